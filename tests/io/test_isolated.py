@@ -76,19 +76,20 @@ def test_pieces_of_a_file_are_one_surface(tmp_path):
 
 
 def test_reading_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtk", Mesh(*CUBE))
+    write_mesh(tmp_path / "a.vtkhdf", Mesh(*CUBE))
     monkeypatch.setattr(isolated, "_SECONDS", 0.01)
-    with pytest.raises(MeshError, match=r"a\.vtk: .*reading was stopped after 0 s"):
-        read_mesh(tmp_path / "a.vtk")
+    monkeypatch.setattr(isolated, "_PER_MEGABYTE", 0.0)
+    with pytest.raises(MeshError, match=r"a\.vtkhdf: .*reading was stopped after 0 s"):
+        read_mesh(tmp_path / "a.vtkhdf")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs limits of memory")
 def test_reading_that_needs_too_much_memory_is_an_error(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtk", Mesh(*icosphere(6)))
+    write_mesh(tmp_path / "a.vtkhdf", Mesh(*icosphere(6)))
     monkeypatch.setattr(isolated, "_MEMORY", 1)
     monkeypatch.setattr(isolated, "_PER_BYTE", 0)
-    with pytest.raises(MeshError, match=r"a\.vtk: "):
-        read_mesh(tmp_path / "a.vtk")
+    with pytest.raises(MeshError, match=r"a\.vtkhdf: "):
+        read_mesh(tmp_path / "a.vtkhdf")
 
 
 @pytest.mark.skipif(not meshlab.available(), reason="needs PyMeshLab")
@@ -99,10 +100,10 @@ def test_error_messages_of_pymeshlab_are_passed_on(tmp_path):
 
 
 def test_no_temporary_files_are_left_behind(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtk", Mesh(*CUBE))
+    write_mesh(tmp_path / "a.vtkhdf", Mesh(*CUBE))
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    read_mesh(tmp_path / "a.vtk")
-    (tmp_path / "a.vtk").write_bytes((tmp_path / "a.vtk").read_bytes()[:-200])
+    read_mesh(tmp_path / "a.vtkhdf")
+    (tmp_path / "a.vtkhdf").write_bytes((tmp_path / "a.vtkhdf").read_bytes()[:-200])
     with pytest.raises(MeshError):
-        read_mesh(tmp_path / "a.vtk")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.vtk"]
+        read_mesh(tmp_path / "a.vtkhdf")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.vtkhdf"]

@@ -25,7 +25,7 @@ from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
-from vtk_segdeform.io.number_lines import numbers_of
+from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
@@ -499,6 +499,52 @@ def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype):
         if slow is not None:
             assert quick.dtype == slow.dtype
             assert quick.tobytes() == slow.tobytes()
+
+
+def test_areas_of_faces_are_equal(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    quick, slow = twin(lambda: Mesh(MESH.vertices, MESH.faces).face_areas)
+    assert_array_equal(quick, slow)
+    corners = MESH.vertices[MESH.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert_allclose(quick, 0.5 * np.linalg.norm(normals, axis=1), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "is_plain"),
+    [("v 1 2.5 -3e2\nf 1 2 3\nv\t0 0 0 \r\n", True), ("v 1 2\nv 1 2 3\n", False),
+     ("v 1 2 3\nv 1 2\n", False), ("v 1 x\n", False), ("v 1 2 # 3\n", False), ("f 1 2 3\n", False),
+     ("v 1\n 2\n", True)],
+)  # fmt: skip
+def test_tables_of_lines_are_read_alike(twin, monkeypatch, text, is_plain):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    quick, slow = twin(lambda: Lines(text.encode(), ("v", "f")).table("v"))
+    assert (quick is None, slow is None) == (not is_plain, not is_plain)
+    if is_plain:
+        assert quick.tolist() == slow.tolist()
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("f 1 2 -3\nv 1 2 3\nf 4 5 6 7", [[1, 0, 0], [2, 0, 0], [-3, 0, 0], [4, 0, 0]]),
+     ("f 1/2 3/4\n", [[1, 2, 0], [3, 4, 0]]), ("f 1//2 3//4", [[1, 0, 2], [3, 0, 4]]),
+     ("f\t1/2/-3 \r\n", [[1, 2, -3]]), ("f 0 1 2", None), ("f 1/0", None), ("f 1/ 2/", None),
+     ("f /1 2", None), ("f 1/2/3/4", None), ("f 1 a", None), ("f 1//", None), ("f 1.0", None),
+     ("f 1/-/2", None), ("f 123456789012345678", None), ("f - 1", None), ("f 1 2 #", None)],
+)  # fmt: skip
+def test_corners_of_lines_are_read_alike(twin, monkeypatch, text, expected):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    quick, slow = twin(lambda: Lines(text.encode(), ("v", "f")).corners("f"))
+    assert (quick is None, slow is None) == (expected is None, expected is None)
+    if expected is not None:
+        assert quick[1][: len(expected)].tolist() == expected
+        assert [each.tolist() for each in quick] == [each.tolist() for each in slow]
+
+
+def test_corners_that_are_given_in_different_ways_are_read_at_once(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    quick, _ = twin(lambda: Lines(b"f 1 2/3 4//5 6/7/8\n", ("v", "f")).corners("f"))
+    assert quick[1].tolist() == [[1, 0, 0], [2, 3, 0], [4, 0, 5], [6, 7, 8]]
 
 
 STL = (

@@ -33,7 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import IntrinsicTriangulation
 from ..mesh import Mesh
 from ..subspace import Subspace
@@ -76,12 +76,12 @@ class Sample:
         thirds = np.repeat(mesh.face_areas / 3.0, 3)
         areas = np.asarray(np.bincount(faces.ravel(), thirds, n), dtype=np.float64)
         weights = _weights(_along_curve(x, clusters), clusters, areas, number)
-        near = (weights > 0.0)[faces].any(axis=1)
+        near = _touched(weights > 0.0, faces)
         ids, corners = _numbered(faces[near], n)
         surface = IntrinsicTriangulation.of(x[ids], corners)
         if surface.faces is not corners:  # bad triangles were flipped: others may be near now
             whole = IntrinsicTriangulation.of(x, faces)
-            near = (weights > 0.0)[whole.faces].any(axis=1)
+            near = _touched(weights > 0.0, whole.faces)
             ids, corners = _numbered(whole.faces[near], n)
             surface = IntrinsicTriangulation(x[ids], corners, whole.lengths[near])
         return cls(ids, surface, weights[ids])
@@ -95,6 +95,12 @@ class Sample:
             rows.append(mine)
             blocks.append(block[found[mine]])
         return Subspace(len(self.ids), tuple(rows), tuple(blocks))
+
+
+def _touched(vertices: BoolArray, faces: IntArray) -> BoolArray:
+    """Return which *faces* (m, 3) have one of *vertices* (n,)."""
+    a, b, c = (vertices[corner] for corner in faces.T)
+    return np.asarray(a | b | c)
 
 
 def _numbered(faces: IntArray, n: int) -> tuple[IntArray, IntArray]:

@@ -13,7 +13,8 @@ The files, in reading order:
     stl                STL
     gltf               glTF: a folder with its own contents
     vtk_formats        other formats, by VTK
-    vtk_xml            plain files of VTK's XML formats, without VTK
+    vtk_xml vtk_legacy plain files of VTK's formats, without VTK
+    vtk_parts          their cells and arrays
     isolated reading_child
                        native readers in a child process
     array_names        names and arrays that a format cannot store

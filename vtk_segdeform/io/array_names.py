@@ -7,6 +7,7 @@ is valid in any case.
 
 from __future__ import annotations
 
+import codecs
 import logging
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 
@@ -30,9 +31,14 @@ def decoded(data: bytes) -> str:
 
 def text_of(data: bytes) -> str:
     """Return the text of a file, `decoded`; MeshError if it is in UTF-16, or not text at all."""
+    return decoded(text_bytes(data))
+
+
+def text_bytes(data: bytes) -> bytes:
+    """Return the bytes of `text_of`, without the mark of UTF-8 before them."""
     if b"\0" in data[:1000]:
         raise MeshError("is UTF-16 text, or not text at all; save it as UTF-8 or ASCII text")
-    return decoded(data)
+    return data.removeprefix(codecs.BOM_UTF8)
 
 
 def plain_names(

@@ -14,32 +14,39 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_checks, inputs
+from .array_names import decoded
 
-_LINE_FEED, _SPACE, _TAB = b"\n \t"
+_LINE_FEED, _SPACE, _TAB, _SLASH = b"\n \t/"
+_LONGEST = 2  # letters of a word that lines are grouped by
+_MOST = 10**17  # an index
 
 
 class Lines:
-    """The lines of a text, grouped by their first word if it is one of *words*."""
+    """The lines of a text, grouped by their first word if it is one of *words*.
 
-    def __init__(self, text: str, words: tuple[str, ...]) -> None:
-        self._text = text.encode() + b"\n" * (not text.endswith("\n"))
+    These have one or two letters.
+    """
+
+    def __init__(self, text: bytes, words: tuple[str, ...]) -> None:
+        self._text = text + b"\n" * (not text.endswith(b"\n"))
         self._words = words
-        data = np.frombuffer(self._text, dtype=np.uint8)
+        data = self._letters = np.frombuffer(self._text, dtype=np.uint8)
         self._starts = np.append(0, np.flatnonzero(data == _LINE_FEED) + 1)
         first = self._starts[:-1]
-        padded = np.append(data, np.zeros(max(map(len, words)) + 1, dtype=np.uint8))
+        # Beyond the end, the last line feed.
+        letters = [data[np.minimum(first + k, len(data) - 1)] for k in range(_LONGEST + 1)]
         self._sort = np.full(len(first), -1, dtype=np.int8)
         for number, word in enumerate(words):
-            after = padded[first + len(word)]
+            after = letters[len(word)]
             matches = (after == _SPACE) | (after == _TAB)
-            for k, letter in enumerate(word.encode()):
-                matches &= padded[first + k] == letter
+            for k, each in enumerate(word.encode()):
+                matches &= letters[k] == each
             self._sort[matches] = number
 
     def of(self, word: str) -> bytes:
         """Return the lines that begin with *word*."""
         wanted = np.repeat(self._sort == self._words.index(word), np.diff(self._starts))
-        return bytes(np.frombuffer(self._text, dtype=np.uint8)[wanted])
+        return bytes(self._letters[wanted])
 
     def above(self, word: str) -> IntArray:
         """Return the number of lines of *word* above each line (n,)."""
@@ -54,7 +61,36 @@ class Lines:
     def others(self) -> Iterator[tuple[int, str]]:
         """Yield the other lines, with their numbers from 0."""
         for number in np.flatnonzero(self._sort < 0).tolist():
-            yield number, self._text[self._starts[number] : self._starts[number + 1] - 1].decode()
+            yield number, decoded(self._line(number))
+
+    def _line(self, number: int) -> bytes:
+        return self._text[self._starts[number] : self._starts[number + 1] - 1]
+
+    def table(self, word: str) -> FloatArray | None:
+        """Return the numbers (k, w) of the lines of *word*; None unless all have w numbers."""
+        at = self.at(word)
+        kernels = compiled_checks(len(at))
+        if kernels is None or not len(at):
+            return _table_of(self.of(word), word)
+        values = np.empty((len(at), len(self._line(at[0]).split()) - 1))
+        text, starts, rows = inputs(self._letters, self._starts, at)
+        is_plain = kernels.numbers_of_lines(text, starts, rows, len(word), values)
+        return values if is_plain else None
+
+    def corners(self, word: str) -> tuple[IntArray, IntArray] | None:
+        """Return the corners of faces, the lines of *word*, as `_corners_of` does.
+
+        Corners may be given in different ways.
+        """
+        at = self.at(word)
+        kernels = compiled_checks(len(at))
+        if kernels is None:
+            return _corners_of(self.of(word))
+        most = int((self._starts[at + 1] - self._starts[at]).sum()) // 2
+        counts, corners = np.empty(len(at), dtype=np.int64), np.empty((most, 3), dtype=np.int64)
+        text, starts, rows = inputs(self._letters, self._starts, at)
+        found = kernels.corners_of_lines(text, starts, rows, len(word), counts, corners)
+        return (counts, corners[:found]) if found >= 0 else None
 
 
 def words_per_line(lines: bytes) -> tuple[IntArray, IntArray]:
@@ -85,7 +121,7 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     return numbers if len(numbers) == count else None
 
 
-def table_of(lines: bytes, word: str) -> FloatArray | None:
+def _table_of(lines: bytes, word: str) -> FloatArray | None:
     """Return the numbers (k, w) of lines that begin with *word*; None unless all have w numbers."""
     _, counts = words_per_line(lines)
     if not len(counts) or (counts != counts[0]).any():
@@ -93,3 +129,33 @@ def table_of(lines: bytes, word: str) -> FloatArray | None:
     width = int(counts[0]) - 1
     values = numbers_of(lines.replace(word.encode(), b" "), np.float64, len(counts) * width)
     return None if values is None else values.reshape(-1, width)
+
+
+def _corners_of(lines: bytes) -> tuple[IntArray, IntArray] | None:
+    """Return the number of corners of each line (m,) of faces, and the corners (c, 3).
+
+    A corner is a, a/t, a//n or a/t/n, whole numbers other than 0, with 0 for those that are not
+    given.  None if something else is there, or if some corners are given in another way.
+    """
+    begins, n_words = words_per_line(lines)
+    counts = n_words - 1
+    n_corners = int(counts.sum())
+    data = np.frombuffer(lines, dtype=np.uint8)
+    slashes = np.flatnonzero(data == _SLASH)
+    per_word = np.diff(np.searchsorted(slashes, np.append(begins, len(data))))
+    per_corner = np.delete(per_word, np.cumsum(n_words) - n_words)
+    n_slashes = int(per_corner[0]) if n_corners else 0
+    columns = ([0], [0, 1], [0, 1, 2])[min(n_slashes, 2)]
+    if n_slashes > 2 or (per_corner != n_slashes).any():
+        return None
+    if n_slashes == 2 and (doubled := lines.count(b"//")):
+        if doubled != n_corners:
+            return None
+        columns = [0, 2]
+    text = lines.replace(b"f", b" ").replace(b"/", b" ")
+    numbers = numbers_of(text, np.int64, n_corners * len(columns))
+    if numbers is None or (numbers == 0).any() or (np.abs(numbers) >= _MOST).any():
+        return None
+    corners = np.zeros((n_corners, 3), dtype=np.int64)
+    corners[:, columns] = numbers.reshape(n_corners, len(columns))
+    return counts, corners

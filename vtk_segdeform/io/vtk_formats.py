@@ -1,8 +1,8 @@
 """Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
 
 Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
-afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain XML
-files are read without VTK (`vtk_xml`).
+afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain
+.vtk, .vtp and .vtu files are read without VTK (`vtk_legacy`, `vtk_xml`).
 
 Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
 names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to
@@ -32,11 +32,13 @@ from ..errors import MeshError
 from .array_names import plain_names, warn_renamed
 from .isolated import read_isolated
 from .polygons import polydata_of
+from .vtk_legacy import read_plain_legacy
 from .vtk_xml import read_plain_xml
 
 _log = logging.getLogger(__name__)
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
 _XML = frozenset({".vtp", ".vtu"})
+_PLAIN = {".vtk": read_plain_legacy, **dict.fromkeys(_XML, read_plain_xml)}
 _DENSEST = 1100  # most bytes out of one compressed byte
 _COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
 _BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
@@ -63,12 +65,13 @@ def read_with_vtk(path: Path) -> pv.PolyData:
                 f"does not begin as a {suffix} file does; it is damaged, or of another format: "
                 "give it the suffix of its format"
             )
-    if suffix in _XML:
+    if suffix in _PLAIN:
         data = path.read_bytes()
-        plain = read_plain_xml(data)
+        plain = _PLAIN[suffix](data)
         if plain is not None:
             return _surface(plain)
-        _require_plausible_counts(data)
+        if suffix in _XML:
+            _require_plausible_counts(data)
     try:
         with read_isolated("vtk", path) as folder:
             pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))

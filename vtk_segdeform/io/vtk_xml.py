@@ -26,10 +26,18 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonDataModel import vtkDataSetAttributes
 
-from .number_lines import numbers_of
+from .vtk_parts import (
+    NotPlainError,
+    add_array,
+    cells_of,
+    count_of,
+    demand,
+    numbers_of_text,
+    set_grid_cells,
+    set_points,
+)
 
 _TAG = re.compile(rb'<(/?)(\w+)((?:\s+\w+="[^"<>&]*")*)\s*(/?)>')
 _ATTRIBUTE = re.compile(rb'(\w+)="([^"]*)"')
@@ -67,10 +75,6 @@ _RANGES = ("L2_NORM_RANGE", "L2_NORM_FINITE_RANGE")  # computed again when they 
 _DEEPEST, _DENSEST = 8, 64  # elements in each other, bytes out of one compressed byte
 
 
-class _NotPlainError(Exception):
-    """The file is damaged, or has something that is left to VTK."""
-
-
 @dataclass
 class _Element:
     name: str
@@ -82,13 +86,11 @@ class _Element:
     def child(self, name: str) -> _Element | None:
         """Return the only child of this name, or None."""
         found = [each for each in self.children if each.name == name]
-        _demand(len(found) <= 1)
+        demand(len(found) <= 1)
         return found[0] if found else None
 
     def count(self, name: str) -> int:
-        word = self.values.get(name, "0")
-        _demand(word.isascii() and word.isdigit() and len(word) < 16)
-        return int(word)
+        return count_of(self.values.get(name, "0"))
 
 
 @dataclass
@@ -106,13 +108,8 @@ def read_plain_xml(data: bytes) -> pv.PolyData | pv.UnstructuredGrid | None:
     """Return what is in the bytes of a .vtp or .vtu file; None if the file is not plain."""
     try:
         return _read(data)
-    except (_NotPlainError, ValueError, FloatingPointError, zlib.error):
+    except (NotPlainError, ValueError, FloatingPointError, zlib.error):
         return None
-
-
-def _demand(plain: Any) -> None:
-    if not plain:
-        raise _NotPlainError
 
 
 def _read(data: bytes) -> pv.PolyData | pv.UnstructuredGrid:
@@ -123,12 +120,12 @@ def _read(data: bytes) -> pv.PolyData | pv.UnstructuredGrid:
     _demand_text(head)
     file = _tree(head)
     compressor, header = file.values.get("compressor", ""), file.values.get("header_type", "UInt32")
-    _demand(file.name == "VTKFile" and file.values.get("byte_order") == "LittleEndian")
-    _demand(file.values.get("version") in ("0.1", "1.0") and header in _HEADERS)
-    _demand(compressor in _COMPRESSORS and len(file.children) == 1)
+    demand(file.name == "VTKFile" and file.values.get("byte_order") == "LittleEndian")
+    demand(file.values.get("version") in ("0.1", "1.0") and header in _HEADERS)
+    demand(compressor in _COMPRESSORS and len(file.children) == 1)
     coding = _Coding(_HEADERS[header], bool(compressor), raw, appended, _DENSEST * len(data))
     body, piece = file.children[0], file.children[0].child("Piece")
-    _demand(body.name == file.values.get("type") and piece is not None)
+    demand(body.name == file.values.get("type") and piece is not None)
     assert piece is not None
     result = {"PolyData": _polydata, "UnstructuredGrid": _grid}[body.name](piece, coding)
     n_points, n_cells = result.GetNumberOfPoints(), result.GetNumberOfCells()
@@ -145,7 +142,7 @@ def _demand_text(text: bytes) -> None:
     """Demand UTF-8 without control characters."""
     letters = np.frombuffer(text, dtype=np.uint8)
     n_blank = sum(text.count(each) for each in (b" ", b"\t", b"\n", b"\r"))
-    _demand(np.count_nonzero(letters <= _SPACE) == n_blank)
+    demand(np.count_nonzero(letters <= _SPACE) == n_blank)
     if not text.isascii():
         text.decode("utf-8")
 
@@ -161,30 +158,30 @@ def _tree(text: bytes) -> _Element:
         n_tags += 1
         name = tag[2].decode()
         parent = path[-1]
-        _demand(parent.name in _WITH_TEXT or not text[at : tag.start()].strip())
+        demand(parent.name in _WITH_TEXT or not text[at : tag.start()].strip())
         at = tag.end()
         if tag[1]:
-            _demand(parent.name == name and not tag[3] and not tag[4])
-            _demand(name != "Value" or _VALUE.fullmatch(text, parent.start, tag.start()))
+            demand(parent.name == name and not tag[3] and not tag[4])
+            demand(name != "Value" or _VALUE.fullmatch(text, parent.start, tag.start()))
             if not parent.children:
                 parent.text = text[parent.start : tag.start()]
             path.pop()
             continue
         values = {key.decode(): value.decode() for key, value in _ATTRIBUTE.findall(tag[3])}
         known = _KNOWN.get(name)
-        _demand(known is not None and len(path) < _DEEPEST)
-        _demand(len(values) == tag[3].count(b'="'))  # none is there twice
+        demand(known is not None and len(path) < _DEEPEST)
+        demand(len(values) == tag[3].count(b'="'))  # none is there twice
         assert known is not None
         names = {key for key in values if name != "DataArray" or not _COMPONENT.fullmatch(key)}
-        _demand(names <= known)
+        demand(names <= known)
         if name == "InformationKey":
-            _demand(values.get("name") in _RANGES)
+            demand(values.get("name") in _RANGES)
             parent.text = parent.text or text[parent.start : tag.start()]
         parent.children.append(_Element(name, values, tag.end()))
         if not tag[4]:
             path.append(parent.children[-1])
-    _demand(path == [root] and len(root.children) == 1 and not text[at:].strip())
-    _demand(n_tags == text.count(b"<", root.start))
+    demand(path == [root] and len(root.children) == 1 and not text[at:].strip())
+    demand(n_tags == text.count(b"<", root.start))
     return root.children[0]
 
 
@@ -204,40 +201,36 @@ def _grid(piece: _Element, coding: _Coding) -> pv.UnstructuredGrid:
     n_points, n_cells = _set_points(grid, piece, coding), piece.count("NumberOfCells")
     element = _demanded(piece.child("Cells"))
     cells = _cells(element, n_cells, n_points, coding)
-    types = _numbers(_array_of(element, "types"), n_cells, coding)
-    _demand(types.dtype == np.uint8 and len(element.children) == 3)
-    grid.SetCells(numpy_to_vtk(types, 1), cells)
+    demand(len(element.children) == 3)
+    set_grid_cells(grid, cells, _numbers(_array_of(element, "types"), n_cells, coding))
     return grid
 
 
 def _demanded(element: _Element | None) -> _Element:
     if element is None:
-        raise _NotPlainError
+        raise NotPlainError
     return element
 
 
 def _set_points(data: Any, piece: _Element, coding: _Coding) -> int:
     count, element = piece.count("NumberOfPoints"), _demanded(piece.child("Points"))
-    _demand(count and len(element.children) == 1)
+    demand(count and len(element.children) == 1)
     values = _numbers(element.children[0], 3 * count, coding)
-    _demand(values.dtype.kind == "f" and element.children[0].count("NumberOfComponents") == 3)
-    data.points = np.array(values.reshape(-1, 3))
+    demand(element.children[0].count("NumberOfComponents") == 3)
+    set_points(data, values)
     return count
 
 
 def _cells(element: _Element, count: int, n_points: int, coding: _Coding) -> pv.CellArray:
     corners = _numbers(_array_of(element, "connectivity"), None, coding)
     ends = _numbers(_array_of(element, "offsets"), count, coding)
-    _demand(corners.dtype.kind == ends.dtype.kind == "i" and len(corners) and len(ends))
-    starts = np.append(0, ends)
-    _demand((np.diff(starts) >= 0).all() and starts[-1] == len(corners))
-    _demand(corners.min() >= 0 and corners.max() < n_points)
-    return pv.CellArray.from_arrays(starts.astype(np.int64), corners.astype(np.int64))
+    demand(corners.dtype.kind == ends.dtype.kind == "i")
+    return cells_of(np.append(0, ends), corners, n_points)
 
 
 def _array_of(element: _Element, name: str) -> _Element:
     found = [each for each in element.children if each.values.get("Name") == name]
-    _demand(len(found) == 1)
+    demand(len(found) == 1)
     return found[0]
 
 
@@ -248,79 +241,66 @@ def _add_arrays(
     if element is None:
         return
     names = [each.values.get("Name", "") for each in element.children]
-    _demand(all(names) and len(set(names)) == len(names))
     for name, each in zip(names, element.children, strict=True):
         width = each.count("NumberOfComponents") if "NumberOfComponents" in each.values else 1
         n_rows = each.count("NumberOfTuples") if count is None else count
-        _demand(width)
+        demand(width)
         values = _numbers(each, n_rows * width, coding).reshape(n_rows, width)
         is_ids = "IdType" in each.values
-        _demand(each.values.get("IdType", "1") == "1")
-        _demand(values.size and (not is_ids or values.dtype == np.int64))
-        array = numpy_to_vtkIdTypeArray(values, 1) if is_ids else numpy_to_vtk(values, 1)
-        array.SetName(name)
+        demand(each.values.get("IdType", "1") == "1")
+        demand(not is_ids or values.dtype == np.int64)
+        array = add_array(attributes, name, values, is_ids=is_ids)
         for key, part in each.values.items():
             if found := _COMPONENT.fullmatch(key):
-                _demand(int(found[1]) < width)
+                demand(int(found[1]) < width)
                 array.SetComponentName(int(found[1]), part)
-        attributes.AddArray(array)
     for kind, name in element.values.items():
-        _demand(name in names and attributes.SetActiveAttribute(name, _KINDS[kind]) >= 0)
+        demand(name in names and attributes.SetActiveAttribute(name, _KINDS[kind]) >= 0)
 
 
 def _numbers(element: _Element, count: int | None, coding: _Coding) -> Any:
     """Return the numbers of an array, (count,); as many as there are if *count* is None."""
     values = element.values
-    _demand(element.name == "DataArray" and values.get("type") in _TYPES)
+    demand(element.name == "DataArray" and values.get("type") in _TYPES)
     kind = np.dtype(_TYPES[values["type"]])
     if values.get("format") == "ascii":
-        result = _numbers_of_text(element.text, kind)
+        result = numbers_of_text(element.text, kind)
     else:
         if values.get("format") == "appended":
             code = memoryview(coding.appended)[element.count("offset") :]
-            _demand("offset" in values and len(code))
+            demand("offset" in values and len(code))
         else:
-            _demand(values.get("format") == "binary")
+            demand(values.get("format") == "binary")
             code = memoryview(element.text.strip())
         raw = coding.raw and values["format"] == "appended"
         decoded = (_decompressed if coding.compressed else _stored)(code, raw, coding)
         result = np.frombuffer(decoded, kind)
-    _demand(count is None or len(result) == count)
+    demand(count is None or len(result) == count)
     return result
-
-
-def _numbers_of_text(text: bytes, kind: Any) -> Any:
-    numbers = numbers_of(text, np.float64 if kind.kind == "f" else np.int64)
-    _demand(numbers is not None and kind != np.uint64)
-    if kind.kind != "f" and len(numbers):
-        bounds = np.iinfo(kind)
-        _demand(bounds.min <= numbers.min() and numbers.max() <= bounds.max)
-    with np.errstate(over="raise"):
-        return numbers.astype(kind)
 
 
 def _stored(code: memoryview, raw: bool, coding: _Coding) -> bytes:
     """Return the bytes of an array that is not compressed."""
     size = int(_words(code, 1, raw, coding)[0])
-    _demand(size <= len(code))
+    demand(size <= len(code))
     return _decoded(code, coding.header + size, raw)[coding.header :]
 
 
 def _decompressed(code: memoryview, raw: bool, coding: _Coding) -> bytes:
     n_blocks, block, last = _words(code, 3, raw, coding).tolist()
-    _demand(n_blocks <= len(code))
+    demand(n_blocks <= len(code))
     sizes = _words(code, 3 + n_blocks, raw, coding)[3:].tolist()
     full = [block] * n_blocks
     if n_blocks and last:
         full[-1] = last
     coding.left -= sum(full)
-    _demand(coding.left >= 0 and sum(sizes) <= len(code))
+    demand(coding.left >= 0 and sum(sizes) <= len(code))
     blocks = _decoded(code[_length((3 + n_blocks) * coding.header, raw) :], sum(sizes), raw)
     parts, at = [], 0
     for size, expected in zip(sizes, full, strict=True):
         tool = zlib.decompressobj()
         parts.append(tool.decompress(blocks[at : at + size], expected + 1))
-        _demand(len(parts[-1]) == expected and tool.eof and not tool.unused_data)
+        demand(len(parts[-1]) == expected and tool.eof and not tool.unused_data)
         at += size
     return b"".join(parts)
 
@@ -337,7 +317,7 @@ def _length(size: int, raw: bool) -> int:
 def _decoded(code: memoryview, size: int, raw: bool) -> bytes:
     """Return the first *size* bytes of *code*, which may go on in base64 without a padding."""
     length = _length(size, raw)
-    _demand(length <= len(code))
+    demand(length <= len(code))
     result = bytes(code[:length]) if raw else base64.b64decode(code[:length], validate=True)
-    _demand(len(result) >= size)
+    demand(len(result) >= size)
     return result[:size]

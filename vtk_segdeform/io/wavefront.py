@@ -16,8 +16,6 @@ its vertices.  Here vertices remain as in the file:
 
 A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
 texture coordinates.
-
-Long because reader and writer of the format are side by side.
 """
 
 from __future__ import annotations
@@ -31,9 +29,17 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
-from .array_names import get_names, plain_names, set_names, text_of, warn_left_out, warn_renamed
+from .array_names import (
+    decoded,
+    get_names,
+    plain_names,
+    set_names,
+    text_bytes,
+    warn_left_out,
+    warn_renamed,
+)
 from .moving import CORNER_NORMALS
-from .number_lines import Lines, numbers_of, table_of, words_per_line
+from .number_lines import Lines
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
 _CORNER_TEXTURE = "TextureCorners"
@@ -51,15 +57,16 @@ _Runs: TypeAlias = dict[str, list[tuple[tuple[int, int, int], str]]]
 
 def read_obj(path: Path) -> pv.PolyData:
     """Read the polygons of an OBJ file."""
-    text = text_of(path.read_bytes())
-    if "\r" in text:
-        text = text.replace("\r\n", "\n").replace("\r", "\n")
-    if "\\" in text:
-        text = text.replace("\\\n", " ")
+    text = text_bytes(path.read_bytes())
+    if b"\r" in text:
+        text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    if b"\\" in text:
+        text = text.replace(b"\\\n", b" ")
     lines = Lines(text, _WORDS)
     statements = [(number, *_statement(line)) for number, line in lines.others()]
     if any(word in _WORDS for _, word, _ in statements):  # with other blanks before or after it
-        lines = Lines("\n".join(" ".join(_statement(line)) for line in text.split("\n")), _WORDS)
+        parted = (" ".join(_statement(line)) for line in decoded(text).split("\n"))
+        lines = Lines("\n".join(parted).encode(), _WORDS)
         statements = [(number, *_statement(line)) for number, line in lines.others()]
     above = np.stack([lines.above(word) for word in _WORDS], axis=1)
     cells: dict[str, list[list[int]]] = {"p": [], "l": []}
@@ -76,8 +83,8 @@ def read_obj(path: Path) -> pv.PolyData:
             runs[word].append((begun, rest.strip()))
         elif word == "mtllib":
             libraries.append(rest.strip())
-    counts, indices = _faces(lines.of("f"), above[lines.at("f"), :3])
-    table = _table("vertex", lines.of("v"), "v", (3, 4, 6, 7))
+    counts, indices = _faces(lines, above[lines.at("f"), :3])
+    table = _table("vertex", lines, "v", (3, 4, 6, 7))
     corners = np.ascontiguousarray(indices[:, 0])
     most = max([corners.max(initial=-1), *map(max, (*cells["p"], *cells["l"]))])
     if most >= len(table):
@@ -92,9 +99,9 @@ def read_obj(path: Path) -> pv.PolyData:
     for name, rows in (("verts", cells["p"]), ("lines", cells["l"])):
         if rows:
             setattr(surface, name, [n for row in rows for n in (len(row), *row)])
-    texture = _table("texture coordinate", lines.of("vt"), "vt", (2, 3))[:, :2]
+    texture = _table("texture coordinate", lines, "vt", (2, 3))[:, :2]
     _keep_corners(surface, "texture coordinate", texture, indices[:, 1])
-    normals = _table("normal", lines.of("vn"), "vn", (3,))
+    normals = _table("normal", lines, "vn", (3,))
     _keep_corners(surface, "normal", normals, indices[:, 2])
     _keep_runs(surface, runs)
     if libraries:
@@ -125,68 +132,39 @@ def _number(word: str, count: int) -> int:
     return number - 1 if number > 0 else count + number
 
 
-def _faces(lines: bytes, above: IntArray) -> tuple[IntArray, IntArray]:
+def _faces(lines: Lines, above: IntArray) -> tuple[IntArray, IntArray]:
     """Return the number of corners (m,) of the faces, and the indices (c, 3); -1 for none.
 
     *above* (m, 3) are the numbers of vertices, texture coordinates and normals above each line.
     """
-    plain = _plain_faces(lines, above)
+    plain = lines.corners("f")
     if plain is not None:
-        return plain
-    counts, indices = [], []
-    for line, sizes in zip(lines.decode().split("\n"), above.tolist(), strict=False):
+        counts, corners = plain
+        indices = corners - 1
+        if (corners < 0).any():
+            indices = np.where(corners < 0, corners + np.repeat(above, counts, axis=0), indices)
+        if ((indices >= 0) | (corners == 0)).all():
+            return counts, indices
+    n_corners, each = [], []
+    for line, sizes in zip(decoded(lines.of("f")).split("\n"), above.tolist(), strict=False):
         words = _words(line)[1:]
-        counts.append(len(words))
+        n_corners.append(len(words))
         for word in words:
             parts = (*word.split("/", 2), "", "")[:3]
             vertex = _number(parts[0], sizes[0])
             others = zip(parts[1:], sizes[1:], strict=True)
-            indices.append((vertex, *(_number(part, n) if part else -1 for part, n in others)))
-    return np.array(counts, dtype=np.int64), np.array(indices, dtype=np.int64).reshape(-1, 3)
+            each.append((vertex, *(_number(part, n) if part else -1 for part, n in others)))
+    return np.array(n_corners, dtype=np.int64), np.array(each, dtype=np.int64).reshape(-1, 3)
 
 
-def _plain_faces(lines: bytes, above: IntArray) -> tuple[IntArray, IntArray] | None:
-    """Return `_faces` if all corners are valid, and alike: a, a/t, a//n or a/t/n."""
-    begins, n_words = words_per_line(lines)
-    counts = n_words - 1
-    n_corners = int(counts.sum())
-    data = np.frombuffer(lines, dtype=np.uint8)
-    slashes = np.flatnonzero(data == ord("/"))
-    per_word = np.diff(np.searchsorted(slashes, np.append(begins, len(data))))
-    per_corner = np.delete(per_word, np.cumsum(n_words) - n_words)
-    n_slashes = int(per_corner[0]) if n_corners else 0
-    columns = ([0], [0, 1], [0, 1, 2])[min(n_slashes, 2)]
-    if n_slashes > 2 or (per_corner != n_slashes).any():
-        return None
-    if n_slashes == 2 and (doubled := lines.count(b"//")):
-        if doubled != n_corners:
-            return None
-        columns = [0, 2]
-    text = lines.replace(b"f", b" ").replace(b"/", b" ")
-    numbers = numbers_of(text, np.int64, n_corners * len(columns))
-    if numbers is None:
-        return None
-    table = numbers.reshape(n_corners, len(columns))
-    if (table == 0).any() or (table > _MOST).any():
-        return None
-    indices = np.full((n_corners, 3), -1)
-    indices[:, columns] = table - 1
-    if (table < 0).any():
-        from_end = table + np.repeat(above[:, columns], counts, axis=0)
-        if (from_end < 0).any():
-            return None
-        indices[:, columns] = np.where(table > 0, table - 1, from_end)
-    return counts, indices
-
-
-def _table(what: str, lines: bytes, word: str, widths: tuple[int, ...]) -> FloatArray:
-    """Return the numbers (k, w) of *lines*, as many as the least of *widths* if they differ."""
-    if not lines:
-        return np.empty((0, min(widths)))
-    table = table_of(lines, word)
+def _table(what: str, lines: Lines, word: str, widths: tuple[int, ...]) -> FloatArray:
+    """Return the numbers (k, w) of lines, as many as the least of *widths* if they differ."""
+    table = lines.table(word)
     if table is not None and table.shape[1] in widths:
         return table
-    rows = [_words(line)[1:] for line in lines.decode().split("\n")[:-1]]
+    rows = [_words(line)[1:] for line in decoded(lines.of(word)).split("\n")[:-1]]
+    if not rows:
+        return np.empty((0, min(widths)))
     if word == "vt":
         rows = [(row + ["0", "0"])[:2] for row in rows]
     if len({len(row) for row in rows}) > 1 or len(rows[0]) not in widths:

@@ -132,11 +132,9 @@ class Search:
 
     @cached_property
     def _distinct(self) -> tuple[BoolArray, BoolArray, HalfEdges]:
-        none = np.zeros(len(self.triangles), dtype=bool)
         if self.n_repeating == 0:
-            half_edges = HalfEdges(self.triangles, len(self.points))
-            if not half_edges.repeated.any():
-                return none, none, half_edges
+            none = np.zeros(len(self.triangles), dtype=bool)
+            return _without_repeated(none, HalfEdges(self.triangles, len(self.points)))
         return distinct_faces(self.triangles, len(self.points))
 
     @cached_property
@@ -307,11 +305,20 @@ def distinct_faces(faces: IntArray, n_vertices: int) -> tuple[BoolArray, BoolArr
 
     No face is both.
     """
-    degenerate, duplicate = repeats_vertex(faces), np.zeros(len(faces), dtype=bool)
-    half_edges = HalfEdges(faces[~degenerate] if degenerate.any() else faces, n_vertices)
-    if half_edges.repeated.any():
-        duplicate[~degenerate] = half_edges.repeated
-        half_edges = HalfEdges(faces[~degenerate & ~duplicate], n_vertices)
+    degenerate = repeats_vertex(faces)
+    left = faces[~degenerate] if degenerate.any() else faces
+    return _without_repeated(degenerate, HalfEdges(left, n_vertices))
+
+
+def _without_repeated(
+    degenerate: BoolArray, half_edges: HalfEdges
+) -> tuple[BoolArray, BoolArray, HalfEdges]:
+    """Return `distinct_faces`, of the *half_edges* of the faces that are not *degenerate*."""
+    duplicate = np.zeros(len(degenerate), dtype=bool)
+    repeated = half_edges.repeated
+    if repeated.any():
+        duplicate[~degenerate] = repeated
+        half_edges = HalfEdges(half_edges.faces[~repeated], half_edges.n_vertices)
     return degenerate, duplicate, half_edges
 
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, inputs, scratch
@@ -31,8 +29,25 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
         kernels.link(tree, *inputs(np.asarray(one, np.int64), np.asarray(other, np.int64)))
         kernels.number_trees(tree)
         return tree
-    links = sparse.coo_array((np.ones(len(one), bool), (one, other)), shape=(n, n))
-    return renumbered_by_first(csgraph.connected_components(links, directed=False)[1])
+    return renumbered_by_first(_linked(n, one, other))
+
+
+def _linked(n: int, one: IntArray, other: IntArray) -> IntArray:
+    """Return the first member of the component of each item, (n,) int.
+
+    In each round, all components join their lowest neighbours, if these are lower.  For a few
+    thousand items this takes a quarter of the time of scipy's search.
+    """
+    first = np.arange(n)
+    while True:
+        a, b = first[one], first[other]
+        apart = a != b
+        if not apart.any():
+            return first
+        one, other, a, b = one[apart], other[apart], a[apart], b[apart]
+        np.minimum.at(first, np.maximum(a, b), np.minimum(a, b))
+        while (further := first[first] != first).any():
+            first[further] = first[first[further]]
 
 
 def renumbered_by_first(labels: NDArray[np.integer]) -> IntArray:
@@ -104,22 +119,6 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
     first = np.empty(len(rows), dtype=np.int64)
     first[order] = order[np.flatnonzero(new)][np.cumsum(new) - 1]
     return first
-
-
-def counting_order(keys: IntArray, n: int) -> IntArray:
-    """Return the stable order that sorts *keys* of 0..n-1, in linear time.
-
-    The keys are the column indices of a sparse matrix with one entry per row; its conversion from
-    rows to columns is a counting sort.
-
-    >>> counting_order(np.array([2, 0, 2, 1]), 3)
-    array([1, 3, 0, 2])
-    """
-    short = np.int32 if max(len(keys), n) < np.iinfo(np.int32).max else np.int64
-    entries = np.ones(len(keys), dtype=bool)
-    rows = np.arange(len(keys) + 1, dtype=short)
-    matrix = sparse.csr_array((entries, keys.astype(short), rows), shape=(len(keys), n))
-    return matrix.tocsc().indices.astype(np.int64)
 
 
 def first_members(labels: NDArray[np.integer]) -> IntArray:

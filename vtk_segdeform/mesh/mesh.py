@@ -11,7 +11,7 @@ faults, `repair` corrects them in the mesh, and `Surface` deforms any polygons w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,14 +21,16 @@ from ..arrays import FloatArray, IntArray, as_points, bounds_of, frozen
 from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
-from ..kernels import in_parallel
+from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import components, edge_keys
 from .faults import Search, as_soup, find_faults
 from .grouping import begins
 from .loops import loops_of
 from .topology import HalfEdges
+from .triangles import corner_columns, cross, norm
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
+_LARGE_PIECE = 200_000  # faces per task of compiled kernels
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -137,10 +139,12 @@ class Mesh(Frozen):
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
         # An edge that is not in the boundary has faces in both directions.
-        n, tail, head = self.n_vertices, self.faces, np.roll(self.faces, -1, axis=1)
-        forth = tail < head
+        n, (a, b, c) = self.n_vertices, self.faces.T.copy()
         one, other = self.boundary.T
-        keys = np.concatenate([tail[forth] * n + head[forth], edge_keys(one, other, n)])
+        forth = [
+            tail[tail < head] * n + head[tail < head] for tail, head in ((a, b), (b, c), (c, a))
+        ]
+        keys = np.concatenate([*forth, edge_keys(one, other, n)])
         keys.sort()
         return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
 
@@ -177,10 +181,14 @@ class Mesh(Frozen):
         areas = np.empty(self.n_faces)
 
         def work(start: int, stop: int) -> None:
-            a, b, c = self.vertices[self.faces[start:stop].T]
-            areas[start:stop] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+            a, b, c = corner_columns(self.vertices, self.faces[start:stop])
+            areas[start:stop] = 0.5 * norm(cross(b - a, c - a))
 
-        in_parallel(work, self.n_faces, _PIECE)
+        if kernels := compiled_checks(self.n_faces):
+            given = inputs(self.vertices, self.faces)
+            in_parallel(partial(kernels.face_areas, areas, *given), self.n_faces, _LARGE_PIECE)
+        else:
+            in_parallel(work, self.n_faces, _PIECE)
         frozen(areas)
         return areas
 

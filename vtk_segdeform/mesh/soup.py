@@ -222,10 +222,14 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
     border[half_edges.head_of(half_edges.boundary)] = True
     if border[used].all():
         return found
+    some = np.flatnonzero(shared[half_edges.faces[:, 0]])
+    some = some[shared[half_edges.faces[some, 1:]].all(axis=1)]
+    if border[half_edges.faces[some]].all():  # as along seams: no need to find the shells
+        return found
     shells = half_edges.shells
     is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
     is_open[shells[half_edges.boundary // 3]] = True
-    faces = half_edges.faces[is_open[shells] & shared[half_edges.faces].all(axis=1)]
+    faces = half_edges.faces[some[is_open[shells[some]]]]
     if border[faces].all():
         return found
     first = first_equal_row(np.sort(first_at[faces], axis=1))

@@ -25,8 +25,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs, scratch
@@ -34,7 +32,6 @@ from .edges import edge_keys, next_half_edge
 from .grouping import (
     begins,
     connected,
-    counting_order,
     first_equal_row,
     first_members,
     renumbered_by_first,
@@ -46,6 +43,7 @@ _NAMELESS = (
     "repeated", "shells", "sides", "one_sided", "crowded", "turned", "_alone", "_paired",
 )  # fmt: skip
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
+_LARGEST = 2**63  # of 64-bit integers
 _LARGE = 200_000  # faces for which another thread is worth waking
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
@@ -76,10 +74,12 @@ class HalfEdges:
     @cached_property
     def order(self) -> IntArray:
         """(3m,) int: the half-edges sorted by edge, and by number within an edge."""
-        by_larger = counting_order(np.maximum(self.tail, self.head), self.n_vertices)
-        smaller = np.minimum(self.tail, self.head)[by_larger]
-        order: IntArray = by_larger[counting_order(smaller, self.n_vertices)]
-        return order
+        count = len(self.tail)
+        if self.n_vertices**2 * count < _LARGEST:  # both numbers in one: far quicker to sort
+            numbered = self.keys * count + np.arange(count)
+            numbered.sort()
+            return numbered % count
+        return np.argsort(self.keys, kind="stable")
 
     @cached_property
     def _alone(self) -> IntArray | None:
@@ -282,10 +282,12 @@ class HalfEdges:
         if len(self.crowded) or len(self.turned):
             turned = self.opposite[self.turned]
             half = self._by_edge(np.concatenate([half, self.crowded, self.turned, turned]))
+        if not len(half):
+            return np.empty((0, 2), dtype=np.int64)
         forth = np.where(self.tail[half] < self.head_of(half), 1, -1)
         keys = self.keys_of(half)
         first = np.flatnonzero(begins(keys))
-        net = np.add.reduceat(forth, first) if len(half) else forth
+        net = np.add.reduceat(forth, first)
         edges = np.stack(np.divmod(keys[first], self.n_vertices), axis=1)
         edges[net < 0] = edges[net < 0, ::-1]
         return np.repeat(edges, np.abs(net), axis=0)
@@ -303,8 +305,9 @@ class HalfEdges:
         same = (a == b) | (b == c) | (c == a)
         some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         repeated = np.zeros(len(self.faces), dtype=bool)
-        first = first_equal_row(np.sort(self.faces[some], axis=1))
-        repeated[some] = first != np.arange(len(some))
+        if len(some):
+            first = first_equal_row(np.sort(self.faces[some], axis=1))
+            repeated[some] = first != np.arange(len(some))
         return repeated
 
     def renumbered(self, number: IntArray, n_vertices: int) -> HalfEdges:
@@ -331,13 +334,6 @@ class HalfEdges:
             one = np.append(one, self.crowded[following - 1])
             other = np.append(other, self.crowded[following])
             return connected(m, one // 3, other // 3)
-        # Most meshes are one shell; testing for that takes a fifth of the time of the general case.
-        if m and (self.twin is not None or self.counts.max() <= 2):
-            starts, faces = np.arange(0, 3 * m + 1, 3), np.arange(m)[:, None]
-            across = np.where(self.across < 0, faces, self.across).ravel()  # itself at a border
-            links = sparse.csr_array((np.ones(3 * m, bool), across, starts), shape=(m, m))
-            if len(csgraph.breadth_first_order(links, 0)[0]) == m:
-                return np.zeros(m, dtype=np.int64)
         later = np.ones(len(self.order), dtype=bool)  # on an edge, than its first half-edge
         later[self.first] = False
         at = np.flatnonzero(later)

@@ -12,8 +12,9 @@
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
-    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`
-    text            `number_lines.numbers_of`, `stl.read_stl`
+    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`,
+                    `Mesh.face_areas`
+    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -37,8 +38,8 @@ from .pairs import facing_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
-from .text import facet_corners, plain_numbers
-from .triangles import first_equal_points, flat_faces, shell_sums
+from .text import corners_of_lines, facet_corners, numbers_of_lines, plain_numbers
+from .triangles import face_areas, first_equal_points, flat_faces, shell_sums
 from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
@@ -50,8 +51,10 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "corners_of_lines",
     "determinants",
     "distances_inside",
+    "face_areas",
     "facet_corners",
     "facing_pairs",
     "first_equal_points",
@@ -61,6 +64,7 @@ __all__ = [
     "link_corners",
     "map_packed",
     "number_trees",
+    "numbers_of_lines",
     "one_fan_each",
     "pair_half_edges",
     "plain_numbers",

@@ -1,4 +1,4 @@
-"""Numbers in text, for `number_lines` and `stl`.
+"""Numbers in text, for `number_lines`, `wavefront` and `stl`.
 
 A number is m 10^p with an integer m.  If m is up to 2^53 and p from -22 to 22, both factors are
 doubles, and their product or quotient is rounded once.  Otherwise m and 10^|p| are sums of two
@@ -24,7 +24,8 @@ _EXACT, _EXACT_POWER, _LARGEST = 2**53, 22, 2**62
 _SPLIT = 2.0**27 + 1.0
 _UNDECIDED = 2.0**-95  # relative error of a sum of two doubles, and a margin
 _LINE_FEED, _SPACE, _TAB, _RETURN = b"\n \t\r"
-_PLUS, _MINUS, _POINT, _ZERO, _NINE, _E = b"+-.09e"
+_PLUS, _MINUS, _POINT, _SLASH, _ZERO, _NINE, _E = b"+-./09e"
+_MOST_DIGITS = 17  # of an index
 _LETTER_CASE = 0x20
 _VERTEX, _FACET = np.frombuffer(b"vertex", "u1"), np.frombuffer(b"facet", "u1")
 _END_FACET, _END_SOLID = np.frombuffer(b"endfacet", "u1"), np.frombuffer(b"endsolid", "u1")
@@ -130,6 +131,71 @@ def plain_numbers(text, whole, result):
         if at < 0:
             return -1
         count += 1
+    return count
+
+
+@_compile
+def numbers_of_lines(text, starts, lines, skip, values):
+    """Put the numbers of *lines* (k,) of *text*, after *skip* letters, into *values* (k, w).
+
+    Line i is text[starts[i] : starts[i + 1]].  Return whether all of them have w plain numbers.
+    """
+    for row in range(len(lines)):
+        at, end = starts[lines[row]] + skip, starts[lines[row] + 1]
+        for column in range(values.shape[1]):
+            while at < end and text[at] <= _SPACE:
+                at += 1
+            if at == end:
+                return False
+            values[row, column], at = _number(text, at, False)
+            if at < 0:
+                return False
+        while at < end and text[at] <= _SPACE:
+            at += 1
+        if at < end:
+            return False
+    return True
+
+
+@_compile
+def corners_of_lines(text, starts, lines, skip, counts, corners):
+    """Put the corners of faces, a, a/t, a//n or a/t/n, into *corners* (c, 3), with 0 for none.
+
+    Put their number on each of *lines* (k,) into *counts*.  Return how many there are; -1 if
+    something else is there, if an index is 0 or has over 17 digits, or if there are over c.
+    """
+    count = 0
+    for row in range(len(lines)):
+        at, end = starts[lines[row]] + skip, starts[lines[row] + 1]
+        first = count
+        while True:
+            while at < end and text[at] <= _SPACE:
+                at += 1
+            if at == end:
+                break
+            if count == len(corners):
+                return -1
+            for part in range(3):
+                negative = at < end and text[at] == _MINUS
+                at += negative
+                index, begin = np.int64(0), at
+                while at < end and _ZERO <= text[at] <= _NINE:
+                    index = 10 * index + (np.int64(text[at]) - _ZERO)
+                    at += 1
+                is_empty = part == 1 and at == begin and not negative
+                if (index == 0 and not is_empty) or at - begin > _MOST_DIGITS:
+                    return -1
+                corners[count, part] = -index if negative else index
+                if part == 2 or at == end or text[at] != _SLASH:
+                    if is_empty:
+                        return -1
+                    corners[count, part + 1 :] = 0
+                    break
+                at += 1
+            if at < end and text[at] > _SPACE:
+                return -1
+            count += 1
+        counts[row] = count - first
     return count
 
 

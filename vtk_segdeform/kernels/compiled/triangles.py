@@ -38,6 +38,18 @@ def flat_faces(flat, points, faces, share, start, stop):
 
 
 @_compile
+def face_areas(areas, points, faces, start, stop):
+    """Put the areas of faces start..stop into *areas* (m,)."""
+    for f in range(start, stop):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        ax, ay, az = points[i, 0], points[i, 1], points[i, 2]
+        ux, uy, uz = points[j, 0] - ax, points[j, 1] - ay, points[j, 2] - az
+        vx, vy, vz = points[k, 0] - ax, points[k, 1] - ay, points[k, 2] - az
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        areas[f] = 0.5 * np.sqrt((x * x + y * y) + z * z)
+
+
+@_compile
 def shell_sums(volume, area, size, origins, points, faces, shells):
     """Add to *volume* and *area* (k,) of each shell six times and twice those of its faces.
 
