@@ -12,11 +12,16 @@ J = 0 on.  It is weak: it costs hardly anything unless a tetrahedron is almost f
 Poses that are folded already, such as those of cages moved by hand, must have a way back.  So
 tetrahedra that are inverted where a solve begins are left out of this solve.
 
-The inner point d is in the middle of the largest ball inside the body that touches the surface at a
-corner, as the mean of the surface points around this ball.  So all corners are linear in the
-surface, the coarse one that the solver's steps have anyway: while no J is below J_0, the term costs
-some determinants.  Neighbouring triangles share an inner point where it is well inside the balls of
-all of them.
+The inner point d is in the middle of the largest balls inside the body that touch the surface at
+the three corners, as the mean of the surface points around these balls.  So all corners are linear
+in the surface, the coarse one that the solver's steps have anyway.  Neighbouring triangles share an
+inner point where it is well inside the balls of all of them.  While no J is below J_0 the term
+costs the inner points and the determinants: 4 to 10 % of a frame.
+
+It has a price where it is active, at bends beyond 90 degrees: a body that may not fold in a crease
+bends over a greater length.  In 25 poses of five bodies, bent and twisted by up to 150 degrees, the
+triangles are distorted 1.03 times as much in the median, and 1.2 to 1.75 times in seven poses;
+5 triangles are folded instead of 31.
 
 Of the Hessian only b'' dJ dJ^T is used, one row for each tetrahedron with J < J_0.  The rest,
 b' d^2 J, is not convex; steps without it are as few.
@@ -144,10 +149,7 @@ class Barrier:
         scale = np.sqrt(0.5 * self.weights[active] * _barrier(j[active])[2])
         moves = self._slopes(y, active) * scale[:, None, None]
         ids, place = np.unique(self.corners[active], return_inverse=True)
-        used, columns = np.unique(self.points[ids].indices, return_inverse=True)
-        near = self.points[ids]
-        near = sparse.csr_array((near.data, columns, near.indptr), (len(ids), len(used)))
-        w = (near @ self.surface.at(used))[place.reshape(-1, 4)]
+        w = self.surface.premultiplied(self.points[ids])[place.reshape(-1, 4)]
         rows = (np.swapaxes(moves, 1, 2) @ w).reshape(len(active), -1)
         return np.asarray(blas.dsyrk(1.0, rows.T, lower=0).T)
 
@@ -206,13 +208,16 @@ def _tetrahedra(x: FloatArray, faces: IntArray) -> tuple[sparse.csr_array, IntAr
     used, place = np.unique(faces, return_inverse=True)
     place = place.reshape(-1, 3)
     around, diameters = _around_balls(x[used], place)
-    inside, own = around @ x[used], place[:, 0]
+    thirds = np.full(place.size, 1.0 / 3.0), (np.repeat(np.arange(len(faces)), 3), place.ravel())
+    mean = sparse.coo_array(thirds, (len(faces), len(used))).tocsr()
+    around, diameters = sparse.csr_array(mean @ around), mean @ diameters
+    inside, own = np.asarray(around @ x[used]), np.arange(len(faces))
     cluster = cluster_positions(inside, _INNER, seeded=False)
     means = np.stack([np.bincount(cluster, axis) for axis in inside.T]) / np.bincount(cluster)
-    shared = np.asarray(cKDTree(inside).query(means.T)[1])[cluster][own]
-    beside = np.linalg.norm(inside[shared] - inside[own], axis=1)
+    shared = np.asarray(cKDTree(inside).query(means.T)[1])[cluster]
+    beside = np.linalg.norm(inside[shared] - inside, axis=1)
     y, n, chosen = np.concatenate([x, inside]), len(x), own.copy()
-    is_shared = beside <= 0.5 * _SHARED * diameters[own]
+    is_shared = beside <= 0.5 * _SHARED * diameters
     is_shared &= _are_solid(y, np.column_stack([faces[:, [0, 2, 1]], n + shared]))
     chosen[is_shared] = shared[is_shared]
     corners = np.column_stack([faces[:, [0, 2, 1]], n + chosen])

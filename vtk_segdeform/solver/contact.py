@@ -196,7 +196,9 @@ class Contact:
         """Return the term of *surface* beside a shape energy of this *scale*."""
         return cls(surface, held, _STIFFNESS * scale)
 
-    def value_and_slope(self, p: FloatArray, _x: FloatArray = NO_SURFACE) -> tuple[float, FloatArray]:
+    def value_and_slope(
+        self, p: FloatArray, _x: FloatArray = NO_SURFACE
+    ) -> tuple[float, FloatArray]:
         """Return the term at cages *p* (m, 3), and half its gradient (m, 3)."""
         found = self._active(p)
         if found is None:

@@ -20,11 +20,14 @@ NO_SURFACE = np.empty((0, 3))  # of a pose whose surface is not known
 class Term(Protocol):
     """A further term of the objective; see `terms`."""
 
-    def value_and_slope(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> tuple[float, FloatArray]:
+    def value_and_slope(
+        self, p: FloatArray, x: FloatArray = NO_SURFACE
+    ) -> tuple[float, FloatArray]:
         """Return the term for cages at *p* (m, 3), and half its gradient (m, 3).
 
-        *x* (n, 3) is the surface of the volumes there, or empty if it is not known.  The value is exactly 0 while the term is inactive, and infinite where *p* is not allowed;
-        the gradient is not used then.
+        *x* (n, 3) is the surface of the volumes there, or empty if it is not known.  The value is
+        exactly 0 while the term is inactive, and infinite where *p* is not allowed; the gradient is
+        not used then.
         """
         ...
 
