@@ -390,7 +390,7 @@ class GaussNewton:
         else:
             rows = self.volumes.surface.adjoints(gradients)
         energy, slope = self.energy.value_and_slope(p, load)
-        value, slope = with_terms(self._begun, p, x, energy, slope)
+        value, slope = with_terms(self._begun, p, x, value=energy, slope=slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
         return here.toward(term)
 

@@ -44,7 +44,7 @@ class Term(Protocol):
 
 
 def with_terms(
-    terms: Sequence[Term], p: FloatArray, x: FloatArray, value: float, slope: FloatArray
+    terms: Sequence[Term], p: FloatArray, x: FloatArray, *, value: float, slope: FloatArray
 ) -> tuple[float, FloatArray]:
     """Return an objective and half its gradient with those of *terms* added."""
     for term in terms:
