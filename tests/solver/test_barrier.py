@@ -16,6 +16,7 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.pose_solver import PoseSolver
 from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.solver.barrier import Barrier
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)
@@ -102,8 +103,51 @@ def test_a_bend_folds_without_the_barrier_only(barrier):
         solution = deformer.solve(targets)
         assert abs(solution.volume_change) < 1e-13
         least.append(barrier.ratios(deformer._p).min())
-    assert least[0] > 0.01
+    assert least[0] > 0.0
     assert least[1] < -0.1
+
+
+def test_without_a_volume_to_preserve_it_maps_the_surface_itself(barrier):
+    deformer = BOUND.hold(**HELD, preserve_volume=False)
+    assert not deformer.step_volumes.constraints
+    deformer.solve(SCENE.turned(150), max_steps=10)
+    assert barrier.ratios(deformer._p).min() > 0.0
+
+
+def test_a_surface_that_is_known_is_not_mapped_again(barrier, squeezed):
+    x = BOUND.step_volumes.surface.map(squeezed)
+    value, slope = barrier.value_and_slope(squeezed)
+    elsewhere = np.zeros_like(squeezed)  # p is not read, x is
+    known, same = barrier.value_and_slope(elsewhere, x)
+    assert value > 0.0
+    assert known == value
+    assert_array_equal(same, slope)
+    assert_array_equal(barrier.hessian(elsewhere, x), barrier.hessian(squeezed))
+
+
+def test_the_solver_passes_the_surface_of_the_same_pose(monkeypatch):
+    seen = []
+
+    def recorded(self, p, x):
+        seen.append((p, x))
+        return 0.0, np.zeros_like(p)
+
+    monkeypatch.setattr(Barrier, "value_and_slope", recorded)
+    deformer = BOUND.hold(**HELD)
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    assert len(seen) > 3
+    for p, x in seen:
+        assert_allclose(x, deformer.step_volumes.surface.map(p), atol=1e-12)
+
+
+def test_triangles_share_inner_points_of_the_body(barrier):
+    n = BOUND.step_volumes.surface.n_vertices
+    inner = barrier.corners[:, 3]
+    assert (inner >= n).all()
+    assert len(np.unique(inner)) < 0.5 * len(inner)
+    assert_allclose(barrier.points.sum(axis=1), 1.0, atol=1e-12)
+    faces = {tuple(sorted(each)) for each in BOUND._samples.faces.tolist()}
+    assert {tuple(sorted(each)) for each in barrier.corners[:, :3].tolist()} == faces
 
 
 def test_while_inactive_it_changes_no_bit():

@@ -42,6 +42,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_kernels, inputs
+from .terms import NO_SURFACE
 
 _LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cover the surface
 _DEPTH = 1.5  # D_ab / (h_a + h_b)
@@ -195,7 +196,9 @@ class Contact:
         """Return the term of *surface* beside a shape energy of this *scale*."""
         return cls(surface, held, _STIFFNESS * scale)
 
-    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+    def value_and_slope(
+        self, p: FloatArray, _x: FloatArray = NO_SURFACE
+    ) -> tuple[float, FloatArray]:
         """Return the term at cages *p* (m, 3), and half its gradient (m, 3)."""
         found = self._active(p)
         if found is None:
@@ -203,7 +206,7 @@ class Contact:
         weight = 0.5 * self.stiffness
         return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
 
-    def hessian(self, p: FloatArray) -> FloatArray | None:
+    def hessian(self, p: FloatArray, _x: FloatArray = NO_SURFACE) -> FloatArray | None:
         """Return half the Gauss-Newton Hessian at *p*, (3m, 3m); or None.
 
         The derivatives of normals and weights are in it: without them poses converge slowly.
@@ -221,7 +224,7 @@ class Contact:
         flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
-    def begun_at(self, _p: FloatArray) -> Contact:
+    def begun_at(self, _p: FloatArray, _x: FloatArray = NO_SURFACE) -> Contact:
         """Return itself: the term is finite everywhere."""
         return self
 

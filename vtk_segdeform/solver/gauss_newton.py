@@ -64,7 +64,7 @@ from .exact_volume import moved_along, steps_to_volume
 from .extrapolation import End, Way
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
-from .terms import Term, hessian_of, with_terms
+from .terms import NO_SURFACE, Term, hessian_of, with_terms
 from .volume_constraints import Volumes
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
@@ -78,7 +78,6 @@ _LONG = 1e-2  # beyond it H is computed again
 _OLD = 20  # steps after which H is computed again
 _OLD_ACTIVE = 3  # the same while a term is active
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
-_NO_SURFACE = np.empty((0, 3))
 
 
 @dataclass(frozen=True)
@@ -358,7 +357,7 @@ class GaussNewton:
 
         Unless *newton*, it is that of (21) with the further terms; None without them.
         """
-        of_terms = hessian_of(self._begun, here.p) if here.is_active else None
+        of_terms = hessian_of(self._begun, here.p, here.x) if here.is_active else None
         if not newton:
             return (
                 full_factor(self._hessian, None, here.p, added=of_terms) if here.is_active else None
@@ -380,7 +379,7 @@ class GaussNewton:
 
     def _surface(self, p: FloatArray) -> FloatArray:
         needed = self.volumes.constraints or self.energy.has_vertex_rotations
-        return self.volumes.surface.map(p) if needed else _NO_SURFACE
+        return self.volumes.surface.map(p) if needed else NO_SURFACE
 
     def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
         """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
@@ -391,7 +390,7 @@ class GaussNewton:
         else:
             rows = self.volumes.surface.adjoints(gradients)
         energy, slope = self.energy.value_and_slope(p, load)
-        value, slope = with_terms(self._begun, p, energy, slope)
+        value, slope = with_terms(self._begun, p, x, value=energy, slope=slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
         return here.toward(term)
 
@@ -401,11 +400,12 @@ class GaussNewton:
         if last is not None and last.p is p and self._begun is self.terms:
             return last.toward(term)
         self._begun = self.terms
-        here = self._evaluate(p, self._surface(p), term)
+        x = self._surface(p)
+        here = self._evaluate(p, x, term)
         if here.shape < math.inf:
             return here
-        self._begun = tuple(each.begun_at(p) for each in self.terms)
-        return self._evaluate(p, self._surface(p), term)
+        self._begun = tuple(each.begun_at(p, x) for each in self.terms)
+        return self._evaluate(p, x, term)
 
     def _ahead(
         self, here: _Iterate, targets: FloatArray, term: TargetTerm, options: SolverOptions

@@ -10,25 +10,32 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
 from ..arrays import FloatArray
+
+NO_SURFACE = np.empty((0, 3))  # of a pose whose surface is not known
 
 
 class Term(Protocol):
     """A further term of the objective; see `terms`."""
 
-    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+    def value_and_slope(
+        self, p: FloatArray, x: FloatArray = NO_SURFACE
+    ) -> tuple[float, FloatArray]:
         """Return the term for cages at *p* (m, 3), and half its gradient (m, 3).
 
-        The value is exactly 0 while the term is inactive, and infinite where *p* is not allowed;
-        the gradient is not used then.
+        *x* (n, 3) is the surface of the volumes there, or empty if it is not known.  The value is
+        exactly 0 while the term is inactive, and infinite where *p* is not allowed; the gradient is
+        not used then.
         """
         ...
 
-    def begun_at(self, p: FloatArray, /) -> Term:
+    def begun_at(self, p: FloatArray, x: FloatArray = NO_SURFACE, /) -> Term:
         """Return the term of a solve that begins at *p*: itself, or one that is finite there."""
         ...
 
-    def hessian(self, p: FloatArray) -> FloatArray | None:
+    def hessian(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> FloatArray | None:
         """Return half the Hessian at *p*, made positive semi-definite; None while inactive.
 
         It is (3m, 3m), stacked axis by axis.  Only its lower half is read.
@@ -37,21 +44,21 @@ class Term(Protocol):
 
 
 def with_terms(
-    terms: Sequence[Term], p: FloatArray, value: float, slope: FloatArray
+    terms: Sequence[Term], p: FloatArray, x: FloatArray, *, value: float, slope: FloatArray
 ) -> tuple[float, FloatArray]:
     """Return an objective and half its gradient with those of *terms* added."""
     for term in terms:
-        more, steeper = term.value_and_slope(p)
+        more, steeper = term.value_and_slope(p, x)
         if more:
             value, slope = value + more, slope + steeper
     return value, slope
 
 
-def hessian_of(terms: Sequence[Term], p: FloatArray) -> FloatArray | None:
+def hessian_of(terms: Sequence[Term], p: FloatArray, x: FloatArray) -> FloatArray | None:
     """Return half the Hessian of all *terms*, (3m, 3m); None while all are inactive."""
     total = None
     for term in terms:
-        own = term.hessian(p)
+        own = term.hessian(p, x)
         if own is not None:
             total = own if total is None else total + own
     return total
