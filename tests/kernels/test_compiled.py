@@ -212,7 +212,7 @@ def test_on_open_meshes_no_kernel_leaves_its_arrays(name):
     kernels.rings.py_func(guarded, faces, starts)
     assert 0 <= guarded.min() <= guarded.max() < n
     ring = np.full(faces.size + 64, -7, dtype=np.int32)
-    kernels.rings(ring[: faces.size], faces, starts)
+    kernels.rings(ring[: faces.size], *dispatch.inputs(faces, starts))
     assert_array_equal(ring[: faces.size], guarded)
     assert (ring[faces.size :] == -7).all()
 
