@@ -68,7 +68,7 @@ class _Edges(NamedTuple):
 
     def taken(self, at: IntArray | BoolArray) -> _Edges:
         """Return some of them."""
-        return _Edges(*(each[at] for each in self))
+        return _Edges(self.i[at], self.j[at], self.key[at], self.cost[at], self.place[at])
 
 
 def simplify(

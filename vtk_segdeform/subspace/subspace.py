@@ -33,6 +33,7 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers
 from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates
 from ..errors import CageError, RegionError
+from ..freezing import Frozen
 from ..kernels import compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
@@ -216,7 +217,7 @@ class Subspace:
 
 
 @dataclass(frozen=True, eq=False)
-class _PackedBlocks:
+class _PackedBlocks(Frozen):
     """A small W~ end to end in memory, so that one call of a kernel multiplies by all of it.
 
     One dense block for each set of vertices that the same cages move; so each vertex is in one

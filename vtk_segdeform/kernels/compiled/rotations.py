@@ -10,6 +10,7 @@ characteristic polynomial", Acta Cryst. A61, 2005.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def _largest(n, q):
             square += n[i, j] * n[i, j]
     c2 = -0.5 * square
     c0 = c1 = 0.0
-    best, most = np.int64(0), 0.0  # literals would compile `_minor` once more for each
+    best: Any = np.int64(0)  # literals would compile `_minor` once more for each
+    most = 0.0
     for j in range(4):
         c1 -= _minor(n, j, j)
         c0 += n[0, j] * _minor(n, best, j)
