@@ -42,10 +42,9 @@ bench-history: $(VENV)/installed
 
 # Workers keep the tests of a file together, so that its fixtures are created once, and take over
 # tests of others when they have finished.  Without bytecode files, every worker and every child
-# process would compile all modules again; without the first line here, both workers would.
+# process would compile all modules again.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/installed-test
-	$(BIN)/python -m compileall -q -j 2 vtk_segdeform widgets
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # In a real ParaView, whose own numpy and scipy may be too old: newer ones are put beside it.
