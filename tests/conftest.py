@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 # Set before numpy, scipy and VTK are imported, because they read these variables once.  More
@@ -21,16 +22,43 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a display VTK warns once per window that it cannot connect to X; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
-import pytest  # noqa: E402
-import pyvista as pv  # noqa: E402 - reads the variables above
+import pytest  # noqa: E402 - its plugins read the variables above
 
-from vtk_segdeform import models  # noqa: E402
-from vtk_segdeform.deformer import deformer  # noqa: E402
-from vtk_segdeform.io import isolated, reading_child  # noqa: E402
+# The product is imported where it is needed: not by the process that only distributes the tests,
+# which would do so before it starts the workers.
+_WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+_WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+_KERNELS = "test_compiled.py"
 
-pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
 
-_MODELS = {name: functools.cache(getattr(models, name)) for name in ("cactus", "dinosaur")}
+class _Backwards(pytest.Dir):
+    """A folder whose last file is collected first."""
+
+    def collect(self) -> list[Any]:
+        return [*super().collect()][::-1]
+
+
+def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Let every other worker begin at the end: what one has compiled, the other reads."""
+    return _Backwards.from_parent(parent, path=path) if _WORKER % 2 else None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give each worker a share of the tests of kernels first, to be compiled once."""
+    if _WORKERS == 1:
+        return
+    items.sort(key=lambda item: item.path)
+    kernels = [item for item in items if item.path.name == _KERNELS]
+    others = [item for item in items if item.path.name != _KERNELS]
+    n, k = len(others), len(kernels)
+    items[:] = [
+        item
+        for w in range(_WORKERS)
+        for item in (
+            *kernels[w * k // _WORKERS : (w + 1) * k // _WORKERS],
+            *others[w * n // _WORKERS : (w + 1) * n // _WORKERS],
+        )
+    ]
 
 
 def pytest_collection_finish() -> None:
@@ -39,16 +67,32 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _quick_rendering() -> None:
+    import pyvista as pv
+
+    pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
+
+
+@functools.cache
+def _cached(name: str) -> Any:
+    from vtk_segdeform import models
+
+    return functools.cache(getattr(models, name))
+
+
 @pytest.fixture
 def cached_models(monkeypatch: pytest.MonkeyPatch) -> None:
     """Create each cactus and dinosaur once per process; meshes are immutable."""
-    for name, cached in _MODELS.items():
-        monkeypatch.setattr(models, name, cached)
+    for name in ("cactus", "dinosaur"):
+        monkeypatch.setattr(f"vtk_segdeform.models.{name}", _cached(name))
 
 
 @pytest.fixture(scope="module")
 def vtk_in_process() -> Iterator[None]:
     """Read files of VTK in this process: for tests of contents, it saves 0.2 s for each file."""
+    from vtk_segdeform.io import isolated, reading_child
+
     outside = isolated._exit_code
 
     def here(arguments: list[str], folder: str, seconds: float) -> int:
@@ -66,6 +110,8 @@ def vtk_in_process() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def bound_once() -> Iterator[None]:
     """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
+    from vtk_segdeform.deformer import deformer
+
     known: dict[str, Any] = {}
     bind = deformer.cached_binding
 

@@ -8,6 +8,7 @@ import zlib
 import numpy as np
 import pytest
 import pyvista as pv
+from given_surfaces import save_raw
 from numpy.testing import assert_array_equal
 from solids import OCTAHEDRON
 from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
@@ -97,13 +98,7 @@ def test_raw_bytes_may_look_like_tags(tmp_path):
     bait = np.frombuffer(6 * b"</AppendedData></VTKFile><a b='", dtype=np.uint8)
     surface.point_data["a"] = bait.reshape(6, -1)
     path = tmp_path / "a.vtp"
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(surface)
-    writer.SetFileName(str(path))
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
-    writer.SetCompressorTypeToNone()
-    writer.Write()
+    save_raw(path, surface)
     plain = read_plain_xml(path.read_bytes())
     assert plain is not None
     assert contents(plain) == contents(pv.read(path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import importlib
 import sys
@@ -212,7 +213,7 @@ def test_on_open_meshes_no_kernel_leaves_its_arrays(name):
     kernels.rings.py_func(guarded, faces, starts)
     assert 0 <= guarded.min() <= guarded.max() < n
     ring = np.full(faces.size + 64, -7, dtype=np.int32)
-    kernels.rings(ring[: faces.size], faces, starts)
+    kernels.rings(ring[: faces.size], *dispatch.inputs(faces, starts))
     assert_array_equal(ring[: faces.size], guarded)
     assert (ring[faces.size :] == -7).all()
 
@@ -379,6 +380,31 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
         assert subspace._is_packed
         assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
     assert subspace.adjoints([]) == []
+
+
+def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
+    pytest.importorskip("numba")
+    from vtk_segdeform.kernels.compiled import add_packed_adjoint, map_packed, solve_factored
+    from vtk_segdeform.kernels.compiled.rotations import _minor
+    from vtk_segdeform.kernels.compiled.text import _number
+
+    rows = np.arange(2500), np.arange(1500, 4000)
+    subspace = Subspace(4000, rows, tuple(RNG.random((2, 2500, 40))))
+    p, y = RNG.normal(size=(80, 3)), RNG.normal(size=(4000, 3))
+    (kept,) = dispatch.inputs(y)
+    subspace.map(p)
+    for one in (subspace, copy.deepcopy(subspace)):
+        one.map(p)
+        one.map(*dispatch.inputs(p, y))
+        for ys in ([y], [y, kept], [kept, y]):
+            one.adjoints(ys)
+        assert one._is_packed
+    for coupled in (True, False):
+        Factor(np.eye(180), coupled).solve(np.ones((60 if coupled else 180, 3)))
+    closest_rotations(SHAPES["any"])
+    numbers_of(1000 * b"1.5 2\n", float)
+    for kernel in (map_packed, add_packed_adjoint, solve_factored, _minor, _number):
+        assert len(kernel.signatures) <= 1, kernel  # none if in the cache with its caller
 
 
 @pytest.mark.parametrize("regions", [1, 5, 70])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -20,22 +21,28 @@ from vtk_segdeform.solver.barrier import Barrier
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)
-BOUND = SCENE.deformer(avoid_folds=True)
-FREE = SCENE.deformer()
-REST = BOUND._rest_cages
 HELD = {"fixed": SCENE.fixed, "handle": SCENE.handle}
+
+
+@functools.cache
+def deformer_of(*, avoid_folds):
+    return SCENE.deformer(avoid_folds=avoid_folds)
+
+
+def rest_cages():
+    return deformer_of(avoid_folds=True)._rest_cages
 
 
 @pytest.fixture(scope="module")
 def barrier():
-    return BOUND._barrier
+    return deformer_of(avoid_folds=True)._barrier
 
 
 @pytest.fixture(scope="module")
 def squeezed(barrier):
     """Return cages half as long along one axis, and noise: most tetrahedra are active."""
-    noise = np.random.default_rng(0).normal(size=REST.shape)
-    return REST * [0.22, 1.0, 1.0] + 2e-3 * noise
+    noise = np.random.default_rng(0).normal(size=rest_cages().shape)
+    return rest_cages() * [0.22, 1.0, 1.0] + 2e-3 * noise
 
 
 def in_order(p):
@@ -45,9 +52,9 @@ def in_order(p):
 
 def test_at_rest_all_volumes_are_as_they_were(barrier):
     assert len(barrier.corners) > 1000
-    assert_allclose(barrier.ratios(REST), 1.0, atol=1e-9)
-    assert barrier.value_and_slope(REST)[0] == 0.0
-    assert barrier.hessian(REST) is None
+    assert_allclose(barrier.ratios(rest_cages()), 1.0, atol=1e-9)
+    assert barrier.value_and_slope(rest_cages())[0] == 0.0
+    assert barrier.hessian(rest_cages()) is None
 
 
 def test_the_slope_is_half_the_derivative(barrier, squeezed):
@@ -83,8 +90,8 @@ def test_a_rigid_motion_changes_nothing(barrier, squeezed):
 
 @pytest.mark.parametrize("scales", [(1, 1, 0.3), (1, 1, -1), (-0.3, 1, 1), (-1, -1, -1)])
 def test_there_is_a_way_back_from_a_folded_pose(barrier, scales):
-    folded = REST * scales
-    deformer = BOUND.hold(**HELD)
+    folded = rest_cages() * scales
+    deformer = deformer_of(avoid_folds=True).hold(**HELD)
     rest = SCENE.mesh.vertices[SCENE.handle]
     deformer.resume([cage.vertices * scales for cage in SCENE.cages], rest)
     assert deformer.solve(rest).status is Status.CONVERGED
@@ -99,7 +106,10 @@ def test_there_is_a_way_back_from_a_folded_pose(barrier, scales):
 def test_a_bend_folds_without_the_barrier_only(barrier):
     targets = SCENE.turned(150)
     least = []
-    for deformer in (BOUND.hold(**HELD), FREE.hold(**HELD)):
+    for deformer in (
+        deformer_of(avoid_folds=True).hold(**HELD),
+        deformer_of(avoid_folds=False).hold(**HELD),
+    ):
         solution = deformer.solve(targets)
         assert abs(solution.volume_change) < 1e-13
         least.append(barrier.ratios(deformer._p).min())
@@ -152,8 +162,10 @@ def test_triangles_share_inner_points_of_the_body(barrier):
 
 def test_while_inactive_it_changes_no_bit():
     targets = SCENE.turned(20)
-    without = FREE.hold(**HELD).solve(targets)
-    assert_array_equal(BOUND.hold(**HELD).solve(targets).vertices, without.vertices)
+    without = deformer_of(avoid_folds=False).hold(**HELD).solve(targets)
+    assert_array_equal(
+        deformer_of(avoid_folds=True).hold(**HELD).solve(targets).vertices, without.vertices
+    )
 
 
 def test_a_session_turns_it_on_and_off():

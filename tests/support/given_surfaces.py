@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 
 def tube(n: int = 16, rows: int = 24) -> pv.PolyData:
@@ -85,3 +86,14 @@ def require_only_moved(before: pv.PolyData, after: pv.PolyData) -> None:
             pair = [getattr(getattr(each, place), f"Get{attribute}")() for each in (before, after)]
             names = [None if each is None else each.GetName() for each in pair]
             assert names[0] == names[1], attribute
+
+
+def save_raw(path, surface):
+    """Write an XML file with its numbers appended in raw binary."""
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(surface)
+    writer.SetFileName(str(path))
+    writer.SetDataModeToAppended()
+    writer.EncodeAppendedDataOff()
+    writer.SetCompressorTypeToNone()
+    writer.Write()

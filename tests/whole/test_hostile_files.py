@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+from given_surfaces import save_raw
 from gltf_files import glb, octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 import vtk_segdeform as sd
 from vtk_segdeform.io import meshlab
@@ -113,17 +113,6 @@ def originals(folder, foreign=FOREIGN):
         (folder / name).write_text(text)
         files.append((reader, folder / name))
     return files
-
-
-def save_raw(path, surface):
-    """Write an XML file with its numbers appended in raw binary."""
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(surface)
-    writer.SetFileName(str(path))
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
-    writer.SetCompressorTypeToNone()
-    writer.Write()
 
 
 def surface_session():

@@ -15,7 +15,8 @@ accumulated area: edges of equal cost then have lengths proportional to rho^(-1/
 A collapse is valid if it preserves the topology (the link condition of [DEGN99]: i and j have
 exactly two common neighbours), inverts no face and creates no needle.  Each round collapses many of
 the cheapest edges at once, chosen so that they do not affect each other; all operations are on
-whole arrays, and the number of rounds grows with the logarithm of the reduction.
+whole arrays, and the number of rounds grows with the logarithm of the reduction.  A round computes
+the costs of the edges at collapsed vertices only; the others have theirs from the round before.
 
 Source
 ------
@@ -29,10 +30,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..progress import Progress, tell
@@ -55,6 +55,20 @@ class _Surface:
     A: FloatArray
     b: FloatArray
     c: FloatArray
+
+
+class _Edges(NamedTuple):
+    """The edges i < j of a surface of n vertices, in the order of their keys n i + j."""
+
+    i: IntArray
+    j: IntArray
+    key: IntArray
+    cost: FloatArray
+    place: FloatArray  # the points that they collapse to
+
+    def taken(self, at: IntArray | BoolArray) -> _Edges:
+        """Return some of them."""
+        return _Edges(self.i[at], self.j[at], self.key[at], self.cost[at], self.place[at])
 
 
 def simplify(
@@ -93,18 +107,21 @@ def simplify(
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     rejected = np.empty(0, dtype=np.int64)
     collapsed = 0
+    known = None
     while left > n_vertices:
         tell(progress, math.log(len(vertices) / left) / reduction, message)
-        edges, cost, place = _costs(surface)
-        key = edges @ [len(vertices), 1]
-        at = np.searchsorted(key, rejected).clip(max=len(key) - 1)
-        cost[at[key[at] == rejected]] = np.inf
-        chosen = _independent(edges, cost, len(vertices))[: left - n_vertices]
-        if len(chosen):
-            done = _collapse(surface, edges[chosen], place[chosen])
+        edges, cost = _costs(surface, known)
+        at = np.searchsorted(edges.key, rejected).clip(max=len(cost) - 1)
+        cost[at[edges.key[at] == rejected]] = np.inf
+        chosen = edges.taken(_independent(edges, cost, len(vertices))[: left - n_vertices])
+        if len(chosen.i):
+            done = _collapse(surface, chosen)
             collapsed += int(done.sum())
             left -= int(done.sum())
-            rejected = np.concatenate([rejected, key[chosen[~done]]])
+            rejected = np.concatenate([rejected, chosen.key[~done]])
+            is_moved = np.zeros(len(vertices), dtype=bool)
+            is_moved[chosen.i[done]] = is_moved[chosen.j[done]] = True
+            known = edges.taken(~(is_moved[edges.i] | is_moved[edges.j])), is_moved
         elif collapsed:  # rejected edges may be valid now that their neighbourhoods changed
             rejected, collapsed = rejected[:0], 0
         else:
@@ -139,17 +156,35 @@ def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | No
     return _Surface(vertices.copy(), faces.copy(), area, need, A, b, c)
 
 
-def _costs(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return all edges i < j, their costs (infinite if invalid) and the points they collapse to."""
+def _costs(s: _Surface, known: tuple[_Edges, BoolArray] | None) -> tuple[_Edges, FloatArray]:
+    """Return all edges, and their costs or infinity where a collapse is invalid.
+
+    *known* are the edges between vertices that have not moved since, and which vertices have.
+    """
     tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
     up = tail < head
     n = len(s.points)
-    order = np.argsort(tail[up] * n + head[up])
+    key = tail[up] * n + head[up]
+    order = np.argsort(key)
     reverse = np.argsort(head[~up] * n + tail[~up])
-    i, j = tail[up][order], head[up][order]
+    key, i, j = key[order], tail[up][order], head[up][order]
+    edges = _Edges(i, j, key, np.empty(len(i)), np.empty((len(i), 3)))
+    fresh: Any = slice(None)
+    if known is not None:
+        old, is_moved = known
+        fresh = is_moved[i] | is_moved[j]
+        edges.cost[~fresh], edges.place[~fresh] = old.cost, old.place
+    edges.cost[fresh], edges.place[fresh] = _cost(s, i[fresh], j[fresh])
+    valence = np.bincount(s.faces.ravel())
+    ends = np.minimum(valence[apex[up][order]], valence[apex[~up][reverse]])
+    return edges, np.where(ends <= 3, np.inf, edges.cost)
+
+
+def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
     middle = 0.5 * (s.points[i] + s.points[j])
     A, b, c = s.A[i] + s.A[j], s.b[i] + s.b[j], s.c[i] + s.c[j]
-    stiffness = _STIFFNESS * np.trace(A, axis1=1, axis2=2)
+    stiffness = _STIFFNESS * (A[:, 0, 0] + A[:, 1, 1] + A[:, 2, 2])
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
     pull = b - np.einsum("eij,ej->ei", A, middle)
     x, y, z = (A + stiffness[:, None, None] * np.eye(3)).transpose(1, 0, 2)
@@ -157,87 +192,89 @@ def _costs(s: _Surface) -> tuple[IntArray, FloatArray, FloatArray]:
     inverse = np.stack([yz, _cross(z, x), _cross(x, y)], axis=1)
     place = middle + np.einsum("eij,ej->ei", inverse, pull) / np.einsum("ei,ei->e", x, yz)[:, None]
     error = np.einsum("eij,ei,ej->e", A, place, place) - 2 * np.einsum("ei,ei->e", b, place) + c
-    squared_length = ((s.points[i] - s.points[j]) ** 2).sum(axis=1)
     area = s.area[i] + s.area[j]
-    cost = error + _LAMBDA * area * squared_length
+    cost = error + _LAMBDA * area * _squared(s.points[i] - s.points[j])
     cost *= ((s.need[i] + s.need[j]) / area) ** 2
-    valence = np.bincount(s.faces.ravel())
-    ends = np.minimum(valence[apex[up][order]], valence[apex[~up][reverse]])
-    cost[ends <= 3] = np.inf
-    return np.stack([i, j], axis=1), cost, place
+    return cost, place
 
 
-def _independent(edges: IntArray, cost: FloatArray, n: int) -> IntArray:
+def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     """Return cheap edges (k,) whose neighbourhoods are disjoint.
 
     An edge is chosen if it is the cheapest one among all edges whose ends or neighbours overlap
     with its own; a second pass considers the edges that overlap with no chosen one.
     """
-    i, j = edges.T
-    cheapest = np.argsort(cost, kind="stable")[: int(np.ceil(_CHEAPEST * len(edges)))]
-    cheapest = cheapest[np.isfinite(cost[cheapest])]
+    i, j = edges.i, edges.j
+    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(_CHEAPEST * len(cost))
+    if len(cheapest) > most:
+        cheapest = cheapest[cost[cheapest] <= np.partition(cost[cheapest], most - 1)[most - 1]]
+    cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]
     chosen = [cheapest[:0]]
     taken = np.zeros(n, dtype=bool)
     for _ in range(_PASSES):
         rank = np.arange(len(cheapest))
-        least = np.full(n, len(edges))
-        np.minimum.at(least, edges[cheapest].ravel(), np.repeat(rank, 2))
-        least = _spread(_spread(least, i, j, np.minimum), i, j, np.minimum)
-        wins = least[edges[cheapest]].min(axis=1) == rank
+        least = np.full(n, len(cost))
+        np.minimum.at(least, i[cheapest], rank)
+        np.minimum.at(least, j[cheapest], rank)
+        for _ in range(2):
+            near = least.copy()
+            np.minimum.at(near, i, least[j])
+            np.minimum.at(near, j, least[i])
+            least = near
+        wins = np.minimum(least[i[cheapest]], least[j[cheapest]]) == rank
         chosen.append(cheapest[wins])
-        taken[edges[cheapest[wins]]] = True
+        taken[i[cheapest[wins]]] = taken[j[cheapest[wins]]] = True
         reach = taken
         for _ in range(2):
-            reach = _spread(reach, i, j, np.logical_or)
-        cheapest = cheapest[~reach[edges[cheapest]].any(axis=1)]
+            near = reach.copy()
+            near[i[reach[j]]] = near[j[reach[i]]] = True
+            reach = near
+        cheapest = cheapest[~(reach[i[cheapest]] | reach[j[cheapest]])]
     return np.concatenate(chosen)
 
 
-def _spread(values: NDArray[Any], i: IntArray, j: IntArray, combine: np.ufunc) -> NDArray[Any]:
-    """Return *values* of vertices combined with those of their neighbours."""
-    result = values.copy()
-    combine.at(result, i, values[j])
-    combine.at(result, j, values[i])
-    return result
-
-
-def _collapse(s: _Surface, edges: IntArray, place: FloatArray) -> BoolArray:
+def _collapse(s: _Surface, edges: _Edges) -> BoolArray:
     """Collapse the valid ones of *edges*, and return which were, (k,) bool."""
+    i, j, place = edges.i, edges.j, edges.place
     owner = np.full(len(s.points), -1)
-    owner[edges] = np.arange(len(edges))[:, None]
+    owner[i] = owner[j] = np.arange(len(i))
     moved = s.points.copy()
-    moved[edges] = place[:, None]
+    moved[i] = moved[j] = place
 
     # The link condition: exactly two vertices are neighbours of both ends.
     of_corner = owner[s.faces]
-    near = np.flatnonzero((of_corner >= 0).any(axis=1))
-    tail, head = s.faces[near].ravel(), s.faces[near][:, [1, 2, 0]].ravel()
+    a, b, c = (of_corner >= 0).T
+    near = np.flatnonzero(a | b | c)
+    around = s.faces[near]
+    tail, head = around.ravel(), around[:, [1, 2, 0]].ravel()
     adjacent = (owner[tail] < 0) & (owner[head] >= 0)
     count = np.bincount(tail[adjacent], minlength=len(owner))
     neighbour_of = np.full(len(owner), -1)
     neighbour_of[tail[adjacent]] = owner[head[adjacent]]
-    common = np.bincount(neighbour_of[count >= 2], minlength=len(edges))
+    common = np.bincount(neighbour_of[count >= 2], minlength=len(i))
     good = common == 2
 
     # The remaining faces must keep their orientation and their shape.
-    kept = near[(of_corner[near] >= 0).sum(axis=1) == 1]
-    before, old_roundness = _normals(s.points[s.faces[kept]])
-    after, new_roundness = _normals(moved[s.faces[kept]])
+    is_kept = a[near].astype(np.int8) + b[near] + c[near] == 1
+    kept = near[is_kept]
+    before, old_roundness = _normals(s.points[around[is_kept]])
+    after, new_roundness = _normals(moved[around[is_kept]])
     of_face = of_corner[kept].max(axis=1)
-    worst = np.full(len(edges), _ROUNDNESS)
+    worst = np.full(len(i), _ROUNDNESS)
     np.minimum.at(worst, of_face, old_roundness)
     fine = np.einsum("fi,fi->f", before, after) > _TURN
     fine &= new_roundness >= worst[of_face]
     good[of_face[~fine]] = False
 
-    i, j = edges[good].T
+    i, j = i[good], j[good]
     s.points[i] = place[good]
     for accumulated in (s.A, s.b, s.c, s.area, s.need):
         accumulated[i] += accumulated[j]
     number = np.arange(len(owner))
     number[j] = i
     faces = number[s.faces]
-    s.faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
+    a, b, c = faces.T
+    s.faces = faces[(a != b) & (b != c) & (c != a)]
     return np.asarray(good)
 
 
@@ -246,9 +283,15 @@ def _normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     a, b, c = corners.transpose(1, 0, 2)
     normal = _cross(b - a, c - a)
     twice_area = np.linalg.norm(normal, axis=1)
-    edges = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).sum(axis=1)
+    x, y, z = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).T
     normal /= np.maximum(twice_area, np.finfo(float).tiny)[:, None]
-    return normal, 2.0 * np.sqrt(3.0) * twice_area / np.maximum(edges, np.finfo(float).tiny)
+    return normal, 2.0 * np.sqrt(3.0) * twice_area / np.maximum((x + y) + z, np.finfo(float).tiny)
+
+
+def _squared(a: FloatArray) -> FloatArray:
+    """Return the squared lengths of (n, 3) vectors."""
+    x, y, z = (a**2).T
+    return np.asarray((x + y) + z)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -63,7 +63,7 @@ class Factor:
     def solve_all(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
         """Return H^-1 y for each y (m, 3)."""
         n = len(self.triangle)
-        solved = np.concatenate([y.T for y in ys]).reshape(-1, n)
+        solved = np.ascontiguousarray(np.concatenate([y.T for y in ys])).reshape(-1, n)
         kernels = compiled_kernels(n * n // _PER_FACE) if len(solved) <= _MOST_SIDES else None
         if kernels:
             kernels.solve_factored(np.ascontiguousarray(self.triangle.T), solved)

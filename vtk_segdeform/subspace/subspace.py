@@ -33,6 +33,7 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers
 from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates
 from ..errors import CageError, RegionError
+from ..freezing import Frozen
 from ..kernels import compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
@@ -46,7 +47,7 @@ _CACHED = 1 << 17  # numbers of a block that are multiplied together: a megabyte
 _PIECES = 16  # of a block at most, for compiled kernels: each call takes some microseconds
 _DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
 _SPARSE = 16  # rows for each one of which the squares of interpolated ones are summed
-_NOTHING = inputs(np.empty((0, 3)))
+_NOTHING = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +217,7 @@ class Subspace:
 
 
 @dataclass(frozen=True, eq=False)
-class _PackedBlocks:
+class _PackedBlocks(Frozen):
     """A small W~ end to end in memory, so that one call of a kernel multiplies by all of it.
 
     One dense block for each set of vertices that the same cages move; so each vertex is in one
@@ -246,7 +247,7 @@ class _PackedBlocks:
     def map(self, p: FloatArray, base: FloatArray | None, kernels: Any) -> FloatArray:
         """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
         x = np.empty((len(self.rows), p.shape[1]))
-        (added,) = _NOTHING if base is None else inputs(base)
+        (added,) = inputs(_NOTHING if base is None else base)
         kernels.map_packed(
             x, added, writable(p), self.rows, self.columns, self.weights, self.starts
         )
@@ -258,7 +259,7 @@ class _PackedBlocks:
         for k in range(0, len(ys), 2):
             y, z = ys[k], (ys[k + 1] if k + 1 < len(ys) else None)
             p = np.zeros((6 if z is not None else 3, n_columns))
-            beside = None if z is None else writable(z)
+            beside = _NOTHING if z is None else writable(z)
             kernels.add_packed_adjoint(
                 p, writable(y), beside, self.rows, self.columns, self.weights, self.starts
             )
@@ -283,7 +284,7 @@ def _add_product(
     kernels = compiled_kernels() if compiled and p.shape[1] % 3 == 0 else None
     size = max(_CACHED // block.shape[1], 1)
     if kernels:
-        arguments = inputs(x, rows, block, p.T)
+        arguments = *inputs(rows, block), writable(p.T)
         size = max(8 * size, -(-len(rows) // _PIECES))
 
     def add(start: int, stop: int) -> None:
@@ -338,7 +339,8 @@ def _adjoint_product(
     """Return block.T @ y[rows], in double precision."""
     kernels = compiled_kernels() if compiled and y.shape[1] == 3 else None
     if kernels:
-        kernels.add_adjoint(total := np.zeros((3, block.shape[1])), *inputs(rows, block, y))
+        total = np.zeros((3, block.shape[1]))
+        kernels.add_adjoint(total, *inputs(rows, block), writable(y))
         return total.T
     p = np.zeros((block.shape[1], y.shape[1]))
     for piece in row_pieces(len(rows), block.shape[1]):

@@ -14,13 +14,10 @@ _IN_A_ROW = 1 << 14  # numbers that are read in forward order, for prefetching
 
 
 @_compile
-def add_product(x, onto, rows, block, p, start, stop):
-    """Put onto + block @ p.T into *rows* start..stop of *x*, for *p* (k, m), k a multiple of 3.
-
-    *onto* is (n, k), for example *x*; None means 0, which is resolved at compile time.
-    """
+def add_product(x, rows, block, p, start, stop):
+    """Add block @ p.T to *rows* start..stop of *x*, for *p* (k, m), k a multiple of 3."""
     if len(p) == 6:
-        _add_six(x, onto, rows, block, p, start, stop)
+        _add_six(x, rows, block, p, start, stop)
         return
     four = start + (stop - start) // 4 * 4
     for i in range(start, four, 4):
@@ -49,15 +46,15 @@ def add_product(x, onto, rows, block, p, start, stop):
                 (np.uint64(rows[i + 2]), s0, s1, s2),
                 (np.uint64(rows[i + 3]), t0, t1, t2),
             ):
-                if onto is not None:
-                    d0, d1, d2 = onto[k, c] + d0, onto[k, c + 1] + d1, onto[k, c + 2] + d2
-                x[k, c], x[k, c + 1], x[k, c + 2] = d0, d1, d2
+                x[k, c] += d0
+                x[k, c + 1] += d1
+                x[k, c + 2] += d2
     for i in range(four, stop):
-        _add_row(x, onto, rows[i], block[i], p)
+        _add_row(x, rows[i], block[i], p)
 
 
 @_compile
-def _add_six(x, onto, rows, block, p, start, stop):
+def _add_six(x, rows, block, p, start, stop):
     """Do `add_product` for six columns, reading the block once: all sums fit into registers."""
     p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
     two = start + (stop - start) // 2 * 2
@@ -83,24 +80,23 @@ def _add_six(x, onto, rows, block, p, start, stop):
             (q, s0, s1, s2, s3, s4, s5),
             (r, t0, t1, t2, t3, t4, t5),
         ):
-            if onto is not None:
-                d0, d1, d2 = onto[row, 0] + d0, onto[row, 1] + d1, onto[row, 2] + d2
-                d3, d4, d5 = onto[row, 3] + d3, onto[row, 4] + d4, onto[row, 5] + d5
-            x[row, 0], x[row, 1], x[row, 2] = d0, d1, d2
-            x[row, 3], x[row, 4], x[row, 5] = d3, d4, d5
+            x[row, 0] += d0
+            x[row, 1] += d1
+            x[row, 2] += d2
+            x[row, 3] += d3
+            x[row, 4] += d4
+            x[row, 5] += d5
     for i in range(two, stop):
-        _add_row(x, onto, rows[i], block[i], p)
+        _add_row(x, rows[i], block[i], p)
 
 
 @_compile
-def _add_row(x, onto, row, b, p):
+def _add_row(x, row, b, p):
     for c in range(len(p)):
         q, s = p[c], 0.0
         for j in range(len(b)):
             s += float(b[j]) * q[j]
-        if onto is not None:
-            s += onto[row, c]
-        x[row, c] = s
+        x[row, c] += s
 
 
 @_compile
@@ -162,6 +158,7 @@ def map_packed(x, base, p, rows, columns, weights, starts):
     *base* (n, 3) is added to the first three columns unless empty.
     """
     here, k = np.empty(p.size), p.shape[1]
+    first = np.int64(0)  # a literal would compile `add_product` once more
     for g in range(len(starts) - 1):
         ids = rows[starts[g, 0] : starts[g + 1, 0]]
         own = columns[starts[g, 1] : starts[g + 1, 1]]
@@ -171,18 +168,17 @@ def map_packed(x, base, p, rows, columns, weights, starts):
         for j in range(c):
             for d in range(k):
                 some[d, j] = p[own[j], d]
-        add_product(x, None, ids, block, some, 0, n)
-        if len(base) > 0:
-            for i in ids:
-                x[i, 0] += base[i, 0]
-                x[i, 1] += base[i, 1]
-                x[i, 2] += base[i, 2]
+        for i in ids:
+            for d in range(k):
+                x[i, d] = base[i, d] if d < 3 and len(base) > 0 else 0.0
+        add_product(x, ids, block, some, first, n)
 
 
 @_compile
 def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
     """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
 
+    Without a second one, *z* is empty.
     From the last group to the first, and in each from its last rows on: these are what
     `map_packed` has left in the cache, as this leaves it the first.
     """
@@ -197,7 +193,7 @@ def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
         step = max(_IN_A_ROW // c, 4)
         for k in range((n - 1) // step, -1, -1):
             piece = slice(k * step, min((k + 1) * step, n))
-            if z is None:
+            if len(z) == 0:
                 add_adjoint(some, ids[piece], block[piece], y)
             else:
                 _add_adjoints(some, ids[piece], block[piece], y, z)

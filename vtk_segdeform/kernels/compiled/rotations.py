@@ -10,6 +10,7 @@ characteristic polynomial", Acta Cryst. A61, 2005.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -46,10 +47,12 @@ def _largest(n, q):
         for j in range(4):
             square += n[i, j] * n[i, j]
     c2 = -0.5 * square
-    c1 = -(_minor(n, 0, 0) + _minor(n, 1, 1) + _minor(n, 2, 2) + _minor(n, 3, 3))
-    c0 = 0.0
+    c0 = c1 = 0.0
+    best: Any = np.int64(0)  # literals would compile `_minor` once more for each
+    most = 0.0
     for j in range(4):
-        c0 += n[0, j] * _minor(n, 0, j)
+        c1 -= _minor(n, j, j)
+        c0 += n[0, j] * _minor(n, best, j)
     top = math.sqrt(0.75 * square)  # not below the largest eigenvalue
     if not top > 0.0:
         return False
@@ -66,7 +69,6 @@ def _largest(n, q):
         return False
     for i in range(4):
         n[i, i] -= top
-    best, most = 0, 0.0
     for i in range(4):
         size = abs(_minor(n, i, i))
         if size > most:

@@ -120,7 +120,7 @@ def plain_numbers(text, whole, result):
 
     Return -1 if they are over n, or if one of them is not plain.  If *whole*, all are integers.
     """
-    at, count = 0, 0
+    at, count = np.int64(0), 0  # a literal would compile `_number` once more
     while at < len(text):
         if text[at] == _SPACE or _TAB <= text[at] <= _RETURN:
             at += 1
@@ -233,7 +233,7 @@ def facet_corners(text, corners, counts):
             for axis in range(3):
                 while end < len(text) and (text[end] == _SPACE or text[end] == _TAB):
                     end += 1
-                corners[counts[0], axis], end = _number(text, end, False)
+                corners[counts[0], axis], end = _number(text, end, np.bool_(False))
                 if end < 0:
                     return False
             counts[0] += 1
