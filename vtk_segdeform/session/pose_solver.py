@@ -44,6 +44,8 @@ _CONSTRAINT_OPTIONS = (
     "avoid_folds",
     "avoid_contact",
 )  # changed by `Deformer.hold`
+_TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
+_TURNED = 1e-6  # diagonals by which such offsets may differ after the last solve
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -65,6 +67,7 @@ class PoseSolver:
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
+        self._turned: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
         self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
     def lids(self, state: State) -> Lids:
@@ -162,18 +165,28 @@ class PoseSolver:
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
         self._current = None  # in case the solve fails
-        places = _less(_stacked(targets), shift, deformer.handle)
-        solution = deformer.solve(places, max_steps=max_steps, within=within)
-        if not np.isfinite(solution.vertices).all():
-            raise ConstraintError("no finite pose for these targets; move the handles less")
-        for vertices in solution.cage_vertices:
-            frozen(vertices)
-        cages, finished = solution.cage_vertices, None if before is None else before.finished
-        if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
-            cages = before.cage_vertices  # so that their vertices are known
-        elif before is not None and finished is not None:
-            finished = self._moved_on(state, before, finished, solution.vertices)
-            self._mapped = cages, solution.vertices
+        wanted = _stacked(targets)
+        for _ in range(_TURNS if shift is not None and max_steps is None else 1):
+            places = _less(wanted, shift, deformer.handle)
+            solution = deformer.solve(places, max_steps=max_steps, within=within)
+            if not np.isfinite(solution.vertices).all():
+                raise ConstraintError("no finite pose for these targets; move the handles less")
+            cages, finished = solution.cage_vertices, None if before is None else before.finished
+            for vertices in cages:
+                frozen(vertices)
+            if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
+                cages = before.cage_vertices  # so that their vertices are known
+            elif before is not None and finished is not None:
+                x = solution.vertices
+                finished = self._moved_on(state, before, finished, cages=cages, x=x)
+                self._mapped = cages, x
+            if shift is None or finished is None:
+                break
+            # The offset of a handle may have turned with it, so its cages have another target.
+            last, shift = shift, finished.shifted(self._surface(state, cages))
+            change = np.abs((shift - last)[deformer.handle]).max(initial=0.0)
+            if change <= _TURNED * self._mesh.diagonal:
+                break
         pose = Pose(cages, targets, finished)
         self._current = pose
         x, change = self._evaluate(state, pose)
@@ -181,11 +194,8 @@ class PoseSolver:
         if shift is None:
             return pose, solution
         reached = None if solution.targets is None else solution.targets + shift[deformer.handle]
-        ids, wanted = (
-            (deformer.handle, deformer.fixed),
-            (_stacked(targets), _fixed_at(self._mesh, state)),
-        )
-        errors = partial(errors_at, ids, wanted, self._mesh.diagonal)
+        ids, places = (deformer.handle, deformer.fixed), (wanted, _fixed_at(self._mesh, state))
+        errors = partial(errors_at, ids, places, self._mesh.diagonal)
         return pose, replace(solution, errors=errors, targets=reached)
 
     def finish(self, state: State, pose: Pose) -> Finish:
@@ -201,7 +211,11 @@ class PoseSolver:
         shift = self._shift(state)
         is_shifted = shift is not None and bool(shift[state.fixed].any())
         deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
-        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift)
+        x = self._surface(state, pose.cage_vertices)
+        if state.locality is not None:
+            x = self.vertices(state, pose)
+            deformer = _localised(deformer, state.locality)
+        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""
@@ -228,7 +242,7 @@ class PoseSolver:
         finished = None if before is None else before.finished
         if before is not None and finished is not None:
             x = self._surface(state, p)
-            finished = self._moved_on(state, before, finished, x)
+            finished = self._moved_on(state, before, finished, cages=p, x=x)
         pose = Pose(p, MappingProxyType({}), finished)
         x, change = self._evaluate(state, pose)
         pose = replace(pose, targets=targets_at(state.handles, x))
@@ -294,12 +308,29 @@ class PoseSolver:
             return None
         return pose.finished.shifted(self._surface(state, pose.cage_vertices))
 
-    def _moved_on(self, state: State, before: Pose, finished: Finished, x: FloatArray) -> Finished:
-        """Return *finished*, of the pose *before*, for other cages, whose mesh is *x* (n, 3)."""
+    def _moved_on(
+        self,
+        state: State,
+        before: Pose,
+        finished: Finished,
+        *,
+        cages: tuple[FloatArray, ...],
+        x: FloatArray,
+    ) -> Finished:
+        """Return *finished*, of the pose *before*, for other *cages*, whose mesh is *x* (n, 3)."""
         offset = finished.vertices - self._surface(state, before.cage_vertices)
         held = np.concatenate([state.fixed, state.handle])
         preserved = self._constrain(state).preserved_volumes
-        return moved_on(finished, offset, x, held=held, constraints=preserved)
+        turned = np.swapaxes(self._rotations(state, before.cage_vertices), 1, 2)
+        turns = self._rotations(state, cages) @ turned
+        turns[state.fixed] = np.eye(3)
+        return moved_on(finished, offset, x, turns=turns, held=held, constraints=preserved)
+
+    def _rotations(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
+        """Return `Deformer.rotations`; the last ones are kept."""
+        if self._turned[0] is not cage_vertices:
+            self._turned = cage_vertices, self.bind(state).rotations(cage_vertices)
+        return self._turned[1]
 
     def _surface(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
         """Return W~ p, (n, 3); the last one is kept."""
@@ -314,12 +345,7 @@ class PoseSolver:
             return constrained
         if self._local is not None and self._local[:2] == (constrained, locality):
             return self._local[2]
-        deformer = constrained.copy()
-        x = deformer.surface(locality.cage_vertices)
-        deformer.resume(locality.cage_vertices, x[deformer.handle])
-        deformer = deformer.local(
-            locality.vertex, locality.reach, locality.spread, follows=locality.follows
-        )
+        deformer = _localised(constrained, locality)
         self._local = constrained, locality, deformer
         self._current = None
         return deformer
@@ -367,6 +393,16 @@ def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:
 def _less(points: FloatArray, shift: FloatArray | None, ids: IntArray) -> FloatArray:
     """Return *points* (k, 3) of the vertices *ids* (k,), less their *shift* if there is any."""
     return points if shift is None else points - shift[ids]
+
+
+def _localised(deformer: Deformer, locality: Locality) -> Deformer:
+    """Return a copy of *deformer* for a pull: local, in the pose at its press."""
+    deformer = deformer.copy()
+    x = deformer.surface(locality.cage_vertices)
+    deformer.resume(locality.cage_vertices, x[deformer.handle])
+    return deformer.local(
+        locality.vertex, locality.reach, locality.spread, follows=locality.follows
+    )
 
 
 def _fixed_at(mesh: Mesh, state: State) -> FloatArray:
