@@ -637,7 +637,8 @@ class Deformer:
             places[stays] = start[stays]
             held |= stays
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
-        finisher = Finisher(self._rest_pose, self._cell_energy, held, self.preserved_volumes)
+        volumes = self.preserved_volumes
+        finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
         run = finisher.run_apart if self._avoid_contact else finisher.run
         found = run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
