@@ -123,10 +123,12 @@ class Finishing:
             self._since = time.monotonic()
         if time.monotonic() - self._since < _REST:
             return
-        self.interrupt()
         session = self._session()
         solution = session.solution  # None after undo
-        if solution is None or solution.status is Status.STEP_LIMIT or not session.can_finish:
+        if solution is not None and solution.status is Status.STEP_LIMIT:
+            return  # it will be refined
+        self.interrupt()
+        if solution is None or not session.can_finish:
             return
         self._job = Job(
             view_timer(self._view),

@@ -53,12 +53,11 @@ class Glide:
         if surface.instead is not None:
             return
         after = surface.session.vertices
-        began, camera = time.monotonic(), self._view.renderer.GetActiveCamera()
-        stamp = camera.GetMTime()
+        began, camera = time.monotonic(), self._camera()
 
         def draw() -> None:
             t = (time.monotonic() - began) / SECONDS
-            if t >= 1.0 or camera.GetMTime() != stamp or surface.instead is not None:
+            if t >= 1.0 or self._camera() != camera or surface.instead is not None:
                 self.end()
             else:
                 surface.draw(before + t * t * (3.0 - 2.0 * t) * (after - before))
@@ -67,6 +66,12 @@ class Glide:
         observed = [self._view.observe(event, self.end, _FIRST) for event in _ENDING]
         self._stops = [self._view.every(_PERIOD, draw), *observed]
         surface.draw(before)
+
+    def _camera(self) -> tuple[object, ...]:
+        """Return where the camera is and what it sees, apart from its clipping planes."""
+        camera = self._view.renderer.GetActiveCamera()
+        places = camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()
+        return *places, camera.GetViewAngle(), camera.GetParallelScale()
 
     def end(self) -> None:
         """Draw the final pose, if a glide is running."""
