@@ -31,6 +31,7 @@ from ..solver import Solution, VolumeConstraint, errors_at, total_volume
 from .finishing import Finish, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
+from .pulling import localised
 from .state import Finished, Locality, Pose, State
 
 _MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
@@ -177,15 +178,13 @@ class PoseSolver:
             if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
                 cages = before.cage_vertices  # so that their vertices are known
             elif before is not None and finished is not None:
-                x = solution.vertices
-                finished = self._moved_on(state, before, finished, cages=cages, x=x)
-                self._mapped = cages, x
+                finished = self._moved_on(state, before, finished, cages)
             if shift is None or finished is None:
                 break
-            # The offset of a handle may have turned with it, so its cages have another target.
+            # The offset of a handle may have turned with it: then its cages have another target.
             last, shift = shift, finished.shifted(self._surface(state, cages))
-            change = np.abs((shift - last)[deformer.handle]).max(initial=0.0)
-            if change <= _TURNED * self._mesh.diagonal:
+            turn = np.abs((shift - last)[deformer.handle]).max(initial=0.0)
+            if turn <= _TURNED * self._mesh.diagonal:
                 break
         pose = Pose(cages, targets, finished)
         self._current = pose
@@ -214,7 +213,7 @@ class PoseSolver:
         x = self._surface(state, pose.cage_vertices)
         if state.locality is not None:
             x = self.vertices(state, pose)
-            deformer = _localised(deformer, state.locality)
+            deformer = localised(deformer, state.locality)
         return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
 
     def accept(self, before: Pose, after: Pose) -> None:
@@ -241,8 +240,7 @@ class PoseSolver:
         before = state.pose
         finished = None if before is None else before.finished
         if before is not None and finished is not None:
-            x = self._surface(state, p)
-            finished = self._moved_on(state, before, finished, cages=p, x=x)
+            finished = self._moved_on(state, before, finished, p)
         pose = Pose(p, MappingProxyType({}), finished)
         x, change = self._evaluate(state, pose)
         pose = replace(pose, targets=targets_at(state.handles, x))
@@ -309,18 +307,13 @@ class PoseSolver:
         return pose.finished.shifted(self._surface(state, pose.cage_vertices))
 
     def _moved_on(
-        self,
-        state: State,
-        before: Pose,
-        finished: Finished,
-        *,
-        cages: tuple[FloatArray, ...],
-        x: FloatArray,
+        self, state: State, before: Pose, finished: Finished, cages: tuple[FloatArray, ...]
     ) -> Finished:
-        """Return *finished*, of the pose *before*, for other *cages*, whose mesh is *x* (n, 3)."""
-        offset = finished.vertices - self._surface(state, before.cage_vertices)
+        """Return *finished*, of the pose *before*, for other *cages*."""
         held = np.concatenate([state.fixed, state.handle])
         preserved = self._constrain(state).preserved_volumes
+        offset = finished.vertices - self._surface(state, before.cage_vertices)
+        x = self._surface(state, cages)
         turned = np.swapaxes(self._rotations(state, before.cage_vertices), 1, 2)
         turns = self._rotations(state, cages) @ turned
         turns[state.fixed] = np.eye(3)
@@ -345,7 +338,7 @@ class PoseSolver:
             return constrained
         if self._local is not None and self._local[:2] == (constrained, locality):
             return self._local[2]
-        deformer = _localised(constrained, locality)
+        deformer = localised(constrained, locality)
         self._local = constrained, locality, deformer
         self._current = None
         return deformer
@@ -363,10 +356,8 @@ class PoseSolver:
             deformer.resume(pose.cage_vertices, places)
 
     def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
-        if pose.finished is None:
-            x, _ = self._evaluate(state, pose)
-        else:
-            x = self._surface(state, pose.cage_vertices)
+        is_plain = pose.finished is None
+        x = self.vertices(state, pose) if is_plain else self._surface(state, pose.cage_vertices)
         return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
@@ -374,12 +365,9 @@ class PoseSolver:
         lids, before = state.options.lids, self._evaluated
         same = before is not None and before[0].is_same_surface(pose)
         if before is None or not same or before[1] is not lids:
-            if before and same:
-                x = before[2]
-            elif pose.finished is not None:
-                x = pose.finished.vertices
-            else:
-                x = self.bind(state).surface(pose.cage_vertices)
+            own = None if pose.finished is None else pose.finished.vertices
+            x = before[2] if before and same else own
+            x = self.bind(state).surface(pose.cage_vertices) if x is None else x
             frozen(x)
             _, volume = self._enclosed(state)
             before = self._evaluated = pose, lids, x, cache(partial(volume.relative, x))
@@ -393,16 +381,6 @@ def _stacked(targets: Mapping[str, FloatArray]) -> FloatArray:
 def _less(points: FloatArray, shift: FloatArray | None, ids: IntArray) -> FloatArray:
     """Return *points* (k, 3) of the vertices *ids* (k,), less their *shift* if there is any."""
     return points if shift is None else points - shift[ids]
-
-
-def _localised(deformer: Deformer, locality: Locality) -> Deformer:
-    """Return a copy of *deformer* for a pull: local, in the pose at its press."""
-    deformer = deformer.copy()
-    x = deformer.surface(locality.cage_vertices)
-    deformer.resume(locality.cage_vertices, x[deformer.handle])
-    return deformer.local(
-        locality.vertex, locality.reach, locality.spread, follows=locality.follows
-    )
 
 
 def _fixed_at(mesh: Mesh, state: State) -> FloatArray:

@@ -12,7 +12,6 @@ The files, in reading order:
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
     finishing        the finish of a pose on the mesh, after a drag
-    glide            the way from one pose to the next on the screen
     session_file     the file that the session is saved to
     recordings       recordings of input and video
     messages hints status_line help_card

@@ -19,8 +19,7 @@ from vtk_segdeform.session import Change, FinishedPose, Session
 from vtk_segdeform.solver import Status
 
 from ..recording import announce_finish, on_finish_request, recorded_keys
-from ..scene import Stop, SurfaceDisplay, View
-from .glide import Glide
+from ..scene import Glide, Stop, SurfaceDisplay, View
 from .job import Job, view_timer
 
 MOST_VERTICES = 20_000  # of a mesh that is finished without a request: it takes about a second

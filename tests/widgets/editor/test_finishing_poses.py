@@ -12,8 +12,9 @@ from test_editor import Bench, bench, pull_handle, ready  # noqa: F401 - two of 
 from vtk_segdeform import load_session
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session import save_session
-from vtk_segdeform.widgets.editor import finishing, finishing_after_drags, glide, opening
+from vtk_segdeform.widgets.editor import finishing, finishing_after_drags, opening
 from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.widgets.scene import glide
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 

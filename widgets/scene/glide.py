@@ -13,7 +13,8 @@ from collections.abc import Callable
 
 from vtk_segdeform.arrays import FloatArray
 
-from ..scene import Stop, SurfaceDisplay, View
+from .surface_display import SurfaceDisplay
+from .view import Stop, View
 
 SECONDS = 0.3
 _PERIOD = 15  # milliseconds between two pictures
