@@ -28,6 +28,8 @@ from ..progress import Progress
 from ..solver import Solution, Status, VolumeConstraint, moved_along, steps_to_volume
 from .state import Finished, Pose
 
+_TURNED = 3e-5  # mesh sizes by which shifts must turn before the targets of the cages follow
+
 
 class FinishedPose(NamedTuple):
     """The result of `Session.finishing`."""
@@ -92,7 +94,11 @@ def moved_on(
     restored.
     """
     moved = x + (turns @ offset[:, :, None])[:, :, 0]
-    shifts = (turns[finished.held] @ finished.shifts[:, :, None])[:, :, 0]
+    known = np.union1d(finished.held, held)
+    shifts = finished.shifted(finished.vertices - offset)[known]
+    turned = (turns[known] @ shifts[:, :, None])[:, :, 0]
+    if np.abs(turned - shifts).max(initial=0.0) > _TURNED * np.ptp(x, axis=0).max():
+        shifts = turned  # else the targets of the cages stay, so that they converge
     if constraints:
         centre = moved.mean(axis=0)
         moved -= centre
@@ -105,6 +111,6 @@ def moved_on(
             directions.append(normals)
         paths = np.hstack([moved, *directions])
         moved = moved_along(paths, steps_to_volume(constraints, paths)) + centre
-    for array in (moved, shifts):
+    for array in (moved, known, shifts):
         frozen(array)
-    return Finished(moved, finished.held, shifts)
+    return Finished(moved, known, shifts)

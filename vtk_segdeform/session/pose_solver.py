@@ -46,7 +46,6 @@ _CONSTRAINT_OPTIONS = (
     "avoid_contact",
 )  # changed by `Deformer.hold`
 _TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
-_TURNED = 1e-6  # diagonals by which such offsets may differ after the last solve
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -183,8 +182,7 @@ class PoseSolver:
                 break
             # The offset of a handle may have turned with it: then its cages have another target.
             last, shift = shift, finished.shifted(self._surface(state, cages))
-            turn = np.abs((shift - last)[deformer.handle]).max(initial=0.0)
-            if turn <= _TURNED * self._mesh.diagonal:
+            if np.array_equal(shift[deformer.handle], last[deformer.handle]):
                 break
         pose = Pose(cages, targets, finished)
         self._current = pose
@@ -193,8 +191,10 @@ class PoseSolver:
         if shift is None:
             return pose, solution
         reached = None if solution.targets is None else solution.targets + shift[deformer.handle]
-        ids, places = (deformer.handle, deformer.fixed), (wanted, _fixed_at(self._mesh, state))
-        errors = partial(errors_at, ids, places, self._mesh.diagonal)
+        ids = deformer.handle, deformer.fixed
+        errors = partial(
+            errors_at, ids, (wanted, _fixed_at(self._mesh, state)), self._mesh.diagonal
+        )
         return pose, replace(solution, errors=errors, targets=reached)
 
     def finish(self, state: State, pose: Pose) -> Finish:
