@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import Future, wait
+from typing import TypeVar
 
 from .checks import as_callable
+
+T = TypeVar("T")
+
+_PERIOD = 0.05  # seconds between two calls of a progress callback
 
 Progress = Callable[[float, str], None]
 """Called with the fraction done, 0..1, and a text; may raise `errors.Cancelled` to stop."""
@@ -26,3 +33,26 @@ def part(progress: Progress | None, start: float, end: float) -> Progress | None
         progress(start + fraction * (end - start), message)
 
     return report
+
+
+def cancellable(work: Callable[[], T], progress: Progress | None, message: str) -> T:
+    """Return ``work()``, which reports no progress itself, such as a function of a library.
+
+    With *progress* it runs in another thread, and *progress* is called meanwhile.  If that raises,
+    the thread is abandoned: it ends with its work, or with the process.
+    """
+    if progress is None:
+        return work()
+    result: Future[T] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(work())
+        except BaseException as fault:  # noqa: BLE001 - raised again by the caller's thread
+            result.set_exception(fault)
+
+    threading.Thread(target=run, name="segdeform", daemon=True).start()
+    while True:
+        tell(progress, 0.0, message)
+        if wait([result], timeout=_PERIOD).done:
+            return result.result()

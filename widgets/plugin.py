@@ -205,6 +205,7 @@ class PolyDataTools:
         n_cage_vertices: int | None = None,
         preserve_volume: bool = True,
         lids: bool | None = None,
+        refine: bool | None = None,
         progress: Progress | None = None,
     ) -> pv.PolyData:
         """Return a copy with the handle points at *targets*: coordinates and normals differ.
@@ -217,7 +218,7 @@ class PolyDataTools:
             Points of the handle.
         targets : (h, 3) float
             Where they go.  Points at a seam that are one vertex go to the mean.
-        n_regions, n_cage_vertices, preserve_volume, lids, progress
+        n_regions, n_cage_vertices, preserve_volume, lids, refine, progress
             As in `vtk_segdeform.deform`, which also returns the solver's status; here a missed
             target is only logged.
 
@@ -231,7 +232,7 @@ class PolyDataTools:
         solution = deform(
             surface.mesh, surface.vertices_at(fixed), vertices, ends,
             n_regions=n_regions, n_cage_vertices=n_cage_vertices,
-            preserve_volume=preserve_volume, lids=lids, progress=progress,
+            preserve_volume=preserve_volume, lids=lids, refine=refine, progress=progress,
         )  # fmt: skip
         if solution.handle_error > _HANDLE_MET:
             error = 100.0 * solution.handle_error

@@ -179,11 +179,88 @@ def test_what_cannot_be_finished_is_told():
     session = ready()
     with pytest.raises(SessionError, match="no pose"):
         session.finish()
-    session.pull(int(SCENE.handle[0]), SCENE.mesh.vertices[SCENE.handle[0]] + 0.1, locality=0.5)
-    session.commit()
-    with pytest.raises(SessionError, match="pull"):
+    session.remove_handle("tip")
+    session.set_fixed([])
+    session.move_cage(0, 1.01 * session.cage_vertices[0])
+    with pytest.raises(SessionError, match="add a handle"):
         session.finish()
     assert not session.can_finish
+
+
+def rotated(session: Session, turn: np.ndarray) -> np.ndarray:
+    """Rotate all handles, and return how far each vertex is from the rotated pose."""
+    before, unit = session.vertices, session.mesh.diagonal
+    solution = session.drag({name: at @ turn.T for name, at in session.targets.items()})
+    session.commit()
+    assert solution.handle_error < 1e-4
+    return np.abs(session.vertices - before @ turn.T).max() / unit
+
+
+def test_a_finished_pose_rotates_with_its_handles():
+    session = ready()
+    session.set_fixed([])
+    session.add_handle(SCENE.fixed, "base")
+    dragged(session).finish()
+    plain = session.vertices
+    assert rotated(session, rotation([1.0, 2.0, 3.0], 2.0)) < 1e-4
+    session.undo()
+    assert_array_equal(session.vertices, plain)
+    # A handle made in a finished pose is where the cages do not put it.
+    away = np.abs(plain - SCENE.mesh.vertices).sum(axis=1)
+    away[session.state.handle] = 0.0
+    session.add_handle(np.argsort(away)[-12:], "more")
+    assert rotated(session, rotation([0.0, 1.0, 0.0], 1.0)) < 1e-3
+    session.finish()
+    assert session.solution is not None
+    assert session.solution.handle_error < 1e-12
+    assert rotated(session, rotation([0.0, 0.0, 1.0], 1.0)) < 1e-4
+
+
+def pulled(session: Session, vertex: int, by: float, **options: float) -> None:
+    unit = session.mesh.diagonal
+    session.pull(vertex, session.vertices[vertex] + [0.0, 0.0, by * unit], **options)
+    session.commit()
+
+
+def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
+    session = ready()
+    session.remove_handle("tip")
+    x = session.mesh.vertices
+    ends = int(x[:, 0].argmax()), int(np.abs(x - x[x[:, 0].argsort()[len(x) // 3]]).sum(1).argmin())
+    poses = []
+    for vertex, options in zip(ends, ({}, {"locality": 1.0, "radius": 0.25}), strict=True):
+        pulled(session, vertex, 0.12, **options)
+        before = session.vertices
+        solution = session.finish()
+        poses.append(session.vertices)
+        moved = np.abs(poses[-1] - before).max(axis=1) / session.mesh.diagonal
+        assert moved.max() > 1e-4
+        assert max(solution.handle_error, solution.fixed_error) < 1e-12
+        assert abs(solution.volume_change) < 1e-12
+        assert moved[ends[0]] < 1e-3
+    assert np.count_nonzero(moved < 1e-12) > len(x) // 4  # what the second pull does not reach
+    session.pin(int(x[:, 2].argmax()))
+    free = np.setdiff1d(np.flatnonzero(x[:, 0] < 0.0), [*session.fixed, *session.state.handle])
+    session.set_fixed([*session.fixed, *free[:20]])  # which are fixed where they are now
+    pulled(session, ends[0], -0.05)
+    session.finish()
+    poses.append(session.vertices)
+    solution = session.solution
+    assert solution is not None
+    assert max(solution.handle_error, solution.fixed_error) < 1e-12
+    assert abs(volume_of(session.mesh, poses[-1]) / volume_of(session.mesh) - 1.0) < 1e-12
+    save_session(tmp_path / "pulled", session)
+    loaded = load_session(tmp_path / "pulled")
+    for each in (session, loaded):
+        assert_array_equal(each.vertices, poses[2])
+        each.start_afresh()
+        pulled(each, ends[1], 0.02)
+        each.finish()
+    assert_array_equal(loaded.vertices, session.vertices)
+    session.undo()
+    assert_array_equal(session.vertices, poses[2])
+    session.undo()
+    assert_array_equal(session.vertices, poses[1])
 
 
 def test_a_finished_pose_that_does_not_fit_is_refused():

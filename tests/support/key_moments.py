@@ -161,6 +161,7 @@ class Stand:
         self.editor, self.hand, self.folder = editor, hand, folder
         save_session(folder / "start.segdeform", editor.session)
         self.session_before, self.start = editor.session, editor.session.state
+        editor.controller.finishing.is_wanted = False  # stories compare the poses of cages
         self.references: dict[tuple, Story] = {}
         self.camera: dict | None = None  # at the first drag; some keys move it
 

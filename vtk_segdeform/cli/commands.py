@@ -17,7 +17,7 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, clamped
+from ..deformer import Deformer, clamped, finished
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -74,8 +74,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     progress(0.9, "solving")
     start = time.perf_counter()
     solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
-    if options.refine:
-        solution = deformer.finish(solution, progress=part(progress, 0.95, 1.0))
+    solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     report_solution(solution, time.perf_counter() - start, say)
     surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")

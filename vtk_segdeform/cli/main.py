@@ -22,6 +22,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from .. import sizes
 from ..errors import ConstraintError, SegDeformError
 from ..version import __version__
 from .progress_bar import ProgressBar
@@ -358,6 +359,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     text = "whether open parts enclose a volume under lids over their holes (default: auto)"
     add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
+    _refine(parser)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
@@ -386,9 +388,17 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
-    text = "finish the pose on the mesh itself: less distorted, handles exact"
-    add("--refine", action="store_true", help=text)
+    _refine(parser)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
+
+
+def _refine(parser: argparse.ArgumentParser) -> None:
+    text = (
+        "finish the pose on the mesh itself: less distorted, handles exact (default: up to "
+        f"{sizes.FINISHED:,} vertices)"
+    )
+    action = argparse.BooleanOptionalAction
+    parser.add_argument("--refine", action=action, default=None, help=text)
 
 
 def _count(text: str) -> int:

@@ -50,6 +50,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         lids=lids,
+        refine=options.refine,
         progress=progress,
     )
     seconds = time.perf_counter() - start

@@ -27,7 +27,7 @@ from .arguments import (
     reach_and_follows,
 )
 from .clamping import clamped
-from .deform import deform
+from .deform import deform, finished
 from .deformer import Deformer
 from .pull import pull
 
@@ -45,6 +45,7 @@ __all__ = [
     "checked_vertex",
     "clamped",
     "deform",
+    "finished",
     "pull",
     "reach_and_follows",
 ]

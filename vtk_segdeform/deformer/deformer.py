@@ -514,6 +514,15 @@ class Deformer:
         offsets = stacked_cages(self.cages, cage_vertices) - self._frame.centre
         return self._frame.in_scene(self._map(offsets))
 
+    @one_blas_thread()
+    def rotations(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        """Return how the mesh with these cages has rotated near each vertex since rest, (n, 3, 3).
+
+        These are the rotations of the shape energy, blended smoothly.
+        """
+        p = stacked_cages(self.cages, cage_vertices) - self._frame.centre
+        return self._binding.energy.vertex_rotations(p / self._frame.size)
+
     def reset(self) -> None:
         """Return to rest: the next solve starts from there."""
         self._begin(self._rest_cages, self._rest.vertices[self.handle])
@@ -628,7 +637,8 @@ class Deformer:
             places[stays] = start[stays]
             held |= stays
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
-        finisher = Finisher(self._rest_pose, self._cell_energy, held, self.preserved_volumes)
+        volumes = self.preserved_volumes
+        finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
         run = finisher.run_apart if self._avoid_contact else finisher.run
         found = run(start, places[held], progress)
         if shares is not None and found.vertices is not start:

@@ -20,6 +20,7 @@ from .arguments import (
     checked_vertex,
     reach_and_follows,
 )
+from .deform import checked_refine, finished
 from .deformer import Deformer
 
 
@@ -34,6 +35,7 @@ def pull(
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     lids: bool | None = None,
+    refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
     """Return *mesh* with one vertex pulled to a point, its detail and its volume preserved.
@@ -62,6 +64,8 @@ def pull(
         Total number of cage vertices; by default it follows the number of regions.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
+    refine : bool or None
+        Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
     progress : Progress, optional
         Called while cages are fitted and bound, and before every step; may cancel.
 
@@ -85,6 +89,7 @@ def pull(
     """
     require_mesh(mesh)
     as_lids(lids)
+    checked_refine(refine)
     vertex = checked_vertex(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [vertex], "pins")
     target = checked_point(to)[None]
@@ -101,4 +106,5 @@ def pull(
     )
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
-    return deformer.solve(target, progress=part(progress, 0.9, 1.0))
+    solution = deformer.solve(target, progress=part(progress, 0.9, 0.95))
+    return finished(deformer, solution, refine, progress=part(progress, 0.95, 1.0))

@@ -132,6 +132,27 @@ class Energy:
                 blocks.append((ids[::3] // 3, cages, rows.reshape(-1, 3, len(columns))))
         return blocks
 
+    def vertex_rotations(self, p: FloatArray) -> FloatArray:
+        """Return how the surface has rotated near each vertex since rest, (n, 3, 3).
+
+        The rotations of clusters are blended: first those that move a cage vertex, by their squared
+        rows of K, then those of the cage vertices by W~.  So they vary as smoothly as x.
+        """
+        rotations = closest_rotations(self.covariances(p))
+        if self.has_vertex_rotations:
+            return rotations
+        of_cages = self._shares.T @ rotations.reshape(-1, 9)
+        blended = self.subspace.map(of_cages).reshape(-1, 3, 3)
+        return closest_rotations(np.swapaxes(blended, 1, 2))
+
+    @cached_property
+    def _shares(self) -> FloatArray:
+        """The share of each cluster in the rotation of a cage vertex, (G, m)."""
+        k = np.asarray(self.covariance_operator)
+        shares = (k * k).reshape(len(k) // 3, 3, -1).sum(axis=1)
+        shares /= np.maximum(shares.sum(axis=0), np.finfo(float).tiny)
+        return np.asarray(shares)
+
     @cached_property
     def _covariance_blocks(self) -> Subspace:
         return _blocks_by_cage(np.asarray(self.covariance_operator), self.subspace.columns)

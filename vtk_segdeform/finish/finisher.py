@@ -28,6 +28,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -35,8 +36,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..errors import MeshError
 from ..mesh import Mesh, new_crossings
-from ..progress import Progress, part, tell
+from ..progress import Progress, cancellable, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .folds import Folds
@@ -104,6 +106,13 @@ class Finisher:
         Fixed and handle vertices.
     constraints : sequence of VolumeConstraint
         The volumes to preserve.
+    progress : Progress, optional
+        Called while the matrix is factored; may cancel.
+
+    Raises
+    ------
+    MeshError
+        If the Laplacian of the free vertices is singular.
     """
 
     def __init__(
@@ -112,6 +121,7 @@ class Finisher:
         energy: CellEnergy,
         held: BoolArray,
         constraints: Sequence[VolumeConstraint],
+        progress: Progress | None = None,
     ) -> None:
         self._mesh, self._energy = mesh, energy
         anchored = np.bincount(mesh.components, held) > 0.0
@@ -119,7 +129,7 @@ class Finisher:
         self._held, self._free = held, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
-        self._solve = _factored(rows[:, self._free])
+        self._solve = _factored(rows[:, self._free], progress)
         corners = (each.faces[each.faces < len(free)] for each in constraints)
         self._constraints = [
             each for each, own in zip(constraints, corners, strict=True) if free[own].any()
@@ -157,8 +167,9 @@ class Finisher:
             stays[self._mesh.faces[crossing]] = True
             stays |= self._energy.neighbours @ stays.astype(float) > 0.0
             x = self.between(begin, end, share)
-            problem = Finisher(self._mesh, self._energy, self._held | stays, self._constraints)
-            found = problem._run(x, part(progress, 0.4 + 0.2 * turn, 0.6 + 0.2 * turn))
+            held, own = self._held | stays, part(progress, 0.4 + 0.2 * turn, 0.6 + 0.2 * turn)
+            problem = Finisher(self._mesh, self._energy, held, self._constraints, own)
+            found = problem._run(x, own)
             steps += found.steps
             crossing = self._crossing(found.vertices)
             if len(crossing) < len(least):
@@ -315,7 +326,9 @@ class Finisher:
         return best
 
 
-def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
+def _factored(
+    matrix: sparse.csr_array, progress: Progress | None
+) -> Callable[[FloatArray], FloatArray]:
     """Return the solution of the symmetric positive definite *matrix* as a function.
 
     Minimum degree takes minutes for the vertex order of a subdivided mesh: 45 s and more for
@@ -326,7 +339,14 @@ def _factored(matrix: sparse.csr_array) -> Callable[[FloatArray], FloatArray]:
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     sorted_matrix = matrix[order][:, order].tocsc()
     options = {"SymmetricMode": True}
-    factor = splu(sorted_matrix, permc_spec="MMD_AT_PLUS_A", options=options)
+
+    def factorise() -> Any:
+        try:
+            return splu(sorted_matrix, permc_spec="MMD_AT_PLUS_A", options=options)
+        except RuntimeError as fault:
+            raise MeshError(f"the pose cannot be finished on this mesh: {fault}") from fault
+
+    factor = cancellable(factorise, progress, "finishing on the mesh")
 
     def solve(right: FloatArray) -> FloatArray:
         result = np.empty_like(right)

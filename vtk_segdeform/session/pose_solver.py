@@ -31,6 +31,7 @@ from ..solver import Solution, VolumeConstraint, errors_at, total_volume
 from .finishing import Finish, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
+from .pulling import localised
 from .state import Finished, Locality, Pose, State
 
 _MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
@@ -44,6 +45,7 @@ _CONSTRAINT_OPTIONS = (
     "avoid_folds",
     "avoid_contact",
 )  # changed by `Deformer.hold`
+_TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -65,6 +67,7 @@ class PoseSolver:
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
+        self._turned: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
         self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
     def lids(self, state: State) -> Lids:
@@ -162,18 +165,25 @@ class PoseSolver:
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
         self._current = None  # in case the solve fails
-        places = _less(_stacked(targets), shift, deformer.handle)
-        solution = deformer.solve(places, max_steps=max_steps, within=within)
-        if not np.isfinite(solution.vertices).all():
-            raise ConstraintError("no finite pose for these targets; move the handles less")
-        for vertices in solution.cage_vertices:
-            frozen(vertices)
-        cages, finished = solution.cage_vertices, None if before is None else before.finished
-        if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
-            cages = before.cage_vertices  # so that their vertices are known
-        elif before is not None and finished is not None:
-            finished = self._moved_on(state, before, finished, solution.vertices)
-            self._mapped = cages, solution.vertices
+        wanted = _stacked(targets)
+        for _ in range(_TURNS if shift is not None and max_steps is None else 1):
+            places = _less(wanted, shift, deformer.handle)
+            solution = deformer.solve(places, max_steps=max_steps, within=within)
+            if not np.isfinite(solution.vertices).all():
+                raise ConstraintError("no finite pose for these targets; move the handles less")
+            cages, finished = solution.cage_vertices, None if before is None else before.finished
+            for vertices in cages:
+                frozen(vertices)
+            if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
+                cages = before.cage_vertices  # so that their vertices are known
+            elif before is not None and finished is not None:
+                finished = self._moved_on(state, before, finished, cages)
+            if shift is None or finished is None:
+                break
+            # The offset of a handle may have turned with it: then its cages have another target.
+            last, shift = shift, finished.shifted(self._surface(state, cages))
+            if np.array_equal(shift[deformer.handle], last[deformer.handle]):
+                break
         pose = Pose(cages, targets, finished)
         self._current = pose
         x, change = self._evaluate(state, pose)
@@ -181,11 +191,10 @@ class PoseSolver:
         if shift is None:
             return pose, solution
         reached = None if solution.targets is None else solution.targets + shift[deformer.handle]
-        ids, wanted = (
-            (deformer.handle, deformer.fixed),
-            (_stacked(targets), _fixed_at(self._mesh, state)),
+        ids = deformer.handle, deformer.fixed
+        errors = partial(
+            errors_at, ids, (wanted, _fixed_at(self._mesh, state)), self._mesh.diagonal
         )
-        errors = partial(errors_at, ids, wanted, self._mesh.diagonal)
         return pose, replace(solution, errors=errors, targets=reached)
 
     def finish(self, state: State, pose: Pose) -> Finish:
@@ -201,7 +210,11 @@ class PoseSolver:
         shift = self._shift(state)
         is_shifted = shift is not None and bool(shift[state.fixed].any())
         deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
-        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift)
+        x = self._surface(state, pose.cage_vertices)
+        if state.locality is not None:
+            x = self.vertices(state, pose)
+            deformer = localised(deformer, state.locality)
+        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""
@@ -227,8 +240,7 @@ class PoseSolver:
         before = state.pose
         finished = None if before is None else before.finished
         if before is not None and finished is not None:
-            x = self._surface(state, p)
-            finished = self._moved_on(state, before, finished, x)
+            finished = self._moved_on(state, before, finished, p)
         pose = Pose(p, MappingProxyType({}), finished)
         x, change = self._evaluate(state, pose)
         pose = replace(pose, targets=targets_at(state.handles, x))
@@ -294,12 +306,24 @@ class PoseSolver:
             return None
         return pose.finished.shifted(self._surface(state, pose.cage_vertices))
 
-    def _moved_on(self, state: State, before: Pose, finished: Finished, x: FloatArray) -> Finished:
-        """Return *finished*, of the pose *before*, for other cages, whose mesh is *x* (n, 3)."""
-        offset = finished.vertices - self._surface(state, before.cage_vertices)
+    def _moved_on(
+        self, state: State, before: Pose, finished: Finished, cages: tuple[FloatArray, ...]
+    ) -> Finished:
+        """Return *finished*, of the pose *before*, for other *cages*."""
         held = np.concatenate([state.fixed, state.handle])
         preserved = self._constrain(state).preserved_volumes
-        return moved_on(finished, offset, x, held=held, constraints=preserved)
+        offset = finished.vertices - self._surface(state, before.cage_vertices)
+        x = self._surface(state, cages)
+        turned = np.swapaxes(self._rotations(state, before.cage_vertices), 1, 2)
+        turns = self._rotations(state, cages) @ turned
+        turns[state.fixed] = np.eye(3)
+        return moved_on(finished, offset, x, turns=turns, held=held, constraints=preserved)
+
+    def _rotations(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
+        """Return `Deformer.rotations`; the last ones are kept."""
+        if self._turned[0] is not cage_vertices:
+            self._turned = cage_vertices, self.bind(state).rotations(cage_vertices)
+        return self._turned[1]
 
     def _surface(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
         """Return W~ p, (n, 3); the last one is kept."""
@@ -314,12 +338,7 @@ class PoseSolver:
             return constrained
         if self._local is not None and self._local[:2] == (constrained, locality):
             return self._local[2]
-        deformer = constrained.copy()
-        x = deformer.surface(locality.cage_vertices)
-        deformer.resume(locality.cage_vertices, x[deformer.handle])
-        deformer = deformer.local(
-            locality.vertex, locality.reach, locality.spread, follows=locality.follows
-        )
+        deformer = localised(constrained, locality)
         self._local = constrained, locality, deformer
         self._current = None
         return deformer
@@ -337,10 +356,8 @@ class PoseSolver:
             deformer.resume(pose.cage_vertices, places)
 
     def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
-        if pose.finished is None:
-            x, _ = self._evaluate(state, pose)
-        else:
-            x = self._surface(state, pose.cage_vertices)
+        is_plain = pose.finished is None
+        x = self.vertices(state, pose) if is_plain else self._surface(state, pose.cage_vertices)
         return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     def _evaluate(self, state: State, pose: Pose) -> tuple[FloatArray, Callable[[], float]]:
@@ -348,12 +365,9 @@ class PoseSolver:
         lids, before = state.options.lids, self._evaluated
         same = before is not None and before[0].is_same_surface(pose)
         if before is None or not same or before[1] is not lids:
-            if before and same:
-                x = before[2]
-            elif pose.finished is not None:
-                x = pose.finished.vertices
-            else:
-                x = self.bind(state).surface(pose.cage_vertices)
+            own = None if pose.finished is None else pose.finished.vertices
+            x = before[2] if before and same else own
+            x = self.bind(state).surface(pose.cage_vertices) if x is None else x
             frozen(x)
             _, volume = self._enclosed(state)
             before = self._evaluated = pose, lids, x, cache(partial(volume.relative, x))

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from .. import deformer
 from ..arrays import FloatArray, IntArray, frozen, plain
-from ..deformer import SPREAD, checked_point, checked_vertex, reach_and_follows
+from ..deformer import SPREAD, Deformer, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
 from ..mesh import Mesh
 from .handles import (
@@ -143,6 +143,14 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
     local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
     return Grasp(grip, after, name, vertices[vertex], MappingProxyType(carried))
+
+
+def localised(constrained: Deformer, locality: Locality) -> Deformer:
+    """Return a copy of a *constrained* deformer for a pull: local, in the pose at its press."""
+    other = constrained.copy()
+    x = other.surface(locality.cage_vertices)
+    other.resume(locality.cage_vertices, x[other.handle])
+    return other.local(locality.vertex, locality.reach, locality.spread, follows=locality.follows)
 
 
 def pinned(mesh: Mesh, state: State, vertex: int) -> tuple[str, Mapping[str, IntArray]]:

@@ -806,7 +806,8 @@ class Session(Timeline):
         """Finish the pose on the mesh itself, as `Deformer.finish` does.
 
         Triangles are less distorted, joints bend in less space, and handles and fixed vertices are
-        exact.  The next drag continues from the finished pose.
+        exact.  The next drag continues from the finished pose.  The pose of a pull is finished
+        within its reach.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
 
@@ -818,7 +819,7 @@ class Session(Timeline):
         Raises
         ------
         SessionError
-            If there is no pose, or it is that of a local pull.
+            If there is no pose, or nothing is fixed or in a handle.
         """
         if self.solution is not None and self.solution.status is Status.STEP_LIMIT:
             self.refine()
@@ -865,8 +866,6 @@ class Session(Timeline):
             return "there is no pose to finish; move a handle first"
         if not (state.handles or len(state.fixed)):
             return "there are no handles or fixed vertices to finish the pose for; add a handle"
-        if state.locality is not None:
-            return "the pose of a pull cannot be finished; drag a handle first"
         return ""
 
     def start_afresh(self) -> None:

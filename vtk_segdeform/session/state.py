@@ -120,7 +120,7 @@ class Finished(Frozen):
     vertices: FloatArray
     """(n, 3) float."""
     held: IntArray
-    """(h,) int: the vertices that were fixed or in handles at the finish."""
+    """(h,) int: the vertices that were fixed or in handles at the finish, or since."""
     shifts: FloatArray
     """(h, 3) float: their positions minus the targets of the cages; nonzero only for vertices that
     were fixed, or made handles, in a finished pose."""

@@ -83,7 +83,7 @@ def finish(controller: Controller) -> None:
     session = controller.session
 
     def accept(result: FinishedPose) -> str:
-        is_same = session.accept_finish(result)
+        is_same = controller.finishing.accept(result)
         return "Pose finished on the mesh" if is_same else "The pose changed; it was not finished"
 
     controller.start("Finishing on the mesh", session.finishing(), accept)

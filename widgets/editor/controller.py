@@ -93,7 +93,13 @@ class Controller:
             self._prepare_pulls,
             self.refresh,
         )
-        self.finishing = Finishing(view, lambda: self.session, self._is_free, self.refresh)
+        self.finishing = Finishing(
+            view,
+            lambda: self.session,
+            lambda: self.widgets.surface,
+            self._is_free,
+            self.refresh,
+        )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
         self._listen()
@@ -255,7 +261,7 @@ class Controller:
         if widget.remark:
             self.messages.note(widget.remark)
         load_early()
-        if widget is self.widgets.dragger:
+        if widget in (self.widgets.dragger, self.widgets.puller):
             self.finishing.rest()
         self.refresh()
 
@@ -373,6 +379,7 @@ class Controller:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
+        is_used |= widgets.puller.is_waiting
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
 

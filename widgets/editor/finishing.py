@@ -3,6 +3,7 @@
     end of a drag  ->  rest for a moment, until the pose has converged
     another thread ->  `Session.finishing`, from its own deformer
     the result     ->  `Session.accept_finish`, part of the same undo step
+    on the screen  ->  `Glide`, since the pose may move by some per cent of the diagonal
 
 The next press, and every change of the session, cancels it.  Large meshes are finished on request
 only.  A replay finishes where the recording did.
@@ -18,10 +19,10 @@ from vtk_segdeform.session import Change, FinishedPose, Session
 from vtk_segdeform.solver import Status
 
 from ..recording import announce_finish, on_finish_request, recorded_keys
-from ..scene import Stop, View
+from ..scene import Glide, Stop, SurfaceDisplay, View
 from .job import Job, view_timer
 
-MOST_VERTICES = 30_000  # of a mesh that is finished without a request: it takes about 2 seconds
+MOST_VERTICES = 20_000  # of a mesh that is finished without a request: it takes about a second
 
 _REST = 0.4  # seconds without a change before it begins
 _PERIOD = 100  # milliseconds between two checks
@@ -30,9 +31,7 @@ _KEPT = Change.NAMES | Change.PIVOTS  # changes that a finish does not depend on
 
 
 class Finishing:
-    """Finishes the pose of a session after a drag, if that is wanted.
-
-    By default it is not: where the finish moves whole limbs, the surface jumps after the release.
+    """Finishes the pose of a session after a drag, unless that is not wanted.
 
     Parameters
     ----------
@@ -40,6 +39,8 @@ class Finishing:
         Provides the timer.
     session : callable
         Returns the session that is edited.
+    surface : callable
+        Returns the surface that shows it.
     is_free : callable
         Returns whether nothing is being dragged, refined or computed.
     changed : callable
@@ -50,12 +51,14 @@ class Finishing:
         self,
         view: View,
         session: Callable[[], Session],
+        surface: Callable[[], SurfaceDisplay],
         is_free: Callable[[], bool],
         changed: Callable[[], object],
     ) -> None:
-        self._view, self._session = view, session
+        self._view, self._session, self._surface = view, session, surface
         self._is_free, self._changed = is_free, changed
-        self._is_wanted = False
+        self._is_wanted = True
+        self.glide = Glide(view)
         self._stop_waiting: Stop | None = None
         self._since = 0.0
         self._job: Job[FinishedPose] | None = None
@@ -97,8 +100,9 @@ class Finishing:
             self.interrupt()
 
     def interrupt(self) -> bool:
-        """Cancel; False if there was nothing to cancel."""
+        """Cancel, and end the glide; False if there was nothing to cancel."""
         is_running = self._job is not None
+        self.glide.end()
         if self._stop_waiting is not None:
             self._stop_waiting()
             self._stop_waiting = None
@@ -118,27 +122,37 @@ class Finishing:
             self._since = time.monotonic()
         if time.monotonic() - self._since < _REST:
             return
-        self.interrupt()
         session = self._session()
         solution = session.solution  # None after undo
-        if solution is None or solution.status is Status.STEP_LIMIT or not session.can_finish:
+        if solution is not None and solution.status is Status.STEP_LIMIT:
+            return  # it will be refined
+        self.interrupt()
+        if solution is None or not session.can_finish:
             return
         self._job = Job(
             view_timer(self._view),
             session.finishing(),
-            done=self._accept,
+            done=self._accept_announced,
             watch=self._watch,
             is_due=self._is_free,
         )
         self._show(0.0)
 
-    def _accept(self, result: FinishedPose) -> None:
-        self._is_accepting = True
+    def accept(self, result: FinishedPose) -> bool:
+        """Use a finished pose, and glide to it; False if the pose has changed since."""
+        session, self._is_accepting = self._session(), True
         try:
-            is_accepted = self._session().accept_finish(result)
+            with self._view.drawing_once():
+                before = session.vertices
+                is_accepted = session.accept_finish(result)
+                if is_accepted:
+                    self.glide.begin(self._surface(), before)
         finally:
             self._is_accepting = False
-        if is_accepted:
+        return is_accepted
+
+    def _accept_announced(self, result: FinishedPose) -> None:
+        if self.accept(result):
             announce_finish(self._view.interactor)
 
     def _watch(self, job: Job[FinishedPose]) -> None:

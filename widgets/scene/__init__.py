@@ -7,6 +7,7 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
+    glide              the way from one pose to the next on the screen
     handle_colours     the colours of the handles of a session
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
@@ -27,6 +28,7 @@ from .backdrop import set_background, set_lights
 from .decimated_surface import decimated_triangles
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
+from .glide import Glide
 from .handle_colours import handle_colour
 from .highlights import Highlights
 from .labels import Panel, Text, set_font
@@ -45,6 +47,7 @@ __all__ = [
     "VIEWS",
     "Draft",
     "Gesture",
+    "Glide",
     "Highlights",
     "Navigation",
     "OrientationCube",

@@ -179,8 +179,12 @@ class SurfaceDisplay:
 
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
-        self._shown = self.session.vertices if self._instead is None else self._instead
-        self._points[:] = self._shown
+        self.draw(self.session.vertices if self._instead is None else self._instead)
+
+    def draw(self, vertices: FloatArray) -> None:
+        """Draw *vertices* (n, 3) until the pose changes, for a picture between two poses."""
+        self._shown = vertices
+        self._points[:] = vertices
         self._drawn[len(self._points) :] = self._points[self._twice]
         self.polydata.GetPoints().GetData().Modified()
         self.polydata.GetPoints().Modified()

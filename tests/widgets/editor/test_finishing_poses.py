@@ -10,14 +10,18 @@ from hands import plain_view
 from test_editor import Bench, bench, pull_handle, ready  # noqa: F401 - two of them are fixtures
 
 from vtk_segdeform import load_session
-from vtk_segdeform.widgets.editor import finishing, finishing_after_drags
+from vtk_segdeform.kernels import compiled_kernels
+from vtk_segdeform.session import save_session
+from vtk_segdeform.widgets.editor import finishing, finishing_after_drags, opening
 from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.widgets.scene import glide
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 
 
 @pytest.fixture(autouse=True)
 def soon(monkeypatch):
+    compiled_kernels()  # from the first gesture on, so that a replay computes with them as well
     monkeypatch.setattr(finishing, "_REST", 0.0)
 
 
@@ -35,7 +39,6 @@ def is_finished(bench):  # noqa: F811
 
 def test_a_pose_is_finished_after_a_drag_and_a_replay_ends_in_the_same(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
-    bench.editor.do(finishing_after_drags(True))
     bench.type("4", "ctrl+r")
     pull_handle(bench, (15, 25))
     until(bench, lambda: is_finished(bench))
@@ -60,7 +63,6 @@ def test_a_pose_is_finished_after_a_drag_and_a_replay_ends_in_the_same(bench, tm
 def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # noqa: F811
     bench.type("4")
     running = bench.editor.controller.finishing
-    running.is_wanted = True
 
     def begin():
         pull_handle(bench, (5, 8))
@@ -82,12 +84,133 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
     bench.type("z")
     assert running.fraction is None
     pull_handle(bench, (5, 8))
-    bench.editor.controller.finishing.is_wanted = False
+    bench.editor.do(finishing_after_drags(False))
     bench.hand.tick()
     assert running.fraction is None
 
 
+def grabbed(bench, fraction=0.6):  # noqa: F811
+    """Pull the surface at a share of the handle's distance, with the hand, and rest."""
+    hand, x = bench.hand, bench.session.vertices
+    seen = np.argmax(x[:, 0] - 2.0 * x[:, 1])  # towards the viewer, near the handle
+    start = np.array(hand.at(fraction * x[seen] + (1.0 - fraction) * x.mean(axis=0)))
+    hand.drag([start + share * np.array([15.0, 25.0]) for share in np.linspace(0.0, 1.0, 5)])
+
+
+def test_pulls_are_finished_and_add_up_and_are_replayed(bench, tmp_path):  # noqa: F811
+    bench.editor.path = tmp_path / "work.segdeform"
+    bench.session.bind()
+    bench.type("0", "ctrl+r")
+    poses = []
+    for fraction in (0.7, 0.3):
+        grabbed(bench, fraction)
+        assert bench.session.undo_label == "pull"
+        until(bench, lambda: is_finished(bench))
+        assert bench.session.solution.handle_error < 1e-12
+        poses.append(bench.session.vertices)
+    bench.type("ctrl+r")
+    text = tmp_path / "work.recording.txt"
+    assert text.read_text().count(" Finish\n") == 2
+    start = load_session(text.with_suffix(".segdeform"))
+    start.bind()
+    again = Bench(plain_view((400, 320)), start)
+    replay(again.view, text, busy=lambda: again.editor.is_busy)
+    assert again.hand.failures == []
+    assert np.array_equal(again.session.vertices, poses[1])
+    again.editor.remove()
+    bench.type("z")
+    assert np.array_equal(bench.session.vertices, poses[0])
+    bench.type("y")
+    assert np.array_equal(bench.session.vertices, poses[1])
+
+
+def glided(bench):  # noqa: F811
+    """Drag the handle until the surface glides to the finished pose; return the one before."""
+    pull_handle(bench, (15, 25))
+    running, poses = bench.editor.controller.finishing, []
+    while not running.glide.is_running:
+        poses.append(bench.session.vertices)
+        until(bench, lambda: running.glide.is_running or bench.session.vertices is not poses[-1])
+    return poses[-1]
+
+
+def test_the_surface_glides_to_the_finished_pose(bench, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(glide, "SECONDS", 1.0)
+    bench.type("4")
+    before = glided(bench)
+    points, after = bench.editor.widgets.surface.points, bench.session.vertices
+    assert is_finished(bench)
+    way = after - before
+    shares = []
+    while bench.editor.controller.finishing.glide.is_running:
+        shares.append(np.vdot(points - before, way) / np.vdot(way, way))
+        bench.hand.tick()
+    assert shares[0] < 0.2
+    assert np.all(np.diff(shares) >= 0.0)
+    assert sum(0.0 < share < 1.0 for share in shares) > 3
+    assert np.array_equal(points, after)
+
+
+def test_anything_ends_the_glide_at_once(bench, monkeypatch, tmp_path):  # noqa: F811
+    monkeypatch.setattr(glide, "SECONDS", 100.0)
+    bench.type("4")
+    save_session(tmp_path / "other.segdeform", bench.session)
+    before = glided(bench)
+    running, hand = bench.editor.controller.finishing.glide, bench.hand
+
+    def click():
+        hand.press((10, 10))
+        hand.release((10, 10))
+
+    def open_another():
+        bench.editor.do(opening(tmp_path / "other.segdeform"))
+        bench.settle()
+
+    for end in (
+        click,
+        lambda: hand.event("MouseWheelForwardEvent", (200, 160)),
+        lambda: hand.key("h"),
+        lambda: (bench.view.camera.Azimuth(5.0), hand.tick()),
+        bench.session.undo,
+        bench.editor.Off,
+        open_another,
+    ):
+        running.begin(bench.editor.widgets.surface, before)
+        assert running.is_running
+        end()
+        assert not running.is_running
+        for _ in range(3):
+            points = bench.editor.widgets.surface.points
+            assert np.array_equal(points, bench.session.vertices)
+            hand.tick()
+
+
+def test_a_press_during_the_glide_drags_the_finished_pose_on(bench, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(glide, "SECONDS", 100.0)
+    bench.type("4")
+    glided(bench)
+    finished = bench.session.vertices
+    middle = finished[next(iter(bench.session.handles.values()))].mean(axis=0)
+    at = np.array(bench.hand.at(middle))
+    bench.hand.press(at)
+    bench.hand.move(at + 1.0)
+    moved = np.abs(bench.session.vertices - finished).max() / bench.session.mesh.diagonal
+    assert 0.0 < moved < 0.02
+    bench.hand.release(at + 1.0)
+    assert bench.hand.failures == []
+
+
+def test_another_mode_during_a_finish_does_not_stop_it(bench):  # noqa: F811
+    bench.type("4")
+    pull_handle(bench, (15, 25))
+    until(bench, lambda: bench.editor.controller.finishing.fraction is not None)
+    bench.type("2")
+    until(bench, lambda: is_finished(bench))
+    assert bench.hand.failures == []
+
+
 def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
+    bench.editor.do(finishing_after_drags(False))
     bench.type("4", "shift+f")
     assert "no pose to finish" in bench.editor.status.lower()
     bench.hand.failures.clear()

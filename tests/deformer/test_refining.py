@@ -1,0 +1,77 @@
+"""A pose made in one call is finished on the mesh by default, unless the mesh is large."""
+
+from __future__ import annotations
+
+from threading import Event
+
+import pytest
+from numpy.testing import assert_array_equal
+from scenes import sausage
+
+from vtk_segdeform import sizes
+from vtk_segdeform.deformer import deform, pull
+from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.errors import ArgumentError, Cancelled, MeshError
+from vtk_segdeform.geometry.distortion import distortion
+
+SCENE = sausage(is_coarse=True)
+TARGETS = SCENE.mesh.vertices[SCENE.handle] + [0.0, 0.6, -0.6]
+OPTIONS = {"n_regions": 1, "n_cage_vertices": 40}
+
+
+def bent(refine=None):
+    return deform(SCENE.mesh, SCENE.fixed, SCENE.handle, TARGETS, refine=refine, **OPTIONS)
+
+
+def pulled(refine=None):
+    tip = int(SCENE.mesh.vertices[:, 0].argmax())
+    return pull(
+        SCENE.mesh, tip, SCENE.mesh.vertices[tip] + [0.0, 0.0, 0.8], refine=refine, **OPTIONS
+    )
+
+
+@pytest.mark.parametrize("make", [bent, pulled])
+def test_small_meshes_are_finished_and_large_ones_on_request(make, monkeypatch):
+    plain, finished = make(False), make()
+    assert distortion(SCENE.mesh, finished.vertices) < distortion(SCENE.mesh, plain.vertices)
+    assert finished.handle_error < 1e-12
+    assert abs(finished.volume_change) < 1e-12
+    monkeypatch.setattr(sizes, "FINISHED", SCENE.mesh.n_vertices - 1)
+    assert_array_equal(make().vertices, plain.vertices)
+    assert_array_equal(make(True).vertices, finished.vertices)
+
+
+def test_a_pose_that_cannot_be_finished_is_returned_as_it_is(monkeypatch):
+    def factor(*_, **__):
+        raise RuntimeError("Factor is exactly singular")
+
+    monkeypatch.setattr("vtk_segdeform.finish.finisher.splu", factor)
+    assert_array_equal(bent().vertices, bent(False).vertices)
+    with pytest.raises(MeshError, match="cannot be finished on this mesh: Factor is exactly"):
+        bent(True)
+    with pytest.raises(ArgumentError, match="refine"):
+        bent("yes")
+
+
+def test_a_finish_is_cancelled_even_while_its_matrix_is_factored(monkeypatch):
+    began, released = Event(), Event()
+
+    def factor(*_, **__):
+        began.set()
+        released.wait(20.0)
+
+    def cancel(_, text):
+        if began.is_set():
+            raise Cancelled(text)
+
+    monkeypatch.setattr("vtk_segdeform.finish.finisher.splu", factor)
+    deformer = Deformer(
+        SCENE.mesh, SCENE.regions, SCENE.cages, fixed=SCENE.fixed, handle=SCENE.handle
+    )
+    solution = deformer.solve(TARGETS, max_steps=2)
+    try:
+        with pytest.raises(Cancelled):
+            deformer.finish(solution, progress=cancel)
+        assert not released.is_set()
+    finally:
+        released.set()
