@@ -2,8 +2,9 @@
 
     python -m vtk_segdeform.widgets.web.client FILE --folder FOLDER
 
-It listens on 127.0.0.1, prints ``{"port": N}`` as one line once the page can be opened, and ends
-when its standard input is closed.  The work is saved in FOLDER after each change, and opened again
+The first line of its standard input is a secret, which each request must carry.  It listens on
+127.0.0.1, prints ``{"port": N}`` as one line once the page can be opened, and ends when its standard
+input is closed.  The work is saved in FOLDER after each change, and opened again
 by the next process there.
 """
 
@@ -11,10 +12,8 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import json
 import signal
 import sys
-import threading
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -24,6 +23,7 @@ from vtk_segdeform.models import cactus
 from vtk_segdeform.session import Session, save_session
 
 from ..editor import read_session
+from .serving import announce, announce_error, end_with_stdin, guard, read_secret
 from .transfer import UPLOAD_LIMIT
 from .web_editor import WebEditor
 
@@ -84,6 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--folder", type=Path, required=True, help="a private folder")
     parser.add_argument("--upload-limit", type=int, default=UPLOAD_LIMIT, help="bytes")
     options = parser.parse_args(arguments)
+    secret = read_secret()
+    end_with_stdin()
     place: Path = options.folder / AUTOSAVE
     try:
         session, name = _first_session(options.file, place)
@@ -91,36 +93,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
             session, name=name, folder=options.folder, upload_limit=options.upload_limit
         )
     except SegDeformError as error:
-        sys.stderr.write(f"segdeform: {error}\n")
+        announce_error(str(error))
         return 1
+    web.server.controller.on_server_bind.add(
+        lambda bound: bound.app.middlewares.append(guard(secret))
+    )
     asyncio.run(_serve(web, Autosave(web, place), options.port))
     return 0
 
 
 def _first_session(file: Path | None, place: Path) -> tuple[Session, str]:
     """Return the session to begin with, and its name."""
-    if file is not None:
-        return read_session(file, lambda *_: None), file.name
     if place.is_file():
         return read_session(place, lambda *_: None), "Last session"
+    if file is not None:
+        return read_session(file, lambda *_: None), file.name
     return Session(cactus()), "Sample model"
 
 
 async def _serve(web: WebEditor, autosave: Autosave, port: int) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
 
-    def wait_for_end() -> None:
-        sys.stdin.buffer.read()
-        loop.call_soon_threadsafe(ended.set)
-
     def ready(port: int) -> None:
         autosave.start()
-        sys.stdout.write(json.dumps({"port": port}) + "\n")
-        sys.stdout.flush()
+        announce(port)
 
     with suppress(NotImplementedError):  # on Windows
         loop.add_signal_handler(signal.SIGTERM, ended.set)
-    threading.Thread(target=wait_for_end, daemon=True).start()
     serving = loop.create_task(web.serve(port=port, ready=ready))
     ending = loop.create_task(ended.wait())
     await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
