@@ -3,9 +3,9 @@
     python -m vtk_segdeform.widgets.web.client FILE --folder FOLDER
 
 The first line of its standard input is a secret, which each request must carry.  It listens on
-127.0.0.1, prints ``{"port": N}`` as one line once the page can be opened, and ends when its standard
-input is closed.  The work is saved in FOLDER after each change, and opened again
-by the next process there.
+127.0.0.1, prints ``{"port": N}`` as one line once the page can be opened, and ends when its
+standard input is closed.  The work is saved in FOLDER after each change, and opened again by the
+next process there.
 """
 
 from __future__ import annotations
