@@ -22,7 +22,7 @@ class Wall:
     reach: float
     weight: float = 1e-3
 
-    def value_and_slope(self, p):
+    def value_and_slope(self, p, x=None):
         gap = self.row @ p[:, 2] - self.height
         if gap >= self.reach:
             return 0.0, np.zeros_like(p)
@@ -33,7 +33,7 @@ class Wall:
         slope[:, 2] = -1.5 * self.weight * log**2 / gap * self.row
         return -self.weight * log**3, slope
 
-    def hessian(self, p):
+    def hessian(self, p, x=None):
         gap = self.row @ p[:, 2] - self.height
         if not 0.0 < gap < self.reach:
             return None

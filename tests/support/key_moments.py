@@ -435,9 +435,6 @@ class SeldomDrawn(View):
     def render(self):
         pass
 
-    def draw(self):
-        super().render()
-
 
 class HandStand(Stand):
     """In a host with a single timer fired by hand: `plain_view`, or an off-screen plotter."""

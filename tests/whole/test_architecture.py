@@ -31,7 +31,7 @@ ROOMS = [
     "widgets.web.drawing", "widgets.web.serving", "widgets.web", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 24
-MOST_IMPORTS = 345  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 350  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}

@@ -7,6 +7,7 @@
 
 The module of a command is imported when the command runs, so that ``segdeform --help`` takes a
 tenth of a second and loads neither numpy nor VTK.  This is the only module that prints.
+Long because it has the options of every command.
 """
 
 from __future__ import annotations

@@ -179,10 +179,13 @@ class SurfaceDisplay:
 
     def update(self) -> None:
         """Show the session's current pose; called automatically when it changes."""
-        self.draw(self.session.vertices if self._instead is None else self._instead)
+        self._draw(self.session.vertices if self._instead is None else self._instead)
 
     def draw(self, vertices: FloatArray) -> None:
         """Draw *vertices* (n, 3) until the pose changes, for a picture between two poses."""
+        self._draw(as_points(vertices, "vertices", len(self._points)))
+
+    def _draw(self, vertices: FloatArray) -> None:
         self._shown = vertices
         self._points[:] = vertices
         self._drawn[len(self._points) :] = self._points[self._twice]
