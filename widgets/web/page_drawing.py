@@ -18,9 +18,10 @@ import numpy as np
 
 from ..editor import DeformEditor
 from ..scene import Draft, SurfaceStyle
-from .drawing import SurfaceStream, label_actors, labels_of, look_of, marks_of
+from .drawing import Mark, SurfaceStream, label_actors, labels_of, look_of, marks_of
 
 _PIECE = 1 << 18  # bytes; pictures are sent between two pieces
+_MOST_POINTS = 5_000  # of marks that follow the camera: 60 kilobytes an update
 
 
 @dataclass(frozen=True)
@@ -142,8 +143,15 @@ class PageDrawing:
         vertices, camera = self._drawn
         return vertices is self._editor.session.vertices and camera == self._camera
 
-    def first_update(self) -> Update:
-        """Return the update for the state that the page shows, as drawn by the server."""
+    def first_update(self) -> Update | None:
+        """Return the update for the state that the page shows, as drawn by the server.
+
+        None if pictures are smaller than updates: marks of constant size, such as a gizmo, change
+        whenever the camera moves.
+        """
+        turns = self._editor.controller.camera.navigation.is_dragging
+        if turns and sum(len(mark.points) for mark in self._marks) > _MOST_POINTS:
+            return None
         self._labels = label_actors(self._editor.view)
         return self._update(is_first=True)
 
@@ -163,11 +171,16 @@ class PageDrawing:
         labels = tuple(labels_of(added, view))
         return Update(tuple(messages), labels, *view.window.GetSize(), is_first)
 
+    @property
+    def _marks(self) -> list[Mark]:
+        view = self._editor.view
+        view.lay_out()
+        return marks_of(view, self._editor.widgets.surface.actors)
+
     def _due(self) -> list[bytes]:
         editor, surface = self._editor, self._editor.widgets.surface
         view, viewpoint = editor.view, editor.controller.camera.viewpoint
-        view.lay_out()
+        marks = self._marks  # first, because this lays out
         material, focus = surface.actor.GetProperty(), np.array(view.camera.GetFocalPoint())
         look = look_of(view.renderer, material, viewpoint.turning_axis(), focus)
-        marks = marks_of(view, surface.actors)
         return self._stream.due(look, colours=surface.colours, marks=marks)

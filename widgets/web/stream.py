@@ -160,8 +160,10 @@ class Stream:
             if self._encoding is not None:
                 await asyncio.wait([self._encoding])
             self._cancel_rest()
-            self._is_live = True
-            self._update(drawing.first_update())
+            update = drawing.first_update()
+            if update is not None:
+                self._is_live = True
+                self._update(update)
 
     def _end_live(self) -> None:
         """Let the server draw again, once the view rests or the page cannot draw any more."""
