@@ -169,7 +169,8 @@ class PageDrawing:
         messages, view = self._due(), self._editor.view
         added = [actor for actor in label_actors(view) if actor not in self._labels]
         labels = tuple(labels_of(added, view))
-        return Update(tuple(messages), labels, *view.window.GetSize(), is_first)
+        width, height = view.window.GetSize()
+        return Update(tuple(messages), labels, width, height, is_first)
 
     @property
     def _marks(self) -> list[Mark]:

@@ -34,9 +34,7 @@ class ViewProtocol(LinkProtocol):
         Called after each change of its size.
     """
 
-    def __init__(
-        self, stream: Stream, drawing: PageDrawing, sized: Callable[[], object]
-    ) -> None:
+    def __init__(self, stream: Stream, drawing: PageDrawing, sized: Callable[[], object]) -> None:
         super().__init__()
         self._stream, self._drawing, self._sized = stream, drawing, sized
         self._draws = False  # the page that connected last

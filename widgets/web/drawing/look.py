@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -230,7 +231,7 @@ def _strip_corners(cells: Any) -> IntArray:
     offsets = vtk_to_numpy(cells.GetOffsetsArray()) if cells.GetNumberOfCells() else ()
     corners = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
     pieces = [np.empty(0, dtype=np.int64)]
-    for start, end in zip(offsets[:-1], offsets[1:], strict=True):
+    for start, end in pairwise(offsets):
         strip = corners[start:end]
         triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
         triangles[1::2] = triangles[1::2, ::-1]
