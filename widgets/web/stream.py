@@ -23,7 +23,7 @@ from .page_drawing import PageDrawing, Surface, Update
 from .pictures import Encode, Picture, Pictures
 from .timers import Timers
 
-_AHEAD = 3  # pictures that the page has not shown yet, with one that is being encoded
+_AHEAD = 2  # pictures that the page has not shown yet
 _LOST = 2.0  # seconds after which such a picture is no longer waited for
 _REST = 0.25  # seconds without another picture, after which the view rests
 _PERIOD = 0.04  # seconds between two checks whether a view that the page draws rests
@@ -137,7 +137,7 @@ class Stream:
                 self._handled()
             self._end_live()
             if self._is_wanted and self._is_open:
-                if self._sent - self._shown >= _AHEAD:
+                if self._is_ahead:
                     await self._wait_for_page()
                 await self._show()
             self._announce()
@@ -194,9 +194,15 @@ class Stream:
             if surface is not None:
                 self._send(surface, self._sent)
 
+    @property
+    def _is_ahead(self) -> bool:
+        """Whether the page has yet to show enough of what was sent."""
+        is_encoding = self._encoding is not None and not self._encoding.done()
+        return self._sent - is_encoding - self._shown >= _AHEAD
+
     async def _wait_for_page(self) -> None:
         """Wait until the page has shown a picture, or too long; handle no event meanwhile."""
-        while self._sent - self._shown >= _AHEAD:
+        while self._is_ahead:
             try:
                 await asyncio.wait_for(self._awake.wait(), _LOST)
             except asyncio.TimeoutError:
