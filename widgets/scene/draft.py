@@ -62,6 +62,11 @@ class Draft:
             view.draft = cls(view)
         return cast(Draft, view.draft)
 
+    @property
+    def is_active(self) -> bool:
+        """Whether pictures are drafts."""
+        return self._stop is not None
+
     def begin(self, *, if_slow: bool = False) -> None:
         """Draw drafts until `end`, or until this was not called for 0.2 s.
 

@@ -128,6 +128,16 @@ class SurfaceDisplay:
         return self._read_only_points
 
     @property
+    def actors(self) -> tuple[Any, ...]:
+        """The vtkActors that show the mesh, completely or decimated."""
+        return (self.actor,) if self._decimated is None else (self.actor, self._decimated.actor)
+
+    @property
+    def colours(self) -> NDArray[np.uint8] | None:
+        """(n, 3) uint8: the colours of the vertices in the newest layer; None without any."""
+        return next(reversed(self._layers.values()), None)
+
+    @property
     def style(self) -> SurfaceStyle:
         """How the surface is drawn."""
         return self._style
@@ -166,7 +176,7 @@ class SurfaceDisplay:
             self._layers.pop(layer, None)
         else:
             self._layers[layer] = self._checked(colours)
-        top = next(reversed(self._layers.values()), None)
+        top = self.colours
         self._mapper.SetScalarVisibility(top is not None)
         if top is not None:
             colours_drawn = np.concatenate([top, top[self._twice]])
@@ -234,7 +244,7 @@ class SurfaceDisplay:
             if self._decimated is None:
                 return
             self.view.renderer.AddActor(self._decimated.actor)
-            self._decimated.set_colours(next(reversed(self._layers.values()), None))
+            self._decimated.set_colours(self.colours)
         self._is_draft = True
         self._decimated.update(self._points)
         self._decimated.actor.VisibilityOn()

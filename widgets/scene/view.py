@@ -229,6 +229,10 @@ class View(Projection):
         tag = self.renderer.AddObserver("StartEvent", called)
         return _once(lambda: self.renderer.RemoveObserver(tag))
 
+    def lay_out(self) -> None:
+        """Call what `before_render` calls, without drawing: the host draws by itself."""
+        self.renderer.InvokeEvent("StartEvent")
+
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
         """Call *callback* repeatedly from the event loop, until stopped.
 

@@ -4,6 +4,8 @@ The files, in reading order:
 
     web_editor  `WebEditor`: an off-screen view, a trame server and a page
     stream      input in, pictures out, in one order
+    page_drawing
+                what the page draws itself during a drag
     inputs key_names timers pictures
                 the parts of that: events, keys, timers, JPEG
     protocol    the messages between page and stream

@@ -12,6 +12,7 @@ from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
+from .page_drawing import PageDrawing, Surface, Update
 from .pictures import Picture
 from .stream import Stream
 
@@ -27,25 +28,35 @@ class ViewProtocol(LinkProtocol):
     ----------
     stream : Stream
         The view.
+    drawing : PageDrawing
+        What the page draws itself, while there is only one.
     sized : callable
         Called after each change of its size.
     """
 
-    def __init__(self, stream: Stream, sized: Callable[[], object]) -> None:
+    def __init__(self, stream: Stream, drawing: PageDrawing, sized: Callable[[], object]) -> None:
         super().__init__()
-        self._stream, self._sized = stream, sized
+        self._stream, self._drawing, self._sized = stream, drawing, sized
+        self._draws = False  # the page that connected last
         self._pages: set[str] = set()
 
     def onConnect(self, request: Any, client_id: str) -> None:  # noqa: N802 - wslink's name
-        """Count a page."""
+        """Count a page; whether it draws is not known yet."""
         del request
         self._pages.add(client_id)
+        self._set_draws(False)
 
     def onClose(self, client_id: str) -> None:  # noqa: N802
         """Stop drawing when the last page has gone."""
         self._pages.discard(client_id)
         if not self._pages:
             self._stream.close()
+        self._set_draws(self._draws)
+
+    def _set_draws(self, draws: bool) -> None:
+        self._draws = draws
+        self._drawing.want(draws and len(self._pages) == 1)
+        self._stream.wake()
 
     @register("segdeform.input")
     def input(self, events: object) -> None:
@@ -66,6 +77,26 @@ class ViewProtocol(LinkProtocol):
         self._stream.open(size[0], size[1])
         self._sized()
 
+    @register("segdeform.draws")
+    def draws(self, draws: object) -> None:
+        """Let the page draw from now on, which has nothing yet; or let the server draw."""
+        self._set_draws(draws is True)
+
+    @register("segdeform.surface")
+    def surface(self, version: Any, start: Any) -> bytes:
+        """Return the bytes of a surface from *start* on; see `PageDrawing.piece`."""
+        for value in (version, start):
+            if not is_whole(value, 0):
+                raise ArgumentError(f"version and start must be integers; got {shown(value)}")
+        return self._drawing.piece(int(version), int(start))
+
+    @register("segdeform.holds")
+    def holds(self, version: Any) -> None:
+        """Let the page draw surface *version*, which it has received."""
+        if not is_whole(version, 0):
+            raise ArgumentError(f"version must be an integer; got {shown(version)}")
+        self._drawing.hold(int(version))
+
     @register("segdeform.shown")
     def shown(self, number: Any) -> None:
         """Continue: the page has shown picture *number*."""
@@ -73,12 +104,8 @@ class ViewProtocol(LinkProtocol):
             raise ArgumentError(f"number must be an integer; got {shown(number)}")
         self._stream.shown(int(number))
 
-    def send(self, picture: Picture, number: int) -> None:
-        """Publish a picture."""
-        message = {
-            "number": number,
-            "width": picture.width,
-            "height": picture.height,
-            "content": picture.data,
-        }
-        self.publish("segdeform.picture", message)
+    def send(self, picture: Picture | Update | Surface, number: int) -> None:
+        """Publish a picture, or what the page needs to draw."""
+        names = {"data": "content"}
+        message = {names.get(name, name): value for name, value in vars(picture).items()}
+        self.publish("segdeform.picture", {"number": number, **message})

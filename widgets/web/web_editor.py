@@ -30,7 +30,9 @@ from vtk_segdeform.session import Session
 from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor, KeyChoice, keys_of
 from ..scene import set_background, set_lights
+from .page_drawing import PageDrawing, Surface, Update
 from .page_model import PageModel
+from .pictures import Picture
 from .protocol import ViewProtocol
 from .stream import Stream
 from .timers import Timers
@@ -109,9 +111,11 @@ class WebEditor:
         names = {str(self.editor.path): name}
         self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
         self.model = PageModel(self.editor, self.server.state, names)
-        self.stream = Stream(self.editor.view, timers, self._send, self.model.changed)
+        drawing = PageDrawing(self.editor)
+        self.stream = Stream(self.editor.view, timers, self._send, self.model.changed, drawing)
+        self._stop = self.editor.controller.messages.on_change(self.stream.wake)
         self._aim: tuple[float, ...] | None = tuple(self.plotter.camera.position)
-        self._protocol = ViewProtocol(self.stream, self._sized)
+        self._protocol = ViewProtocol(self.stream, drawing, self._sized)
         self._transfer = Transfer(
             self.editor, self._folder, upload_limit, names, self.model.changed
         )
@@ -166,6 +170,7 @@ class WebEditor:
     def close(self) -> None:
         """Release the view and the folder of uploads; the session is unchanged."""
         self.model.stop()
+        self._stop()
         self.plotter.close()  # which removes the editor first
         if self._own is not None:
             shutil.rmtree(self._own, ignore_errors=True)
@@ -176,7 +181,7 @@ class WebEditor:
             self.editor.controller.camera.viewpoint.frame(animate=False)
         self._aim = None
 
-    def _send(self, picture: Any, number: int) -> None:
+    def _send(self, picture: Picture | Update | Surface, number: int) -> None:
         self._protocol.send(picture, number)
 
     def _make_page(self) -> None:

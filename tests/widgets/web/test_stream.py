@@ -6,10 +6,15 @@ import struct
 
 import numpy as np
 import pytest
+from hands import plain_view
 from posed_scenes import random_cages, sausage_session
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkFiltersCore import vtkStripper
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.session import Change
-from vtk_segdeform.widgets.web.drawing import Look, Mark, SurfaceStream
+from vtk_segdeform.widgets.web.drawing import Look, Mark, SurfaceStream, marks_of
 from vtk_segdeform.widgets.web.drawing.look import Shape
 from vtk_segdeform.widgets.web.drawing.messages import Kind
 
@@ -113,3 +118,35 @@ def test_after_new_cages_nothing_is_due_until_they_are_encoded(stream):
     messages = stream.due(LOOK)
     assert kinds(messages) == [Kind.SURFACE, Kind.LOOK, Kind.CAGES]
     assert struct.unpack_from("<12xI", messages[0]) == (2,)
+
+
+@pytest.mark.parametrize("strips", [False, True])
+def test_solids_are_marked_without_what_vtk_culls_or_clips(strips):
+    view, actor, mapper = plain_view((100, 100)), vtkActor(), vtkPolyDataMapper()
+    source = vtkSphereSource()
+    source.SetThetaResolution(24)
+    source.SetPhiResolution(24)
+    last = source
+    if strips:
+        last = vtkStripper()
+        last.SetInputConnection(source.GetOutputPort())
+    mapper.SetInputConnection(last.GetOutputPort())
+    actor.SetMapper(mapper)
+    view.renderer.AddActor(actor)
+    view.camera.SetPosition(0.0, 0.0, 10.0)
+    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
+    (whole,) = marks_of(view, [])
+    assert len(whole.points) == 3 * source.GetOutput().GetNumberOfPolys()
+    actor.GetProperty().SetFrontfaceCulling(True)
+    (back,) = marks_of(view, [])
+    a, b, c = back.points.reshape(-1, 3, 3).transpose(1, 0, 2)
+    outwards = np.cross(b - a, c - a)
+    assert (outwards * a).sum(axis=1).min() > 0.0  # no triangle is turned over
+    assert (outwards * (a - [0.0, 0.0, 10.0])).sum(axis=1).min() > 0.0
+    assert len(whole.points) / 3 < len(back.points) < len(whole.points)
+    plane = vtkPlane()
+    plane.SetNormal(1.0, 0.0, 0.0)
+    mapper.AddClippingPlane(plane)
+    (half,) = marks_of(view, [])
+    assert half.points.reshape(-1, 3, 3).mean(axis=1)[:, 0].min() >= 0.0
+    assert abs(len(half.points) - len(back.points) / 2) < 0.2 * len(back.points)

@@ -5,18 +5,20 @@ The files, in reading order:
     messages    binary messages to the page
     encoding    a mesh and its W~ as a message, and the messages of its poses
     look        camera, light, material and marks of a VTK renderer
+    labels      its texts
     stream      which messages a page still needs
 
-``surface.js`` receives the messages and draws with WebGL 2.
+``page/surface.js`` receives the messages and draws with WebGL 2.
 """
 
 from pathlib import Path
 
 from .encoding import EncodedSurface, encode_surface, is_drawable
+from .labels import label_actors, labels_of
 from .look import Look, Mark, look_of, marks_of
 from .stream import SurfaceStream
 
-SCRIPT = Path(__file__).with_name("surface.js")
+SCRIPT = Path(__file__).parents[1] / "page" / "surface.js"
 """The script of the page."""
 
 __all__ = [
@@ -27,6 +29,8 @@ __all__ = [
     "SurfaceStream",
     "encode_surface",
     "is_drawable",
+    "label_actors",
+    "labels_of",
     "look_of",
     "marks_of",
 ]

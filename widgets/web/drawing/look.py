@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -175,11 +176,11 @@ def marks_of(view: Any, body: Collection[Any]) -> list[Mark]:
     for renderer in (view.renderer, view.foreground):
         for actor in renderer.GetActors():
             if actor.GetVisibility() and all(actor is not other for other in body):
-                marks += _marks(actor, is_above=renderer is view.foreground)
+                marks += _marks(actor, view.camera, is_above=renderer is view.foreground)
     return marks
 
 
-def _marks(actor: Any, *, is_above: bool) -> Iterator[Mark]:
+def _marks(actor: Any, camera: Any, *, is_above: bool) -> Iterator[Mark]:
     mapper, style = actor.GetMapper(), actor.GetProperty()
     mapper.Update()
     data = mapper.GetInput()
@@ -188,15 +189,54 @@ def _marks(actor: Any, *, is_above: bool) -> Iterator[Mark]:
     matrix = _array(actor.GetMatrix())
     points = vtk_to_numpy(data.GetPoints().GetData()) @ matrix[:3, :3].T + matrix[:3, 3]
     colour = np.array([*style.GetDiffuseColor(), style.GetOpacity()])
+    eye = None
+    if style.GetFrontfaceCulling():  # the outline of a solid, which must not hide that
+        eye = np.array([*camera.GetDirectionOfProjection(), 0.0])
+        if not camera.GetParallelProjection():
+            eye = np.array([*camera.GetPosition(), 1.0])
     pieces = (
-        (Shape.POINTS, data.GetVerts(), style.GetPointSize()),
-        (Shape.LINES, data.GetLines(), style.GetLineWidth()),
-        (Shape.TRIANGLES, data.GetPolys(), 1.0),
+        (Shape.POINTS, _corners(Shape.POINTS, data.GetVerts()), style.GetPointSize()),
+        (Shape.LINES, _corners(Shape.LINES, data.GetLines()), style.GetLineWidth()),
+        (
+            Shape.TRIANGLES,
+            np.concatenate(
+                [_corners(Shape.TRIANGLES, data.GetPolys()), _strip_corners(data.GetStrips())]
+            ),
+            1.0,
+        ),
     )
-    for shape, cells, size in pieces:
-        corners = _corners(shape, cells)
+    for shape, corners, size in pieces:
+        if shape is Shape.TRIANGLES and eye is not None:
+            corners = corners[np.repeat(_face_away(points[corners], eye), shape)]
+        for plane in mapper.GetClippingPlanes() or ():
+            normal, origin = np.array(plane.GetNormal()), np.array(plane.GetOrigin())
+            middles = points[corners].reshape(-1, shape, 3).mean(axis=1)
+            corners = corners[np.repeat((middles - origin) @ normal >= 0.0, shape)]
         if len(corners):
             yield Mark(shape, points[corners], colour, size, is_above)
+
+
+def _face_away(corners: FloatArray, eye: FloatArray) -> NDArray[np.bool_]:
+    """Return which triangles, three *corners* (3 k, 3) each, show their backs to *eye* (4,).
+
+    It is homogeneous: a place, or a direction of sight with a last number of 0.
+    """
+    a, b, c = corners.reshape(-1, 3, 3).transpose(1, 0, 2)
+    sight = a - eye[:3] if eye[3] else eye[:3]
+    return np.asarray((np.cross(b - a, c - a) * sight).sum(axis=1) > 0.0)
+
+
+def _strip_corners(cells: Any) -> IntArray:
+    """Return the points of the triangles of strips, every other one turned."""
+    offsets = vtk_to_numpy(cells.GetOffsetsArray()) if cells.GetNumberOfCells() else ()
+    corners = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
+    pieces = [np.empty(0, dtype=np.int64)]
+    for start, end in pairwise(offsets):
+        strip = corners[start:end]
+        triangles = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
+        triangles[1::2] = triangles[1::2, ::-1]
+        pieces.append(triangles.ravel())
+    return np.concatenate(pieces)
 
 
 def _corners(shape: Shape, cells: Any) -> IntArray:

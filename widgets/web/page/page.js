@@ -3,6 +3,7 @@ import controls from './panel.js';
 import View from './view.js';
 
 const STEPS_SEEN = 'segdeform steps seen', COLOURS = 'segdeform colours';
+const DRAWING = 'segdeform drawing', DRAWS = 'view.draw_in_browser';
 const CARDS = { pin: 'mdi-pin-outline', pull: 'mdi-gesture-swipe-up', done: 'mdi-check' };
 const remembered = {
   get(name) { try { return localStorage.getItem(name); } catch { return null; } },
@@ -16,7 +17,7 @@ const Page = {
   inject: ['trame'],
   data: () => ({
     pins: false, panel: false, fault: '', sent: null, isOver: false, asked: null,
-    hasSteps: !remembered.get(STEPS_SEEN),
+    hasSteps: !remembered.get(STEPS_SEEN), draws: remembered.get(DRAWING) !== 'no', isDrawable: false,
   }),
   mounted() {
     const scheme = window.matchMedia('(prefers-color-scheme: dark)');
@@ -30,8 +31,25 @@ const Page = {
   methods: {
     press(name, value) {
       this.fault = '';
+      if (name === DRAWS) {
+        this.draws = value === true;
+        remembered.set(DRAWING, this.draws ? 'yes' : 'no');
+        return;
+      }
       this.trame.trigger('press', [name, value]);
     },
+    // Return a field of the toolbar with what only this page knows.
+    extended(field) {
+      if (field.name !== 'view') return field;
+      const own = {
+        name: DRAWS, kind: 'toggle', label: 'Draw in the browser', value: this.draws,
+        enabled: this.isDrawable,
+        tip: this.isDrawable ? 'Draw the surface in this page during a drag'
+          : 'This browser cannot draw the surface: it lacks WebGL 2',
+      };
+      return { ...field, items: [...field.items, null, own] };
+    },
+    setDrawable(isDrawable) { this.isDrawable = isDrawable; },
     toggleDark() {
       remembered.set(COLOURS, this.dark ? 'light' : 'dark');
       this.$emit('dark', !this.dark);
@@ -119,7 +137,7 @@ const Page = {
   },
   template: `
     <div class="sd" :class="{ dark }" @click="settle" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
-      <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
+      <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark, extended, setDrawable,
         forget, closeSteps, cardIcon, touchSentence }"></slot>
       <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
       <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">

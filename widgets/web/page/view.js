@@ -3,7 +3,9 @@
 // Positions are fractions of the view.  Moves of one animation frame become one, and no more than
 // AHEAD messages are on their way at once, so a slow network gets fewer moves, not later ones.
 // One finger is the left button; two fingers turn (Alt and the left button) and pinch (the wheel);
-// three fingers pan (the middle button).
+// three fingers pan (the middle button).  During a drag the page may draw itself; see `Drawing`.
+import Drawing from './drawing.js';
+
 const AHEAD = 3; // messages without an answer
 const WHEEL = 100, PINCHED_WHEEL = 12; // pixels of one click of the wheel
 const PINCH = Math.log(1.2); // one click of the wheel zooms by 1.2
@@ -124,13 +126,16 @@ const isTyping = (event) => event.target.closest
 const isOnButton = (event) => event.target.closest && event.target.closest('button, a, [role=menu]');
 
 const View = {
-  props: { pins: Boolean, topic: { default: 'segdeform.picture' } },
-  emits: ['begun', 'download', 'open'],
+  props: { pins: Boolean, draws: Boolean, topic: { default: 'segdeform.picture' } },
+  emits: ['begun', 'download', 'open', 'drawable'],
   template: `<div class="sd-canvas" ref="area"
       @pointerdown="down" @pointermove="move" @pointerup="up" @pointercancel="up"
       @pointerleave="leave" @wheel.prevent="turn" @contextmenu.prevent
-    ><canvas ref="canvas" role="img" aria-label="The surface"></canvas></div>`,
+    ><canvas ref="canvas" role="img" aria-label="The surface"></canvas>
+    <div class="sd-live" ref="live" aria-hidden="true">
+      <canvas></canvas><canvas></canvas><canvas></canvas></div></div>`,
   inject: ['trame'],
+  watch: { draws(draws) { this.drawing.want(draws); } },
 
   mounted() {
     const session = this.trame.client.getConnection().getSession();
@@ -139,7 +144,14 @@ const View = {
     this.fingers = new Fingers(this);
     this.keys = new Map();
     this.rolled = 0;
-    this.subscription = session.subscribe(this.topic, ([event]) => this.show(event));
+    this.drawing = new Drawing(this.$refs.live, this.$refs.canvas, this.call);
+    this.$emit('drawable', this.drawing.isPossible);
+    this.drawing.want(this.draws);
+    this.shown = Promise.resolve();
+    this.subscription = session.subscribe(this.topic, ([event]) => {
+      const next = () => this.show(event);
+      this.shown = this.shown.then(next, next); // one after the other
+    });
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$refs.area);
     this.listeners = {
@@ -159,17 +171,26 @@ const View = {
 
   methods: {
     // Pictures.
-    async show({ number, width, height, content }) {
-      const bitmap = await createImageBitmap(new Blob([content], { type: 'image/jpeg' }));
-      const canvas = this.$refs.canvas;
+    async show(event) {
+      const { number, width, height, content } = event, canvas = this.$refs.canvas;
       if (!canvas || number < (this.number || 0)) return;
+      if (event.version) {
+        this.drawing.fetch(event);
+        return;
+      }
       this.number = number;
+      if (event.messages) {
+        this.drawing.show(event);
+        return;
+      }
+      const bitmap = await createImageBitmap(new Blob([content], { type: 'image/jpeg' }));
       if (canvas.width !== width || canvas.height !== height) {
         canvas.width = width;
         canvas.height = height;
       }
       canvas.getContext('bitmaprenderer').transferFromImageBitmap(bitmap);
       canvas.dataset.number = number;
+      this.drawing.hide();
       this.call('shown', number);
     },
 
