@@ -28,8 +28,9 @@ const Page = {
     previewed: null,
   }),
   mounted() {
-    this.trame.client.onConnectionClose((...words) => this.end(words.find((each) => each?.code)));
-    this.trame.client.onConnectionError(() => this.end());
+    const connection = this.trame.client.getConnection();
+    connection.onConnectionClose((_, event) => this.end(event));
+    connection.onConnectionError(() => this.end());
     window.addEventListener('keydown', this.key, true);
     const scheme = window.matchMedia('(prefers-color-scheme: dark)');
     const own = remembered.get(COLOURS);
@@ -189,7 +190,7 @@ const Page = {
           </section></div></div>
       <div v-if="ended" class="sd-ask" role="alertdialog" aria-modal="true">
         <div><h2>{{ ended }}</h2>
-          <p>Your work has been saved. Reload the page to continue.</p>
+          <p>Reload the page to continue where you were.</p>
           <button type="button" class="sd-button down" data-name="reload" @click="reload()">
             Reload</button></div></div>
     </div>`,
