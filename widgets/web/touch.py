@@ -1,7 +1,7 @@
 """Hints and first steps for fingers: what to tap instead of a key or a click with Shift.
 
-    Drag a cage vertex · Next: 4, deform             Drag a cage vertex · Next: [deform]
-    No cages yet. Press F to fit them to ...         No cages yet. [Fit them to ...]
+Drag a cage vertex · Next: 4, deform             Drag a cage vertex · Next: [deform]
+No cages yet. Press F to fit them to ...         No cages yet. [Fit them to ...]
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ def for_fingers(words: Iterable[Word]) -> tuple[Word, ...]:
         text, before = use[1], found[-1].text if found else ""
         if before.endswith("Press "):
             found[-1] = replace(found[-1], text=before.removesuffix("Press "))
+        if before.endswith((". ", "Press ")):
             text = text[:1].upper() + text[1:]
         found.append(Word(text, word.action))
     plain = (replace(word, text=_plain(word.text)) for word in found)

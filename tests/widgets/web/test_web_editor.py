@@ -173,7 +173,12 @@ def _bumpy(n: int) -> Mesh:
 @pytest.mark.campaign
 @pytest.mark.parametrize(
     "make",
-    [lambda: models.cactus(5000), lambda: models.dinosaur(3000), lambda: _bumpy(3), lambda: _bumpy(4)],
+    [
+        lambda: models.cactus(5000),
+        lambda: models.dinosaur(3000),
+        lambda: _bumpy(3),
+        lambda: _bumpy(4),
+    ],
     ids=["cactus", "dinosaur", "bumpy", "fine bumpy"],
 )
 def test_stories_of_other_meshes(
