@@ -94,7 +94,7 @@ def settle(editor):
 
 
 def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_view(web):
-    """A drag of the page, recorded, replays to the bit where there is no page."""
+    """Not to the bit: both views project the pointer with matrices of their own (4e-12)."""
     from hands import plain_view
 
     from vtk_segdeform.widgets import DeformEditor
@@ -121,8 +121,10 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     recorder.stop()
     assert session.position == 1
     again = DeformEditor(plain_view(), start)
+    again.On()
     settle(again)
     replay(again.view, recorder.lines, busy=lambda: again.is_busy)
     settle(again)
-    np.testing.assert_array_equal(start.vertices, session.vertices)
+    diagonal = session.mesh.diagonal
+    np.testing.assert_allclose(start.vertices, session.vertices, rtol=0, atol=1e-10 * diagonal)
     again.remove()
