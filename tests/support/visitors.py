@@ -13,7 +13,7 @@ from yarl import URL
 from vtk_segdeform.widgets.web.serving import Limits, running
 
 STANDIN = [sys.executable, str(Path(__file__).with_name("standin_client.py"))]
-LIMITS = Limits(upload=100_000, message=1 << 16, rate=50.0, burst=600, unread=16, start=30.0)
+LIMITS = Limits(upload=100_000, message=1 << 16, rate=50.0, burst=600, unread=16, start=300.0)
 POSTED = {"content-type": "application/octet-stream"}
 
 
@@ -68,14 +68,14 @@ class Visitor:
         async with self.socket() as socket:
             for message in messages:
                 await socket.send_str(message)
-                answer = await socket.receive(30)
+                answer = await socket.receive(300)
         return answer.data
 
     async def raw(self, head, body=b""):
         """Send bytes; return the first line and the end of the answer."""
         reader, writer = await asyncio.open_connection("127.0.0.1", self.server.port)
         writer.write(head.replace("\n", "\r\n").encode() + body)
-        answer = await asyncio.wait_for(reader.read(4096), 30)
+        answer = await asyncio.wait_for(reader.read(4096), 300)
         writer.close()
         return answer.decode("latin-1")
 

@@ -27,6 +27,7 @@ class Served:
         self._make = lambda: self._web_editor(mesh, keywords)
         self._started: Future[int] = Future()
         self._thread = threading.Thread(target=self._run)
+        self.folder: Path = keywords.get("folder", Path())
 
     def __enter__(self) -> Served:
         self._thread.start()

@@ -10,6 +10,7 @@ The files, in reading order:
                 the parts of that: events, keys, timers, JPEG
     protocol    the messages between page and stream
     page_model  what the page shows, and the one way in which it uses the editor
+    touch       hints for fingers
     transfer    uploads and downloads
     client      a process for one person, for servers
     page/       the page: view.js, panel.js, page.js, page.html, page.css

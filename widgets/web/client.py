@@ -17,6 +17,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.models import cactus
@@ -60,6 +61,7 @@ class Autosave:
             return
         try:
             save_session(self._place, session, view=controller.camera.settings(controller.mode))
+            _name_file(self._place).write_text(self._web.model.name, encoding="utf-8")
             self._saved = state
         except SegDeformError as error:
             self._saved = state  # tried again after the next change
@@ -104,15 +106,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _first_session(file: Path | None, place: Path) -> tuple[Session, str]:
     """Return the session to begin with, and its name."""
+    name = "Last session"
     if place.is_file():
-        return read_session(place, lambda *_: None), "Last session"
+        with suppress(OSError, ValueError):
+            name = _name_file(place).read_text(encoding="utf-8")
+        return read_session(place, lambda *_: None), name
     if file is not None:
         return read_session(file, lambda *_: None), file.name
     return Session(cactus()), "Sample model"
 
 
+def _name_file(place: Path) -> Path:
+    """Return the file with the name that the page shows for the session at *place*."""
+    return place.with_suffix(".name")
+
+
+def _ignore_lost_pages(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Log no error where a page has gone while wslink was sending to it."""
+    if not isinstance(context.get("exception"), ConnectionResetError):
+        loop.default_exception_handler(context)
+
+
 async def _serve(web: WebEditor, autosave: Autosave, port: int) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    loop.set_exception_handler(_ignore_lost_pages)
 
     def ready(port: int) -> None:
         autosave.start()

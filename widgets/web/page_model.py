@@ -16,9 +16,15 @@ from vtk_segdeform.errors import ArgumentError
 from .. import panel
 from ..editor import DeformEditor
 from ..panel import Field
+from .touch import card_for_fingers, for_fingers
 
 _PERIOD = 0.1  # seconds between two refreshes, at least
 _UNSHARED = frozenset({"act", "acts", "action", "while_busy"})
+# Keys of the page itself, after those of the editor in its help.
+_OWN_KEYS = (
+    "Page",
+    (("Ctrl+O", "Open a file"), ("Ctrl+S", "Download the session"), ("F6", "Toolbar, settings")),
+)
 
 _log = logging.getLogger(__name__)
 
@@ -41,7 +47,9 @@ class PageModel:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_due = False
         self._shown: dict[str, Any] = {}
-        state.cards = _plain(panel.first_steps())
+        cards = panel.first_steps()
+        state.cards = _plain(cards)
+        state.touch_cards = _plain(tuple(map(card_for_fingers, cards)))
         self.refresh()
         self.stop: Callable[[], None] = editor.controller.messages.on_change(self.changed)
 
@@ -63,18 +71,22 @@ class PageModel:
     def refresh(self) -> None:
         """Show the editor as it is."""
         editor, keys = self._editor, self._editor.keys
-        name = self._name
+        name, status = self.name, panel.status(editor)
         now = {
             "toolbar": panel.toolbar(editor),
             "sections": panel.sections(editor),
             "history": panel.history(editor),
-            "status": panel.status(editor),
+            "status": status,
+            "touch_words": for_fingers(status.words),
         }
         for key, model in now.items():
             self._set(key, self._public(_plain(model, lambda f: panel.tooltip(f, keys))))
         is_modified = editor.controller.file.is_modified(editor.session)
         stem = name.rpartition(".")[0] or name
         self._set("document", {"name": name, "stem": stem, "modified": is_modified})
+        self._set("trame__title", f"{name} · segdeform")
+        self._set("uses_tab", keys.binding_of("tab", editor.mode) is not None)
+        self._set("help", {"keys": keys["help"].keys, "sections": [*keys.sections(), _OWN_KEYS]})
 
     def press(self, name: object, value: object = None) -> None:
         """Use a control; see `panel.press`.  "hint" runs the action of a word of the hint."""
@@ -94,8 +106,8 @@ class PageModel:
         self.changed()
 
     @property
-    def _name(self) -> str:
-        """The name of the document."""
+    def name(self) -> str:
+        """The name of the document, as the page shows it."""
         return self._names.get(str(self._editor.path), self._editor.path.name)
 
     def _set(self, key: str, value: Any) -> None:

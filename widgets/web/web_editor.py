@@ -194,11 +194,10 @@ class WebEditor:
                 "vue_use": ["segdeform"],
             }
         )
-        server.add_protocol_to_configure(lambda root: root.registerLinkProtocol(self._protocol))
+        server.add_protocol_to_configure(self._configure)
         server.controller.on_server_bind.add(lambda app: self._transfer.add_routes(app.app))
         server.controller.trigger("press")(self.model.press)
         state = server.state
-        state.trame__title = "segdeform"
         state.formats = formats()
         state.upload_limit = self._transfer.limit
         state.dark = False
@@ -208,6 +207,13 @@ class WebEditor:
         theme = ("dark ? 'dark' : 'light'",)
         with VAppLayout(server, vuetify_config=config, theme=theme) as layout:
             layout.root.add_child((_PAGE / "page.html").read_text(encoding="utf-8"))
+        # When the connection is lost, the page itself says so; trame would replace it.
+        state.trame__template_error = state.trame__template_main
+
+    def _configure(self, root: Any) -> None:
+        """Add the messages of the view; remove those by which a page could end this process."""
+        root.registerLinkProtocol(self._protocol)
+        root.exit = root.exitLater = None
 
     def _set_dark(self, dark: object, **_: object) -> None:
         set_background(self.plotter.renderer, dark=dark is True)

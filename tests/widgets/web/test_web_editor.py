@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip("trame")
-from chromium import ALT, CTRL, Chromium, needs_chromium
+from chromium import ALT, CTRL, Chromium, Page, needs_chromium
+from solids import icosphere
 from web_hands import Served, line, only_file
 
-from vtk_segdeform import models
+from vtk_segdeform import Mesh, models, read_mesh
+from vtk_segdeform.io import write_mesh
 from vtk_segdeform.session import Change, load_session
+from vtk_segdeform.widgets.editor import Mode, opening
+from vtk_segdeform.widgets.editor.actions import to_mode
 
 pytestmark = [needs_chromium, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
@@ -27,12 +31,25 @@ def browser() -> Iterator[Chromium]:
         yield browser
 
 
-@pytest.fixture
-def served(tmp_path: Path) -> Iterator[Served]:
-    (tmp_path / "server").mkdir()
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("server")
     mesh = models.cactus(700)
-    with Served(mesh, name="cactus.ply", folder=tmp_path / "server", upload_limit=10**6) as served:
+    with Served(mesh, name="cactus.ply", folder=folder, upload_limit=10**6) as served:
         yield served
+
+
+@pytest.fixture
+def served(server: Served, tmp_path: Path) -> Served:
+    """Return the shared editor with a new session."""
+    web, place = server.web, tmp_path / "cactus.ply"
+    write_mesh(place, models.cactus(700))
+    server.wait(lambda: server.is_at_rest)
+    before = web.session
+    server.call(lambda: web.editor.do(to_mode(Mode.PULL)))
+    server.call(lambda: web.editor.do(opening(place)))
+    server.wait(lambda: web.session is not before and server.is_at_rest)
+    return server
 
 
 def _top(served: Served) -> Any:
@@ -42,82 +59,176 @@ def _top(served: Served) -> Any:
     return vertices[near][np.argmin(vertices[near][:, 1])]
 
 
-def test_a_pull_by_mouse_keeps_the_volume_in_every_frame_and_one_z_undoes_it(
-    served: Served, browser: Chromium
-) -> None:
-    page, session = served.page(browser), served.web.session
-    rest, changes = session.vertices, []
-    served.call(
-        lambda: session.on_change(
-            lambda change: changes.append(session.volume_change) if change & Change.POSE else None
-        )
-    )
+def _upload(served: Served, page: Page, file: Path) -> None:
+    before = served.web.session
+    page.choose_files(".sd-file", file)
+    page.wait("!!document.querySelector('[data-name=discard]') || "
+              f"document.querySelector('.sd-name').textContent == '{file.name}'")  # fmt: skip
+    if page.evaluate("!!document.querySelector('[data-name=discard]')"):
+        page.click("[data-name=discard]")
+    served.wait(lambda: served.web.session is not before and served.is_at_rest)
+    page.wait(f"document.querySelector('.sd-name').textContent == '{file.name}'")
+
+
+def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
+    """Upload, pull, regions, cages, a handle, drag, turn, undo, redo, download, upload again."""
+    web, editor = served.web, served.web.editor
+    _upload(served, page, mesh)
+    session, changes = web.session, list[float]()
+    rest = session.vertices
+
+    def notice(change: Change) -> None:
+        if change & Change.POSE and session.has_volume:
+            changes.append(session.volume_change)
+
+    served.call(lambda: session.on_change(notice))
     start = served.seen(page, _top(served))
-    page.drag(line(start, (start[0] + 90, start[1] + 20), 12), pause=0.02)
-    served.wait(lambda: session.position == 1 and served.is_at_rest)
-    assert np.abs(session.vertices - rest).max() > 0.05 * session.mesh.diagonal
+    page.drag(line(start, (start[0] + 60, start[1] + 15), 8), pause=0.02)
+    served.wait(lambda: session.undo_label == "pull" and served.is_at_rest)
+    assert np.abs(session.vertices - rest).max() > 0.03 * session.mesh.diagonal
     assert len(changes) > 2
+
+    page.key("g")
+    served.wait(lambda: "regions found" in editor.status and served.is_at_rest)
+    page.key("f")
+    served.wait(lambda: "cages fitted" in editor.status and served.is_at_rest)
+    page.wait("document.querySelector('.sd-history .selected').textContent == 'Fit cages'")
+    page.key("2")
+    served.wait(lambda: editor.mode is Mode.CAGES)
+    page.key("3")
+    served.wait(lambda: editor.mode is Mode.HANDLES)
+    vertices = session.vertices
+    low = vertices[vertices[:, 2] < np.quantile(vertices[:, 2], 0.15)]
+    start = served.seen(page, low[np.argmin(low[:, 1])])
+    page.drag(line(start, (start[0] + 4, start[1] - 4), 4), pause=0.02)
+    served.wait(lambda: len(session.fixed) > 0)
+    page.key("d")
+    page.key("a")
+    start = served.seen(page, _top(served))
+    page.drag(line(start, (start[0] + 8, start[1] + 6), 4), pause=0.02)
+    served.wait(lambda: any(len(ids) > 1 for ids in session.handles.values()))
+    page.key("4")
+    served.wait(lambda: editor.mode is Mode.DEFORM and served.is_at_rest)
+    for turns in (False, True):
+        steps = session.position
+        gizmo = served.call(lambda: editor.widgets.dragger.gizmo.centre)
+        start = served.seen(page, np.asarray(gizmo))
+        page.drag(line(start, (start[0] + 30, start[1]), 5), pause=0.02, release=False)
+        if turns:
+            page.key("r")
+            page.move((start[0] + 45, start[1] + 5))
+        page.release((start[0] + 45, start[1] + 5))
+        served.wait(lambda steps=steps: session.position == steps + 1 and served.is_at_rest)
     assert np.abs(changes).max() < 1e-12
-    page.key("y")  # nothing to redo
-    page.key("z")
-    served.wait(lambda: session.position == 0)
-    page.key("y")
-    served.wait(lambda: session.position == 1)
-    page.wait("document.querySelector('.sd-history .selected').textContent == 'Pull'")
+
+    posed, steps = session.vertices, session.position
+    while session.position:
+        here = session.position
+        page.key("z")
+        served.wait(lambda here=here: session.position < here and served.is_at_rest)
+    np.testing.assert_array_equal(session.vertices, rest)
+    while session.position < steps:
+        here = session.position
+        page.key("y")
+        served.wait(lambda here=here: session.position > here and served.is_at_rest)
+    np.testing.assert_array_equal(session.vertices, posed)
+
+    page.save_downloads(folder)
+    page.key("s", modifiers=CTRL)
+    file = only_file(folder, "*.segdeform")
+    assert file.stem == mesh.stem
+    np.testing.assert_array_equal(load_session(file).vertices, posed)
+    page.wait("!document.querySelector('.sd-document b')")  # nothing is unsaved
+    page.click("[data-name=download]")
+    page.wait("!!document.querySelector('.sd-menu button:nth-of-type(3)')")
+    page.evaluate("[...document.querySelectorAll('.sd-menu button')]"
+                  ".find((each) => each.textContent.includes('.obj')).click()")  # fmt: skip
+    written = read_mesh(only_file(folder, "*.obj"))
+    np.testing.assert_allclose(written.vertices, posed, atol=1e-6 * session.mesh.diagonal)
+
+    page.key("Home")
+    served.wait(lambda: session.state.pose is None)
+    page.wait("!!document.querySelector('.sd-document b')")
+    _upload(served, page, file)
+    np.testing.assert_array_equal(web.session.vertices, posed)
     assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
 
 
-def test_a_downloaded_session_uploads_to_the_same_pose(
+def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(
     served: Served, browser: Chromium, tmp_path: Path
 ) -> None:
+    page = served.page(browser)
+    (tmp_path / "down").mkdir()
+    tell_a_story(served, page, tmp_path / "cactus.ply", tmp_path / "down")
+    page.close()
+
+
+def _bumpy(n: int) -> Mesh:
+    """Return a rough ellipsoid."""
+    vertices, faces = icosphere(n)
+    rough = 1.0 + 0.06 * np.sin(7.0 * vertices @ np.array([[1.0, 0.4], [0.3, 1.0], [0.8, 0.1]]))
+    return Mesh(vertices * rough.prod(axis=1)[:, None] * [0.5, 0.4, 1.0], faces)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: models.cactus(5000),
+        lambda: models.dinosaur(3000),
+        lambda: _bumpy(3),
+        lambda: _bumpy(4),
+    ],
+    ids=["cactus", "dinosaur", "bumpy", "fine bumpy"],
+)
+def test_stories_of_other_meshes(
+    served: Served, browser: Chromium, tmp_path: Path, make: Callable[[], Mesh]
+) -> None:
+    write_mesh(tmp_path / "other.ply", make())
+    page = served.page(browser)
+    (tmp_path / "down").mkdir()
+    tell_a_story(served, page, tmp_path / "other.ply", tmp_path / "down")
+    page.close()
+
+
+def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
+    served: Served, browser: Chromium
+) -> None:
     page, web = served.page(browser), served.web
+    surface = web.editor.widgets.surface
     start = served.seen(page, _top(served))
     page.drag(line(start, (start[0] + 60, start[1]), 5), pause=0.02)
     served.wait(lambda: web.session.position == 1 and served.is_at_rest)
-    posed = web.session.vertices
-    page.save_downloads(tmp_path)
-    page.key("s", modifiers=CTRL)
-    file = only_file(tmp_path, "*.segdeform")
-    assert file.name == "cactus.segdeform"
-    np.testing.assert_allclose(load_session(file).vertices, posed, atol=1e-12)
-    page.wait("!document.querySelector('.sd-document b')")  # nothing is unsaved
-    page.key("Home")
-    served.wait(lambda: web.session.state.pose is None)
-    before = web.session
-    page.wait("!!document.querySelector('.sd-document b')")
-    page.choose_files(".sd-file", file)
-    page.wait("!!document.querySelector('[data-name=discard]')")
-    page.click("[data-name=discard]")
-    served.wait(lambda: web.session is not before)
-    np.testing.assert_allclose(web.session.vertices, posed, atol=1e-12)
-    page.wait("document.querySelector('.sd-document').innerText.includes('cactus.segdeform')")
-    page.wait("document.querySelector('.sd-hint').innerText.includes('Opened cactus.segdeform')")
+    page.wait("document.querySelectorAll('.sd-history .sd-row').length == 2")
+    page.move(page.centre(".sd-history .sd-row"))
+    served.wait(lambda: web.editor.widgets.surface.instead is not None)
+    page.move(start)
+    served.wait(lambda: web.editor.widgets.surface.instead is None)
+    assert web.session.position == 1
 
-
-def test_regions_cages_and_a_handle_by_keys_and_mouse(served: Served, browser: Chromium) -> None:
-    page, web = served.page(browser), served.web
-    page.key("g")
-    served.wait(lambda: web.session.regions is not None and not web.editor.is_busy)
-    page.key("f")
-    served.wait(lambda: web.session.cages and not web.editor.is_busy)
-    page.wait("document.querySelector('.sd-hint').textContent.includes('cages fitted')")
-    heights = web.session.mesh.vertices[:, 2]
-    served.call(lambda: web.session.set_fixed(np.flatnonzero(heights < np.quantile(heights, 0.1))))
-    tip = np.flatnonzero(heights > 0.95 * heights.max())
-    served.call(lambda: web.session.add_handle(tip, "tip"))
-    page.wait("!document.querySelector('[data-name=\"mode.deform\"]').disabled")
-    page.click("[data-name='mode.deform']")
-    served.wait(lambda: web.editor.mode.name == "DEFORM" and not web.editor.is_busy)
-    page.wait("document.querySelector('.sd-table')?.innerText.includes('tip')")
-    gizmo = served.call(lambda: web.editor.widgets.dragger.gizmo.centre)
-    start, steps = served.seen(page, np.asarray(gizmo)), web.session.position
-    page.drag(line(start, (start[0] + 50, start[1]), 6), pause=0.02)
-    served.wait(lambda: web.session.position == steps + 1)
-    assert abs(web.session.volume_change) < 1e-12
+    page.key("F6")
+    page.wait("document.activeElement.dataset.name == 'open'")
+    page.key("F6")
+    page.wait("document.activeElement == document.body")
+    page.key("?")
+    page.wait("document.querySelector('.sd-help').textContent.includes('Auto-segment')")
+    page.key("z")  # nothing behind it
+    page.key("Escape")
+    page.wait("!document.querySelector('.sd-help')")
+    served.wait(lambda: not len(web.stream.inputs))
+    assert web.session.position == 1
+    page.evaluate("document.activeElement.blur()")
+    page.key("Tab")
+    page.wait("document.activeElement != document.body")
+    assert surface is not None
+    page.close()
 
 
 def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> None:
     page, web = served.page(browser, touch=True, size=(390, 700)), served.web
+    hint = page.evaluate("document.querySelector('.sd-hint').textContent")
+    assert "Shift" not in hint + page.evaluate("document.querySelector('.sd-cards').textContent")
+    assert "Choose Pin" in hint
     camera = web.plotter.camera
     where, (x, y) = camera.position, served.seen(page, _top(served))
     page.touch("touchStart", [(x, y)])
@@ -132,13 +243,15 @@ def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> Non
     page.touch("touchEnd")
     served.wait(lambda: camera.position != where)
     assert web.session.position == 1
+    page.close()
 
 
 def test_the_page_reads_and_writes_no_file_of_the_server(
     served: Served, browser: Chromium, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    page, web = served.page(browser), served.web
+    page, web, folder = served.page(browser), served.web, served.folder
+    before = [*tmp_path.iterdir()], [*folder.rglob("*")]
     event = {"x": 0.5, "y": 0.5, "control": True}
     for key in "srom":
         served.call(lambda key=key: web.stream.put([{**event, "name": "KeyPress", "key": key}]))
@@ -147,7 +260,7 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
         served.call(lambda name=name: web.model.press(name, "/etc/passwd"))
         served.call(lambda name=name: web.model.press("hint", name))
     served.wait(lambda: not len(web.stream.inputs))
-    assert [path.name for path in tmp_path.iterdir()] == ["server"]
+    assert [*tmp_path.iterdir()] == before[0]
     assert not web.editor.controller.recordings.is_recording
     for path, method, header, status in (
         ("upload?name=a.ply", "POST", False, 403),
@@ -157,7 +270,7 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
         ("download/..%2F..%2Fpasswd", "GET", True, 404),
     ):
         assert _status(f"http://127.0.0.1:{served.port}/{path}", method, header=header) == status
-    assert [*(tmp_path / "server").rglob("*")] == []
+    assert [*folder.rglob("*")] == before[1]
     page.click((400, 200), modifiers=ALT)  # still there
     served.wait(lambda: not len(web.stream.inputs))
 

@@ -11,15 +11,28 @@ const remembered = {
 };
 const address = (path) => new URL(path, window.location.href.replace(/[^/]*([?#].*)?$/, ''));
 
+const isTouch = window.matchMedia('(pointer: coarse)');
+const LOST = 'The connection to the server was lost.';
+const SENTENCES = {
+  1008: 'The page sent more events than the server accepts, and was disconnected.',
+  1009: 'A message of the page was too large, and the page was disconnected.',
+};
+const NAMES = { '?': 'question', Escape: 'escape' };
+
 const Page = {
   props: { dark: Boolean },
   emits: ['dark'],
   inject: ['trame'],
   data: () => ({
     pins: false, panel: false, fault: '', sent: null, isOver: false, asked: null,
-    hasSteps: !remembered.get(STEPS_SEEN), draws: remembered.get(DRAWING) !== 'no', isDrawable: false,
+    hasSteps: !remembered.get(STEPS_SEEN), isTouch: isTouch.matches, ended: '', hasHelp: false,
+    previewed: null, draws: remembered.get(DRAWING) !== 'no', isDrawable: false,
   }),
   mounted() {
+    const connection = this.trame.client.getConnection();
+    connection.onConnectionClose((_, event) => this.end(event));
+    connection.onConnectionError(() => this.end());
+    window.addEventListener('keydown', this.key, true);
     const scheme = window.matchMedia('(prefers-color-scheme: dark)');
     const own = remembered.get(COLOURS);
     this.$emit('dark', own ? own === 'dark' : scheme.matches);
@@ -27,16 +40,54 @@ const Page = {
     scheme.addEventListener('change', this.follow);
     this.scheme = scheme;
   },
-  beforeUnmount() { this.scheme.removeEventListener('change', this.follow); },
+  beforeUnmount() {
+    this.scheme.removeEventListener('change', this.follow);
+    window.removeEventListener('keydown', this.key, true);
+  },
   methods: {
     press(name, value) {
       this.fault = '';
       if (name === DRAWS) {
         this.draws = value === true;
         remembered.set(DRAWING, this.draws ? 'yes' : 'no');
+      } else if (name === 'help') this.hasHelp = true;
+      else this.trame.trigger('press', [name, value]);
+    },
+    preview(place) {
+      if (place === this.previewed) return;
+      this.previewed = place;
+      this.press('history.preview', place);
+    },
+    jump(place) {
+      this.preview(null);
+      this.press('history', place);
+    },
+    end(event) {
+      const reason = event?.code === 4000 && event.reason;
+      this.ended ||= reason || SENTENCES[event?.code] || LOST;
+    },
+    reload() { window.location.reload(); },
+    // Keys of the page, before the view gets them: help, and the way into the toolbar.
+    key(event) {
+      const isPlain = !event.ctrlKey && !event.metaKey && !event.altKey;
+      const isTyping = event.target.closest?.('input, textarea, select');
+      const name = NAMES[event.key] || event.key.toLowerCase();
+      const isHelp = isPlain && !isTyping && this.trame.state.get('help').keys.includes(name);
+      if (this.hasHelp ? isHelp || name === 'escape' : isHelp) {
+        this.hasHelp = !this.hasHelp;
+      } else if (this.hasHelp || this.ended) {
+        event.stopImmediatePropagation(); // nothing behind a dialog
         return;
-      }
-      this.trame.trigger('press', [name, value]);
+      } else if (name === 'f6') {
+        const inside = document.activeElement?.closest('.sd-bar, .sd-side');
+        if (inside) document.activeElement.blur();
+        else this.$el.querySelector('.sd-bar button:not(:disabled)').focus();
+      } else if (name === 'tab' && !this.trame.state.get('uses_tab')) {
+        event.stopImmediatePropagation(); // moves the focus, as in other pages
+        return;
+      } else return;
+      event.preventDefault();
+      event.stopImmediatePropagation();
     },
     // Return a field of the toolbar with what only this page knows.
     extended(field) {
@@ -66,10 +117,6 @@ const Page = {
       remembered.set(STEPS_SEEN, 'yes');
     },
     cardIcon: (name) => CARDS[name] || 'mdi-circle-small',
-    touchSentence(card) {
-      const isTouch = window.matchMedia('(pointer: coarse)').matches;
-      return isTouch ? card.sentence.replace('Shift-click', 'Choose Pin, then tap') : card.sentence;
-    },
 
     // Files.
     choose() { this.$refs.file.click(); },
@@ -139,6 +186,8 @@ const Page = {
     <div class="sd" :class="{ dark }" @click="settle" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
       <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark, extended, setDrawable,
         forget, closeSteps, cardIcon, touchSentence }"></slot>
+      <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
+        forget, closeSteps, cardIcon, preview, jump }"></slot>
       <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
       <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">
         <span>Drop to open</span></div>
@@ -149,6 +198,19 @@ const Page = {
           <button type="button" class="sd-button" data-name="discard" @click="answer(true)">
             Open {{ asked.name }}</button>
           <button type="button" class="sd-button" @click="answer(false)">Cancel</button></div></div>
+      <div v-if="hasHelp" class="sd-ask" @click.self="hasHelp = false">
+        <div class="sd-help" role="dialog" aria-modal="true" aria-label="Keys">
+          <button type="button" class="sd-close" title="Close (Esc)" aria-label="Close"
+            @click="hasHelp = false"><i class="mdi mdi-close"></i></button>
+          <section v-for="[heading, rows] in trame.state.get('help').sections" :key="heading">
+            <h2>{{ heading }}</h2>
+            <p v-for="[keys, what] in rows" :key="keys + what"><kbd>{{ keys }}</kbd>{{ what }}</p>
+          </section></div></div>
+      <div v-if="ended" class="sd-ask" role="alertdialog" aria-modal="true">
+        <div><h2>{{ ended }}</h2>
+          <p>Reload the page to continue where you were.</p>
+          <button type="button" class="sd-button down" data-name="reload" @click="reload()">
+            Reload</button></div></div>
     </div>`,
 };
 

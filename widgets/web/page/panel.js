@@ -83,7 +83,7 @@ const Field = {
       <span>{{ field.label }}</span><output>{{ field.value }}</output>
     </div>
     <button v-else type="button" class="sd-button" :class="{ down: isDown }" :title="field.tip"
-        :disabled="!field.enabled" :aria-pressed="isDown"
+        :disabled="!field.enabled" :aria-pressed="field.value === null ? null : isDown"
         @click="press(null)">
       <i v-if="icon" class="mdi" :class="icon"></i><span>{{ field.label }}</span>
     </button>`,
@@ -125,9 +125,13 @@ const Table = {
       <div class="sd-head"><span>{{ table.title }}</span>
         <span v-for="column in table.columns" :key="column.name" :title="column.tip">
           {{ column.title }}</span></div>
-      <div class="sd-rows">
-        <div v-for="row in table.rows" :key="row.key" class="sd-row" role="option"
+      <div class="sd-rows" role="listbox" :aria-label="table.title"
+          :aria-multiselectable="table.multiple">
+        <div v-for="row in table.rows" :key="row.key" class="sd-row" role="option" tabindex="0"
             :aria-selected="row.selected" :class="{ selected: row.selected }"
+            @keydown.self.enter.stop="select(row, $event)"
+            @keydown.self.space.stop.prevent="select(row, $event)"
+            @keydown.self.f2.stop="rename(row)" @keydown.tab.stop
             @click="select(row, $event)" @dblclick="rename(row)">
           <span class="sd-name"><i class="sd-colour" :style="{ background: colour(row) }"></i>
             <input v-if="renamed === row.key" ref="name" type="text" :value="row.label"
@@ -136,7 +140,7 @@ const Table = {
             <span v-else>{{ row.label }}</span></span>
           <span v-for="(cell, k) in row.cells" :key="k" class="sd-cell">
             <input v-if="cell.checked !== null" type="checkbox" :checked="cell.checked"
-              :title="table.columns[k].tip" @click.stop
+              :title="table.columns[k].tip" :aria-label="table.columns[k].title" @click.stop
               @change="check(row, table.columns[k], $event)">{{ cell.text }}</span>
         </div>
         <div v-if="!table.rows.length" class="sd-none">None yet</div>
@@ -182,7 +186,7 @@ const Tool = {
     <v-menu v-if="field.kind === 'menu'" :disabled="!field.enabled">
       <template v-slot:activator="{ props }">
         <button type="button" class="sd-tool" v-bind="props" :title="field.tip"
-          :disabled="!field.enabled" :data-name="field.name">
+          :aria-label="field.label" :disabled="!field.enabled" :data-name="field.name">
           <i class="mdi" :class="icon"></i><span>{{ field.label }}</span></button>
       </template>
       <div class="sd-menu" role="menu">
@@ -201,8 +205,9 @@ const Tool = {
       </div>
     </v-menu>
     <button v-else type="button" class="sd-tool" :class="{ down: isDown }" :title="field.tip"
-        :disabled="!field.enabled" :aria-pressed="isDown" :data-name="field.name"
-        @click="click" @pointerdown="hold(true)" @pointerup="hold(false)"
+        :disabled="!field.enabled" :aria-label="field.label" :data-name="field.name"
+        :aria-pressed="field.value === null ? null : isDown"
+        @keydown.enter="hold(true)" @keyup.enter="hold(false)" @click="click" @pointerdown="hold(true)" @pointerup="hold(false)"
         @pointerleave="$event.buttons && hold(false)">
       <i class="mdi" :class="icon"></i><span>{{ field.label }}</span></button>`,
 };

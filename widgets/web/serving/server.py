@@ -36,7 +36,7 @@ _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
 _NOTE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>segdeform</title>
 <meta name="viewport" content="width=device-width">
-<meta name="color-scheme" content="light dark">{refresh}
+<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,">{refresh}
 <style>body {{ font: 16px system-ui, sans-serif; margin: 30vh auto 0; max-width: 34em;
 padding: 0 1em; text-align: center; }}</style></head><body><p>{text}</p></body></html>
 """

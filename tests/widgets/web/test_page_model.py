@@ -1,0 +1,130 @@
+"""What the page shows to fingers, and what a page cannot do to its server."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("trame")
+
+from vtk_segdeform import Session, models
+from vtk_segdeform.widgets.editor import Mode, keys_of
+from vtk_segdeform.widgets.editor.hints import hint
+from vtk_segdeform.widgets.panel.status import words_of
+from vtk_segdeform.widgets.web.client import _ignore_lost_pages
+from vtk_segdeform.widgets.web.touch import for_fingers
+
+KEYS = keys_of("pyvista")
+
+
+@pytest.mark.parametrize(
+    ("sentence", "mode", "text", "actions"),
+    [
+        ("Drag a cage vertex · Next: 4, deform", Mode.CAGES,
+         "Drag a cage vertex · Next: deform", ["deform"]),
+        ("No regions yet. Press G to detect them, or paint one", Mode.REGIONS,
+         "No regions yet. Detect them, or paint one", ["segment"]),
+        ("No regions yet. Press G to detect them, or 1 to paint one", Mode.CAGES,
+         "No regions yet. Detect them, or paint one", ["segment", "regions"]),
+        ("Drag the surface. Shift-click pins. Z: undo", Mode.PULL,
+         "Drag the surface. Choose Pin, then tap: the point stays. Undo", ["undo"]),
+        ("Drag the surface · Volume preservation off (P to turn on)", Mode.PULL,
+         "Drag the surface · Volume preservation off (turn on)", ["preserve_volume"]),
+        ("Brush: paint fixed vertices. Ctrl: erase · Next: D, paint a handle", Mode.HANDLES,
+         "Brush: paint fixed vertices · Next: paint a handle", ["paint_handle"]),
+    ],
+)  # fmt: skip
+def test_hints_name_what_to_tap(sentence, mode, text, actions):
+    words = for_fingers(words_of(sentence, KEYS, mode))
+    assert "".join(word.text for word in words) == text
+    assert [word.action for word in words if word.action] == actions
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_no_hint_names_a_key_or_a_modifier_to_fingers(mode, bare_widgets):
+    words = for_fingers(words_of(hint(bare_widgets, mode, KEYS), KEYS, mode))
+    text = "".join(word.text for word in words)
+    for name in ("Shift", "Ctrl", "Press", "wheel"):
+        assert name not in text
+
+
+@pytest.fixture(scope="module")
+def web():
+    from vtk_segdeform.widgets.web import WebEditor
+
+    web = WebEditor(Session(models.cactus(500)), name="cactus.ply")
+    yield web
+    web.close()
+
+
+@pytest.fixture(scope="module")
+def bare_widgets(web):
+    return web.editor.widgets
+
+
+def test_a_page_cannot_end_its_process(web):
+    root = SimpleNamespace(registerLinkProtocol=lambda _: None, exit=print, exitLater=print)
+    web._configure(root)
+    assert (root.exit, root.exitLater) == (None, None)
+
+
+def test_a_page_that_leaves_is_no_error_but_all_else_is():
+    loop, seen = asyncio.new_event_loop(), []
+    loop.default_exception_handler = seen.append
+    _ignore_lost_pages(loop, {"exception": ConnectionResetError(), "message": ""})
+    other = {"exception": ValueError(), "message": ""}
+    _ignore_lost_pages(loop, other)
+    loop.close()
+    assert seen == [other]
+
+
+def settle(editor):
+    """Let the timers of an editor fire until nothing is prepared, refined or computed."""
+    live = editor.widgets.puller, editor.widgets.dragger
+    for _ in range(20_000):
+        editor.view.interactor.InvokeEvent("TimerEvent")
+        if not (editor.is_busy or editor.is_preparing or any(each.is_refining for each in live)):
+            return
+        time.sleep(0.005)
+    raise AssertionError(editor.status)
+
+
+def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_view(web):
+    """Not to the bit: both views project the pointer with matrices of their own (4e-12)."""
+    from hands import plain_view
+
+    from vtk_segdeform.widgets import DeformEditor
+    from vtk_segdeform.widgets.recording import Recorder, replay
+
+    editor = web.editor
+    session = web.session
+    start = Session(session.mesh)
+    web.plotter.render_window.Render()
+    settle(editor)
+    recorder = Recorder(editor.view)
+    vertices = session.vertices
+    near = vertices[vertices[:, 2] > np.quantile(vertices[:, 2], 0.9)]
+    x, y = editor.view.to_display(near[np.argmin(near[:, 1])][None])[0][:2]
+    width, height = editor.view.window.GetSize()
+    for k, name in enumerate(["MouseMove", "LeftButtonPress", *["MouseMove"] * 5]):
+        place = {"x": float((x + 8 * k) / width), "y": float(1 - y / height)}
+        web.stream.inputs.put({"name": name, **place})
+        while web.stream.inputs:
+            web.stream.inputs.send_next()
+    web.stream.inputs.put({"name": "LeftButtonRelease", **place})
+    web.stream.inputs.send_next()
+    settle(editor)
+    recorder.stop()
+    assert session.position == 1
+    again = DeformEditor(plain_view(), start)
+    again.On()
+    settle(again)
+    replay(again.view, recorder.lines, busy=lambda: again.is_busy)
+    settle(again)
+    diagonal = session.mesh.diagonal
+    np.testing.assert_allclose(start.vertices, session.vertices, rtol=0, atol=1e-10 * diagonal)
+    again.remove()
