@@ -11,11 +11,10 @@ from __future__ import annotations
 import asyncio
 import itertools
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +55,9 @@ class WebEditor:
     ----------
     mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
         What to edit first; the page can open other files.
+    plotter : pyvista.Plotter, optional
+        An off-screen plotter that is not shown yet, to which the editor is added.  Its owner shows
+        it before `serve`, and its lights and background do not change.
     name : str
         The name that the page shows for it.
     keys : str or mapping of str to str or sequence of str
@@ -86,6 +88,7 @@ class WebEditor:
         self,
         mesh: Any,
         *,
+        plotter: pv.Plotter | None = None,
         name: str = "Untitled",
         keys: KeyChoice = "pyvista",
         folder: Path | None = None,
@@ -94,18 +97,24 @@ class WebEditor:
         session = plugin.session_of(mesh)
         as_text(name, "name")
         require_offscreen()
-        self._own = Path(tempfile.mkdtemp(prefix="segdeform-")) if folder is None else None
-        self._folder = folder or self._own or Path()
-        self.plotter = pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
-        self.plotter.render_window.SetMultiSamples(_SAMPLES)
+        # Deleted at the end of the process at the latest.
+        self._own = tempfile.TemporaryDirectory(prefix="segdeform-") if folder is None else None
+        self._folder = folder or Path(self._own.name if self._own else "")
+        self._is_plotter_ours = plotter is None
+        self.plotter = plotter or pv.Plotter(
+            off_screen=True, notebook=False, window_size=[*_SIZE]
+        )
         self.plotter.iren.clear_key_event_callbacks()
-        set_lights(self.plotter.renderer)
-        set_background(self.plotter.renderer)
+        if self._is_plotter_ours:
+            self.plotter.render_window.SetMultiSamples(_SAMPLES)
+            set_lights(self.plotter.renderer)
+            set_background(self.plotter.renderer)
         timers = Timers(self.plotter.iren.interactor)  # before the editor creates the first one
         table = {**keys_of(keys).changes, **_NO_KEYS}
-        self.editor: DeformEditor = self.plotter.segdeform.edit(session, keys=table)
+        self.editor: DeformEditor = plugin.add_editor(self.plotter, session, keys=table)
         self.editor.controller.messages.show_line(False)  # which the page shows
-        self.plotter.show(interactive=False, auto_close=False)
+        if self._is_plotter_ours:
+            self.plotter.show(interactive=False, auto_close=False)
         names = {str(self.editor.path): name}
         self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
         self.model = PageModel(self.editor, self.server.state, names)
@@ -163,12 +172,39 @@ class WebEditor:
             await self.stream.stop()
             self.close()
 
+    async def serve_until(
+        self,
+        ended: asyncio.Event,
+        *,
+        port: int = 0,
+        ready: Callable[[int], object] | None = None,
+        last: Callable[[], object] | None = None,
+    ) -> None:
+        """Serve the page, as `serve` does, until the event *ended* is set; call *last* before."""
+        loop = asyncio.get_running_loop()
+        serving = loop.create_task(self.serve(port=port, ready=ready))
+        ending = loop.create_task(ended.wait())
+        await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
+        if last is not None:
+            last()
+        ending.cancel()
+        if self.server.running:
+            await self.server.stop()
+        else:  # ended before it began
+            serving.cancel()
+        with suppress(asyncio.CancelledError):
+            await serving
+
     def close(self) -> None:
         """Release the view and the folder of uploads; the session is unchanged."""
         self.model.stop()
-        self.plotter.close()  # which removes the editor first
+        if self._is_plotter_ours:
+            self.plotter.close()  # which removes the editor first
+        elif self.editor in self.plotter.segdeform.added:
+            self.plotter.segdeform.added.remove(self.editor)
+            self.editor.remove()
         if self._own is not None:
-            shutil.rmtree(self._own, ignore_errors=True)
+            self._own.cleanup()
 
     def _sized(self) -> None:
         """Frame the model once the size of the page is known, unless the camera was moved."""
@@ -205,7 +241,8 @@ class WebEditor:
             layout.root.add_child((_PAGE / "page.html").read_text(encoding="utf-8"))
 
     def _set_dark(self, dark: object, **_: object) -> None:
-        set_background(self.plotter.renderer, dark=dark is True)
+        if self._is_plotter_ours:
+            set_background(self.plotter.renderer, dark=dark is True)
         self.stream.want()
 
 
