@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
     from .volume_overlay import VolumeOverlay
 
+
 class Removable(Protocol):
     """Whatever has to end before a plotter closes."""
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import html
 import logging
 import secrets
 import socket
@@ -139,7 +140,7 @@ class NotebookEditor:
         if self.web is None:
             picture = _picture_of(self._session)
             image = f'<img alt="The surface" src="data:image/jpeg;base64,{picture}">'
-            return f"{image}<p>{self.note}</p>"
+            return f"{image}<p>{html.escape(self.note)}</p>"
         if not self.is_live:
             return "<p>This editor is closed. Run the cell again to edit.</p>"
         from .pictures import Pictures
@@ -209,7 +210,7 @@ class _Show:
             keywords.update(jupyter_backend=jupyter_backend, return_viewer=return_viewer)
             result = self._show(*arguments, **keywords)
             if backend != "none":
-                display(HTML(f"<p>{self._shown.note}</p>"))
+                display(HTML(f"<p>{html.escape(self._shown.note)}</p>"))
             return result
         keywords.update(jupyter_backend="none", interactive=False, auto_close=False)
         result = self._show(*arguments, **keywords)
@@ -268,7 +269,7 @@ def _picture_of(session: Session) -> str:
     set_lights(plotter.renderer)
     set_background(plotter.renderer)
     try:
-        editor = add_editor(plotter, session, keys=())
+        editor = add_editor(plotter, session, keys={})
         plotter.show(interactive=False, auto_close=False)
         return _encoded(Pictures(editor.view))
     finally:

@@ -11,16 +11,21 @@ from __future__ import annotations
 import asyncio
 import itertools
 import os
+import secrets
+import shutil
 import sys
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pyvista as pv
-from trame.app import get_server
+import trame.app  # noqa: F401 - which registers the types of a page's files
 from trame.ui.vuetify3 import VAppLayout
+from trame_client.widgets.core import VirtualNode
+from trame_server import Server
 
 from vtk_segdeform.checks import as_text
 from vtk_segdeform.pictures import require_offscreen
@@ -97,13 +102,11 @@ class WebEditor:
         session = plugin.session_of(mesh)
         as_text(name, "name")
         require_offscreen()
-        # Deleted at the end of the process at the latest.
-        self._own = tempfile.TemporaryDirectory(prefix="segdeform-") if folder is None else None
-        self._folder = folder or Path(self._own.name if self._own else "")
+        own = Path(tempfile.gettempdir()) / f"segdeform-{secrets.token_hex(16)}"
+        self._folder = folder or own  # the own one exists from the first upload on
+        self._remove_own = weakref.finalize(self, shutil.rmtree, own, ignore_errors=True)
         self._is_plotter_ours = plotter is None
-        self.plotter = plotter or pv.Plotter(
-            off_screen=True, notebook=False, window_size=[*_SIZE]
-        )
+        self.plotter = plotter or pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
         self.plotter.iren.clear_key_event_callbacks()
         if self._is_plotter_ours:
             self.plotter.render_window.SetMultiSamples(_SAMPLES)
@@ -116,7 +119,9 @@ class WebEditor:
         if self._is_plotter_ours:
             self.plotter.show(interactive=False, auto_close=False)
         names = {str(self.editor.path): name}
-        self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
+        # Not `get_server`, which keeps every server, and thereby its editor, for ever.
+        self.server = Server(f"segdeform {next(_numbers)}", VirtualNode)
+        self.server.client_type = "vue3"
         self.model = PageModel(self.editor, self.server.state, names)
         self.stream = Stream(self.editor.view, timers, self._send, self.model.changed)
         self._aim: tuple[float, ...] | None = tuple(self.plotter.camera.position)
@@ -203,8 +208,7 @@ class WebEditor:
         elif self.editor in self.plotter.segdeform.added:
             self.plotter.segdeform.added.remove(self.editor)
             self.editor.remove()
-        if self._own is not None:
-            self._own.cleanup()
+        self._remove_own()
 
     def _sized(self) -> None:
         """Frame the model once the size of the page is known, unless the camera was moved."""
