@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import logging
 import os
-from typing import TYPE_CHECKING, Any, overload
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 import pyvista as pv
@@ -32,9 +33,19 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.regions import segment
 from vtk_segdeform.session import Session
 
+from .web import notebook
+
 if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
     from .volume_overlay import VolumeOverlay
+
+
+class Removable(Protocol):
+    """Whatever has to end before a plotter closes."""
+
+    def remove(self) -> None:
+        """Remove everything from the plotter."""
+
 
 _Path = str | os.PathLike[str] | None
 _log = logging.getLogger(__name__)
@@ -61,20 +72,24 @@ def edit(
 ) -> Any:
     """Open a window to deform *mesh*; return the deformed mesh when the window closes.
 
+    In a notebook the editor is in the output of the cell instead, and a `NotebookEditor` is
+    returned at once: its ``session`` and ``mesh`` follow what is done by hand.
+
     Parameters
     ----------
     mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
         Any surface, or a session to continue.  The surfaces of a MultiBlock are edited as one.
     path : path, optional
-        The file that the editor's keys save and open.
+        The file that the editor's keys save and open.  In a notebook only its name is shown: the
+        page downloads.
     title : str
-        Title of the window.
+        Title of the window, if there is one.
     keys : str or mapping of str to str or sequence of str
         "pyvista", "Blender" or the keys of some actions, as in ``{"undo": "Ctrl+Z"}``.
 
     Returns
     -------
-    deformed : of the type of *mesh*
+    deformed : of the type of *mesh*, or NotebookEditor
         A deformed copy.  Of a PolyData or a Surface it is what was given, apart from coordinates
         and normals; of a MultiBlock it is one PolyData.  A session is returned itself, unless
         another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at once.
@@ -91,6 +106,8 @@ def edit(
     session = session_of(mesh)
     path = None if path is None else as_path(path)
     as_text(title, "title")
+    if notebook.is_used_by(pv.global_theme):
+        return notebook.edit(mesh, session, name=_name_of(path), keys=keys)
     if not pv.OFF_SCREEN:
         require_screen()
     plotter = pv.Plotter(title=title, notebook=False)
@@ -102,11 +119,20 @@ def edit(
         plotter.show()
     finally:
         plotter.close()
+    return edited(mesh, editor.session)
+
+
+def _name_of(path: Path | None) -> str:
+    return "Untitled" if path is None else path.name
+
+
+def edited(mesh: Any, session: Session) -> Any:
+    """Return what *session* made of *mesh*, of the same type."""
     if isinstance(mesh, Session):
-        return editor.session
+        return session
     if isinstance(mesh, Mesh):
-        return editor.session.mesh.with_vertices(editor.session.vertices)
-    return editor.session.deformed
+        return session.mesh.with_vertices(session.vertices)
+    return session.deformed
 
 
 @pv.register_plotter_component("segdeform")
@@ -123,7 +149,7 @@ class PlotterTools:
 
     def __init__(self, plotter: pv.BasePlotter) -> None:
         self._plotter = plotter
-        self.added: list[DeformEditor | VolumeOverlay] = []
+        self.added: list[Removable] = []
 
     def edit(
         self,
@@ -145,23 +171,22 @@ class PlotterTools:
             The file that the editor's keys save and open.
         keys : str or mapping of str to str or sequence of str
             As in `edit`.
-        """
-        from .editor import DeformEditor
 
+        In a notebook ``plotter.show()`` shows the page of the editor, with pyvista's backends
+        "trame", "server" and "client"; with the others a picture.
+        """
         session = session_of(mesh)
         path = None if path is None else as_path(path)
         if isinstance(mesh, pv.PolyData):
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
-        editor = DeformEditor(self._plotter, session, keys=keys)
-        self.added.append(editor)
+        if self._plotter.notebook and notebook.is_used_by(self._plotter.theme):
+            name = _name_of(path)
+            return notebook.add_to(self._plotter, session, path=path, name=name, keys=keys)
+        editor = add_editor(self._plotter, session, keys=keys)
         if path is not None:
             editor.path = path
-        if not self._plotter.camera_set:
-            editor.controller.camera.begin(is_aimed=False)
-            self._plotter.camera_set = True  # otherwise `show` would aim it again
-        editor.On()
         return editor
 
     def add_volume_overlay(self, session: Session) -> VolumeOverlay:
@@ -178,6 +203,19 @@ class PlotterTools:
     def __plotter_close__(self) -> None:
         while self.added:
             self.added.pop().remove()
+
+
+def add_editor(plotter: pv.BasePlotter, session: Session, *, keys: KeyChoice) -> DeformEditor:
+    """Add an editor to the current subplot of *plotter*, aim the camera, and switch it on."""
+    from .editor import DeformEditor
+
+    editor = DeformEditor(plotter, session, keys=keys)
+    plotter.segdeform.added.append(editor)
+    if not plotter.camera_set:
+        editor.controller.camera.begin(is_aimed=False)
+        plotter.camera_set = True  # otherwise `show` would aim it again
+    editor.On()
+    return editor
 
 
 @pv.register_dataset_accessor("segdeform", pv.PolyData)

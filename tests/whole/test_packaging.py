@@ -21,6 +21,9 @@ LIBRARY_OF = {
     "vtkmodules": "vtk",
     "igl": "libigl",
     "PIL": "pillow",
+    "IPython": "ipython",
+    "trame_client": "trame-client",
+    "trame_server": "trame-server",
 }  # imported name -> name to install
 # ParaView loads our plugin itself; Blender's module has wheels for a single version of Python.
 UNDECLARED = {"paraview", "bpy"}
@@ -52,7 +55,7 @@ def imported_by(folder: str) -> set[str]:
 
 def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
-    for extra in ("meshlab", "qt", "web", "bench"):
+    for extra in ("meshlab", "qt", "web", "jupyter", "bench"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported_by("vtk_segdeform") | imported_by("widgets")
     assert {"numba", "qtpy"} <= used  # the sources of all folders are read

@@ -13,6 +13,7 @@ The files, in reading order:
     touch       hints for fingers
     transfer    uploads and downloads
     client      a process for one person, for servers
+    notebook    the editor in the output of a cell, served by the kernel
     page/       the page: view.js, panel.js, page.js, page.html, page.css
     drawing/    the body drawn by the page, from the cages alone
     serving/    ``segdeform serve``: one client process for each page

@@ -137,17 +137,7 @@ async def _serve(web: WebEditor, autosave: Autosave, port: int) -> None:
 
     with suppress(NotImplementedError):  # on Windows
         loop.add_signal_handler(signal.SIGTERM, ended.set)
-    serving = loop.create_task(web.serve(port=port, ready=ready))
-    ending = loop.create_task(ended.wait())
-    await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
-    autosave.save()
-    ending.cancel()
-    if web.server.running:
-        await web.server.stop()
-    else:  # ended before it began
-        serving.cancel()
-    with suppress(asyncio.CancelledError):
-        await serving
+    await web.serve_until(ended, port=port, ready=ready, last=autosave.save)
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ class Transfer:
     editor : DeformEditor
         The editor.
     folder : Path
-        Where uploads are stored; nobody else writes there.
+        Where uploads are stored, created if necessary; nobody else writes there.
     limit : int
         Largest upload, in bytes.
     names : dict of str to str
@@ -88,7 +88,7 @@ class Transfer:
             return self._too_large(name)
         if self._editor.is_busy:
             return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
-        place = Path(tempfile.mkdtemp(dir=self._folder)) / f"upload{suffix}"
+        place = self._new_folder() / f"upload{suffix}"
         size = 0
         with replacing(place) as draft, draft.open("wb") as file:
             async for data in request.content.iter_chunked(1 << 18):
@@ -112,7 +112,7 @@ class Transfer:
             return _refusal(403, "Only the page of the editor may download files.")
         if suffix != _SESSION and suffix not in writable_suffixes():
             return _refusal(404, f"There is no format {suffix}.")
-        place = Path(tempfile.mkdtemp(dir=self._folder)) / f"download{suffix}"
+        place = self._new_folder() / f"download{suffix}"
         try:
             self._write(place)
             data = place.read_bytes()
@@ -123,6 +123,10 @@ class Transfer:
         self._changed()
         disposition = f'attachment; filename="{place.name}"'
         return web.Response(body=data, headers={"Content-Disposition": disposition})
+
+    def _new_folder(self) -> Path:
+        self._folder.mkdir(mode=0o700, exist_ok=True)
+        return Path(tempfile.mkdtemp(dir=self._folder))
 
     def _write(self, place: Path) -> None:
         """Write the session, or the surface in its pose."""

@@ -11,17 +11,21 @@ from __future__ import annotations
 import asyncio
 import itertools
 import os
+import secrets
 import shutil
 import sys
 import tempfile
+import weakref
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import pyvista as pv
-from trame.app import get_server
+import trame.app  # noqa: F401 - which registers the types of a page's files
 from trame.ui.vuetify3 import VAppLayout
+from trame_client.widgets.core import VirtualNode
+from trame_server import Server
 
 from vtk_segdeform.checks import as_text
 from vtk_segdeform.pictures import require_offscreen
@@ -58,6 +62,9 @@ class WebEditor:
     ----------
     mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
         What to edit first; the page can open other files.
+    plotter : pyvista.Plotter, optional
+        An off-screen plotter that is not shown yet, to which the editor is added.  Its owner shows
+        it before `serve`, and its lights and background do not change.
     name : str
         The name that the page shows for it.
     keys : str or mapping of str to str or sequence of str
@@ -88,6 +95,7 @@ class WebEditor:
         self,
         mesh: Any,
         *,
+        plotter: pv.Plotter | None = None,
         name: str = "Untitled",
         keys: KeyChoice = "pyvista",
         folder: Path | None = None,
@@ -96,20 +104,26 @@ class WebEditor:
         session = plugin.session_of(mesh)
         as_text(name, "name")
         require_offscreen()
-        self._own = Path(tempfile.mkdtemp(prefix="segdeform-")) if folder is None else None
-        self._folder = folder or self._own or Path()
-        self.plotter = pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
-        self.plotter.render_window.SetMultiSamples(_SAMPLES)
+        own = Path(tempfile.gettempdir()) / f"segdeform-{secrets.token_hex(16)}"
+        self._folder = folder or own  # the own one exists from the first upload on
+        self._remove_own = weakref.finalize(self, shutil.rmtree, own, ignore_errors=True)
+        self._is_plotter_ours = plotter is None
+        self.plotter = plotter or pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
         self.plotter.iren.clear_key_event_callbacks()
-        set_lights(self.plotter.renderer)
-        set_background(self.plotter.renderer)
+        if self._is_plotter_ours:
+            self.plotter.render_window.SetMultiSamples(_SAMPLES)
+            set_lights(self.plotter.renderer)
+            set_background(self.plotter.renderer)
         timers = Timers(self.plotter.iren.interactor)  # before the editor creates the first one
         table = {**keys_of(keys).changes, **_NO_KEYS}
-        self.editor: DeformEditor = self.plotter.segdeform.edit(session, keys=table)
+        self.editor: DeformEditor = plugin.add_editor(self.plotter, session, keys=table)
         self.editor.controller.messages.show_line(False)  # which the page shows
-        self.plotter.show(interactive=False, auto_close=False)
+        if self._is_plotter_ours:
+            self.plotter.show(interactive=False, auto_close=False)
         names = {str(self.editor.path): name}
-        self.server = get_server(f"segdeform {next(_numbers)}", client_type="vue3")
+        # Not `get_server`, which keeps every server, and thereby its editor, for ever.
+        self.server = Server(f"segdeform {next(_numbers)}", VirtualNode)
+        self.server.client_type = "vue3"
         self.model = PageModel(self.editor, self.server.state, names)
         drawing = PageDrawing(self.editor)
         self.stream = Stream(self.editor.view, timers, self._send, self.model.changed, drawing)
@@ -167,13 +181,39 @@ class WebEditor:
             await self.stream.stop()
             self.close()
 
+    async def serve_until(
+        self,
+        ended: asyncio.Event,
+        *,
+        port: int = 0,
+        ready: Callable[[int], object] | None = None,
+        last: Callable[[], object] | None = None,
+    ) -> None:
+        """Serve the page, as `serve` does, until the event *ended* is set; call *last* before."""
+        loop = asyncio.get_running_loop()
+        serving = loop.create_task(self.serve(port=port, ready=ready))
+        ending = loop.create_task(ended.wait())
+        await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
+        if last is not None:
+            last()
+        ending.cancel()
+        if self.server.running:
+            await self.server.stop()
+        else:  # ended before it began
+            serving.cancel()
+        with suppress(asyncio.CancelledError):
+            await serving
+
     def close(self) -> None:
         """Release the view and the folder of uploads; the session is unchanged."""
         self.model.stop()
         self._stop()
-        self.plotter.close()  # which removes the editor first
-        if self._own is not None:
-            shutil.rmtree(self._own, ignore_errors=True)
+        if self._is_plotter_ours:
+            self.plotter.close()  # which removes the editor first
+        elif self.editor in self.plotter.segdeform.added:
+            self.plotter.segdeform.added.remove(self.editor)
+            self.editor.remove()
+        self._remove_own()
 
     def _sized(self) -> None:
         """Frame the model once the size of the page is known, unless the camera was moved."""
@@ -216,7 +256,8 @@ class WebEditor:
         root.exit = root.exitLater = None
 
     def _set_dark(self, dark: object, **_: object) -> None:
-        set_background(self.plotter.renderer, dark=dark is True)
+        if self._is_plotter_ours:
+            set_background(self.plotter.renderer, dark=dark is True)
         self.stream.want()
 
 

@@ -7,7 +7,7 @@ The server passes on what a page may do, and reads no files itself.  The files, 
 
     limits          how many clients, how large, how long
     access          token, cookies, Host, Origin, headers
-    secret          the client's side: its secret, life and port
+    secret          the client's side: its secret, life and port; pages of notebooks
     client          one client process and its folder
     clients         all clients: number, memory, absence
     proxy           requests and WebSockets, passed on with limits
@@ -16,7 +16,7 @@ The server passes on what a page may do, and reads no files itself.  The files, 
 """
 
 from .limits import Limits
-from .secret import announce, announce_error, end_with_stdin, guard, read_secret
+from .secret import announce, announce_error, below, end_with_stdin, guard, read_secret
 from .server import Server, running, serve_until_stopped
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Server",
     "announce",
     "announce_error",
+    "below",
     "end_with_stdin",
     "guard",
     "read_secret",

@@ -59,12 +59,39 @@ def guard(secret: str) -> Middleware:
 
     @web.middleware
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
-        given = request.headers.get(HEADER, "")
-        if not secret or not hmac.compare_digest(_bytes(given), _bytes(secret)):
+        if not _same(request.headers.get(HEADER, ""), secret):
             return web.Response(status=403, text="This port is internal to segdeform serve.\n")
         return await handler(request)
 
     return guarded
+
+
+def below(secret: str) -> Middleware:
+    """Return a middleware that serves everything below the path ``/SECRET/``, and 403 elsewhere.
+
+    For pages in frames of other sites, to which browsers send no cookies.
+    """
+
+    @web.middleware
+    async def served(request: web.Request, handler: Handler) -> web.StreamResponse:
+        del handler  # of the path with the secret, which has none
+        _, given, *rest = request.rel_url.raw_path.split("/", 2)
+        if not rest or not _same(given, secret):
+            return web.Response(status=403, text="This page belongs to a notebook.\n")
+        place = request.rel_url.with_path(f"/{rest[0]}", encoded=True, keep_query=True)
+        match = await request.app.router.resolve(request.clone(rel_url=place))
+        request.match_info.update(match)
+        response = await match.handler(request)
+        if not response.prepared:  # the secret is in the address, which no other page may learn
+            response.headers["Referrer-Policy"] = "no-referrer"
+            response.headers["Cache-Control"] = "no-store"
+        return response
+
+    return served
+
+
+def _same(given: str, secret: str) -> bool:
+    return bool(secret) and hmac.compare_digest(_bytes(given), _bytes(secret))
 
 
 def _bytes(text: str) -> bytes:

@@ -1,0 +1,153 @@
+"""The editor in a notebook: a real kernel, whose cells and page share a session."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip("trame")
+pytest.importorskip("ipykernel", reason="Jupyter is missing: pip install ipykernel nbclient")
+pytest.importorskip("nbclient", reason="Jupyter is missing: pip install ipykernel nbclient")
+from chromium import Chromium, needs_chromium
+from notebooks import Kernel, example, kernel, status
+from web_hands import line
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+SMALL = "sd.models.cactus(700)"
+
+
+@pytest.fixture(scope="module")
+def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
+    folder = tmp_path_factory.mktemp("kernel")
+    with kernel(folder) as running:
+        running.run("import asyncio, gc, sys\nimport pyvista as pv\nimport vtk_segdeform as sd")
+        running.run(f"mesh = {SMALL}")
+        yield running
+        running.run("kept = sd.edit(mesh)")  # runs when the kernel ends
+        running.wait("kept.web.server.running")
+        address = running.value("kept.address").strip("'")
+        assert status(address) == 200
+    assert status(address) is None
+    assert [*folder.glob("segdeform-*")] == []
+
+
+@pytest.fixture
+def address(cells: Kernel) -> Iterator[str]:
+    cells.run("editor = sd.edit(mesh)")
+    cells.wait("editor.web.server.running")
+    yield cells.value("editor.address").strip("'")
+    cells.run("editor.close()")
+
+
+def test_the_example_keeps_the_volume_and_shows_the_page(cells: Kernel) -> None:
+    sources = example(lambda source: source.replace("sd.models.cactus()", SMALL))
+    assert SMALL in sources[0]
+    shown = [cells.run(source)[-1]["data"] for source in sources]
+    n_regions, page, position, volume, moved = shown
+    assert int(n_regions["text/plain"]) == 3
+    assert "<iframe" not in page["text/html"]  # only once the kernel answers
+    picture = re.search(r'base64,([^"]+)"', page["text/html"])
+    assert picture is not None
+    assert base64.b64decode(picture[1])[:2] == b"\xff\xd8"
+    assert "Run the cell to start the editor." in page["text/html"]
+    assert page["text/plain"] == "<NotebookEditor of 700 vertices, live>"
+    assert int(position["text/plain"]) == 3
+    assert abs(float(volume["text/plain"])) < 1e-12
+    assert float(moved["text/plain"]) > 0.05
+    cells.run("editor.close()")
+
+
+@needs_chromium
+def test_a_pull_in_the_page_is_there_in_the_next_cell(cells: Kernel, address: str) -> None:
+    before = cells.value("editor.session.position")
+    with Chromium(1000, 660) as browser:
+        page = browser.page(address)
+        page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
+        cells.wait("not (editor.web.editor.is_busy or editor.web.editor.is_preparing)")
+        left, top, width, height = page.box(".sd-canvas")
+        start = left + 0.5 * width, top + 0.5 * height
+        page.drag(line(start, (start[0] + 90, start[1] - 30), 8), pause=0.02)
+        cells.wait(f"editor.session.position > {before}")
+        assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
+    assert abs(float(cells.value("editor.session.volume_change"))) < 1e-12
+    cells.wait("abs(editor.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
+    assert cells.value("type(editor.mesh) is sd.Mesh") == "True"
+
+
+def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, address: str) -> None:
+    root, secret = re.fullmatch(
+        r"(http://127\.0\.0\.1:\d+/)([\w-]{43})/index\.html", address
+    ).groups()
+    assert status(address) == 200
+    assert status(f"{root}{secret}/ws", upgrade=True) == 101
+    for place in ("", "index.html", "ws", f"{secret[:-1]}/ws", "x/index.html", f"%2F{secret}/ws"):
+        assert status(root + place) == 403
+        assert status(root + place, upgrade=True) == 403
+    for place in ("nothing", "../../etc/passwd", "%2e%2e/%2e%2e/setup.cfg"):
+        assert status(f"{root}{secret}/{place}") == 404
+    assert status(address.replace("127.0.0.1", "127.0.0.2")) is None  # bound to one address
+
+
+def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, address: str) -> None:
+    cells.run("former, editor = editor, sd.edit(mesh)")
+    cells.wait("editor.web.server.running")
+    second = cells.value("editor.address").strip("'")
+    assert status(address) == status(second) == 200
+    cells.run("server = former.web.server; former = None; gc.collect();")
+    cells.wait("not server.running")
+    assert status(address) is None
+    assert status(second) == 200
+
+
+def test_a_page_that_ends_its_server_does_not_end_the_kernel(cells: Kernel, address: str) -> None:
+    cells.run("editor.web.server.protocol.exit(); await asyncio.sleep(0.3)")  # application.exit
+    cells.wait("not editor.is_live")
+    assert status(address) is None
+    assert cells.value("editor.session.position") == "0"
+    assert "This editor is closed." in cells.html("editor")
+
+
+@pytest.mark.parametrize(
+    ("given", "same"),
+    [("mesh", "sd.Mesh"), ("pv.Sphere()", "pv.PolyData"), ("sd.Session(mesh)", "sd.Session")],
+)
+def test_the_mesh_is_of_the_type_that_was_given(cells: Kernel, given: str, same: str) -> None:
+    source = f"e = sd.edit({given}); e.close(); type(e.mesh) is {same}"
+    assert cells.value(source) == "True"
+
+
+def test_a_plotter_shows_the_page_or_a_picture_that_says_what_would_be_live(cells: Kernel) -> None:
+    # pyvista would import all of trame's views, which look for files in the network.
+    cells.run("pv.jupyter._entry_points_loaded = True")
+    cells.run("p = pv.Plotter(); e = p.segdeform.edit(mesh)")
+    for backend in ("trame", "server"):
+        html = cells.html(f"p.show(jupyter_backend='{backend}')")
+        (place,) = re.findall(r"const page = '(\d+/[\w-]+/index\.html)'", html)
+    cells.wait("p.segdeform.added[-1].web.server.running")
+    assert status(f"http://127.0.0.1:{place}") == 200
+    assert cells.value("p.segdeform.added[-1].session is e.session") == "True"
+    still = cells.run("p.show(jupyter_backend='static')")
+    assert "image/png" in still[0]["data"]
+    assert "set_jupyter_backend(&#x27;trame&#x27;)" in still[1]["data"]["text/html"]
+    cells.run("p.close(); await asyncio.sleep(0.3)")
+    assert status(f"http://127.0.0.1:{place}") is None
+
+
+def test_without_trame_one_sentence_says_what_to_install(cells: Kernel) -> None:
+    cells.run(
+        "import vtk_segdeform.widgets.web as web\n"
+        "vars(web).pop('WebEditor', None)\n"
+        "hidden = {n: m for n, m in sys.modules.items() if n.endswith('.web_editor')}\n"
+        "trame = sys.modules['trame']\n"
+        "for n in hidden: del sys.modules[n]\n"
+        "sys.modules['trame'] = None"
+    )
+    html = cells.html("e = sd.edit(mesh)\ne")
+    cells.run("sys.modules.update(hidden); sys.modules['trame'] = trame")
+    assert "pip install &#x27;vtk-segdeform[jupyter]&#x27;" in html
+    assert html.count("<p>") == 1
+    assert "<img" in html
+    assert cells.value("e.session.position, e.is_live") == "(0, False)"

@@ -1,0 +1,276 @@
+"""The editor in a notebook: a page in the output of a cell, served by the kernel itself.
+
+    editor = sd.edit(mesh)           # the output shows the page, the cell ends at once
+    editor.session.volume_change     # in the next cell
+
+The kernel's event loop runs the server, between cells, so both use the session in one thread.  The
+server listens on 127.0.0.1 only.  Its address contains a secret, because frames of another site get
+no cookies; whoever has the address has the editor.  The page is reached directly, or through
+jupyter-server-proxy if the browser is on another machine: the output tries both.
+
+An editor ends when nothing refers to it any more, when it is closed, and with the kernel.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import html
+import logging
+import secrets
+import socket
+import string
+import sys
+import weakref
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pyvista as pv
+
+from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.pictures import require_offscreen
+from vtk_segdeform.session import Session
+
+if TYPE_CHECKING:
+    from ..editor import DeformEditor, KeyChoice
+    from .pictures import Pictures
+    from .web_editor import WebEditor
+
+_log = logging.getLogger(__name__)
+_TEMPLATE = Path(__file__).with_name("page") / "notebook.html"
+_LIVE = ("trame", "server", "client")
+_SIZE = 1000, 600  # pixels of a picture
+_INSTALL = (
+    "This is a picture. For an editor that can be used, run pip install 'vtk-segdeform[jupyter]', "
+    "restart the kernel and run the cell again."
+)
+_CHOOSE = (
+    "This is a picture. For an editor that can be used, call pyvista.set_jupyter_backend('trame') "
+    "and run the cell again."
+)
+
+
+def is_used_by(theme: Any) -> bool:
+    """Return whether plotters with this *theme* show in the notebook that runs this code."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    has_kernel = getattr(shell, "kernel", None) is not None
+    is_wanted = has_kernel if theme.notebook is None else bool(theme.notebook)
+    return has_kernel and is_wanted and _backend(theme) != "none"
+
+
+class NotebookEditor:
+    """An editor in the output of a cell.
+
+    Made by `edit` in a notebook; displayed where it is the last value of a cell.
+
+    Attributes
+    ----------
+    web : WebEditor or None
+        The editor; None where only a picture can be shown.
+    note : str
+        What to do for an editor that can be used, if this one cannot.
+    """
+
+    def __init__(self, given: Any, session: Session, web: WebEditor | None, note: str = "") -> None:
+        self.web, self.note = web, note
+        self._given, self._session = given, session
+        self._page = ""  # PORT/SECRET/index.html
+        self._serving: asyncio.Task[None] | None = None
+        self._stop: weakref.finalize[Any, Any] | None = None
+
+    @property
+    def session(self) -> Session:
+        """The session being edited; another one after the page has opened a file."""
+        return self.web.session if self.web is not None else self._session
+
+    @property
+    def mesh(self) -> Any:
+        """The deformed surface as it is now, of the type that was given to `edit`."""
+        from ..plugin import edited
+
+        return edited(self._given, self.session)
+
+    @property
+    def address(self) -> str:
+        """The address of the page on this machine; it gives access, so keep it private."""
+        return f"http://127.0.0.1:{self._page}" if self.is_live else ""
+
+    @property
+    def is_live(self) -> bool:
+        """Whether the editor is served."""
+        is_wanted = self._stop is not None and self._stop.alive
+        return is_wanted and self._serving is not None and not self._serving.done()
+
+    def start(self) -> None:
+        """Serve the page in the running event loop; again, do nothing."""
+        if self.web is None or self._stop is not None:
+            return
+        from .serving import below
+
+        secret, port = secrets.token_urlsafe(32), _free_port()
+        self._page = f"{port}/{secret}/index.html"
+        guard, ended = below(secret), asyncio.Event()
+        self.web.server.controller.on_server_bind.add(
+            lambda bound: bound.app.middlewares.append(guard)
+        )
+        loop = asyncio.get_running_loop()
+        self._serving = loop.create_task(self.web.serve_until(ended, port=port))
+        self._serving.add_done_callback(_report)
+        self._stop = weakref.finalize(self, _end, loop, ended)
+        self._stop.atexit = False
+
+    def close(self) -> None:
+        """End the editor; the session and the mesh stay as they are."""
+        if self._stop is not None:
+            if self.web is not None:
+                self.web.stream.close()
+            self._stop()
+
+    remove = close
+
+    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
+        """Return the output of the cell."""
+        return {"text/html": self._html(), "text/plain": repr(self)}
+
+    def __repr__(self) -> str:
+        state = "live" if self.is_live else "a picture" if self.web is None else "closed"
+        return f"<NotebookEditor of {self.session.mesh.n_vertices:,} vertices, {state}>"
+
+    def _html(self) -> str:
+        if self.web is None:
+            picture = _picture_of(self._session)
+            image = f'<img alt="The surface" src="data:image/jpeg;base64,{picture}">'
+            return f"{image}<p>{html.escape(self.note)}</p>"
+        if not self.is_live:
+            return "<p>This editor is closed. Run the cell again to edit.</p>"
+        from .pictures import Pictures
+
+        theme = pv.global_theme.trame
+        values = {
+            "id": f"segdeform-{secrets.token_hex(8)}",
+            "page": self._page,
+            "picture": _encoded(Pictures(self.web.editor.view)),
+            "proxy": theme.server_proxy_prefix if theme.server_proxy_enabled else "",
+        }
+        return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+
+
+def edit(given: Any, session: Session, *, name: str, keys: KeyChoice) -> NotebookEditor:
+    """Return the editor of *session*, served, or a picture and what would be needed."""
+    if _backend(pv.global_theme) not in _LIVE:
+        return NotebookEditor(given, session, None, _CHOOSE)
+    web_editor = _web_editor()
+    if web_editor is None:
+        return NotebookEditor(given, session, None, _INSTALL)
+    editor = NotebookEditor(given, session, web_editor(session, name=name, keys=keys))
+    editor.start()
+    return editor
+
+
+def add_to(
+    plotter: Any, session: Session, *, path: Path | None, name: str, keys: KeyChoice
+) -> DeformEditor:
+    """Add an editor to *plotter*, whose `show` then shows the page of its first editor."""
+    from ..plugin import add_editor
+
+    is_first = "show" not in vars(plotter)
+    web_editor = _web_editor() if is_first else None
+    if web_editor is None:
+        web, editor = None, add_editor(plotter, session, keys=keys)
+        if path is not None:
+            editor.path = path
+    else:
+        web = web_editor(session, plotter=plotter, name=name, keys=keys)
+        editor = web.editor
+    if is_first:
+        shown = NotebookEditor(session, session, web, _CHOOSE if web else _INSTALL)
+        plotter.segdeform.added.append(shown)
+        plotter.show = _Show(plotter, shown)
+    return editor
+
+
+class _Show:
+    """Replaces the `show` of a plotter: pyvista's own pages send no keys and no timers."""
+
+    def __init__(self, plotter: Any, shown: NotebookEditor) -> None:
+        self._plotter, self._shown = plotter, shown
+        self._show = plotter.show
+
+    def __call__(
+        self,
+        *arguments: Any,
+        jupyter_backend: str | None = None,
+        return_viewer: bool = False,
+        **keywords: Any,
+    ) -> Any:
+        from IPython.display import HTML, display
+
+        backend = (jupyter_backend or _backend(self._plotter.theme)).lower()
+        if self._shown.web is None or backend not in _LIVE:
+            keywords.update(jupyter_backend=jupyter_backend, return_viewer=return_viewer)
+            result = self._show(*arguments, **keywords)
+            if backend != "none":
+                display(HTML(f"<p>{html.escape(self._shown.note)}</p>"))
+            return result
+        keywords.update(jupyter_backend="none", interactive=False, auto_close=False)
+        result = self._show(*arguments, **keywords)
+        self._shown.start()
+        if return_viewer:
+            return self._shown
+        display(self._shown)
+        return result
+
+
+def _backend(theme: Any) -> str:
+    """Return which of pyvista's backends shows plotters with this *theme*."""
+    return str(theme.jupyter_backend or _LIVE[0]).lower()
+
+
+def _web_editor() -> type[WebEditor] | None:
+    """Return the class `WebEditor`, or None if what it needs is not installed."""
+    try:
+        from . import WebEditor
+    except MissingDependencyError as error:
+        _log.info("%s", error)
+        return None
+    return WebEditor
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def _end(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:
+    """End a server, from any thread."""
+    if not loop.is_closed():
+        loop.call_soon_threadsafe(ended.set)
+
+
+def _report(serving: asyncio.Task[None]) -> None:
+    if not serving.cancelled() and (error := serving.exception()) is not None:
+        _log.error("the editor in a notebook has ended: %s", error)
+
+
+def _encoded(pictures: Pictures) -> str:
+    """Return a picture as JPEG, in base 64."""
+    return base64.b64encode(pictures.draw()().data).decode("ascii")
+
+
+def _picture_of(session: Session) -> str:
+    """Return a picture of *session* as an editor shows it first."""
+    from ..plugin import add_editor
+    from ..scene import set_background, set_lights
+    from .pictures import Pictures
+
+    require_offscreen()
+    plotter = pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
+    set_lights(plotter.renderer)
+    set_background(plotter.renderer)
+    try:
+        editor = add_editor(plotter, session, keys={})
+        plotter.show(interactive=False, auto_close=False)
+        return _encoded(Pictures(editor.view))
+    finally:
+        plotter.close()
