@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import hashlib
 import os
 import sys
 from collections.abc import Iterator
@@ -22,6 +23,7 @@ if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a display VTK warns once per window that it cannot connect to X; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
+import numpy as np  # noqa: E402 - it reads the variables above
 import pytest  # noqa: E402 - its plugins read the variables above
 
 # The product is imported where it is needed: not by the process that only distributes the tests,
@@ -72,6 +74,29 @@ def _quick_rendering() -> None:
     import pyvista as pv
 
     pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
+
+
+@pytest.fixture(scope="session", autouse=True)
+def fitted_once() -> Iterator[Any]:
+    """Fit equal cages around equal regions once per process; yield the function that fits."""
+    from vtk_segdeform.cages import fit
+
+    fitting, known = fit._fit, {}
+
+    def fitted(patch: Any, n: int, offset: Any, progress: Any = None, spacing: Any = None) -> Any:
+        if progress is not None:  # which a test may count, or cancel by
+            return fitting(patch, n, offset, progress, spacing)
+        inputs = hashlib.blake2b(repr((n, offset)).encode())
+        for array in (patch.surface.points, patch.surface.faces, patch.members, spacing):
+            inputs.update(b"" if array is None else np.ascontiguousarray(array))
+        key = inputs.digest()
+        if key not in known:
+            known[key] = fitting(patch, n, offset, None, spacing)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fit, "_fit", fitted)
+        yield fitting
 
 
 @functools.cache

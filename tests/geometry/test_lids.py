@@ -48,7 +48,7 @@ BODIES = {
     "ball with a small hole": lambda: cut(BALL, 2, 0.97),
     "egg, cut lengthwise": lambda: cut(scaled(BALL, 1, 1, 2), 0, 0.5),
     "egg, cut across": lambda: cut(scaled(BALL, 1, 1, 2), 2, 0.5),
-    "half of a dinosaur": lambda: cut(models.dinosaur(3000), 1, 0.5),
+    "half of a dinosaur": lambda: cut(models.dinosaur(1200), 1, 0.5),
     "half of a ring": lambda: cut(models.torus(1500), 0, 0.5),
     "box without a face": lambda: open_box(),
     "box of five quadrilaterals": lambda: open_box(1),
@@ -63,9 +63,9 @@ BODIES = {
     "cup": lambda: revolved([0.02, 1.0, 1.0], [0.0, 0.0, 2.0]),
     "cone": lambda: revolved([1.0, 0.02], [0.0, 2.0]),
     "bottle": lambda: bottle(),
-    "bust with an open neck": lambda: cut(models.cactus(2500), 2, 0.6),
-    "body with 12 holes": lambda: with_holes(models.cactus(2500), 12, 0.03),
-    "body with many holes": lambda: with_holes(models.cactus(2500), 40, 0.02),
+    "bust with an open neck": lambda: cut(models.cactus(1000), 2, 0.6),
+    "body with 12 holes": lambda: with_holes(models.cactus(1000), 12, 0.03),
+    "body with many holes": lambda: with_holes(models.cactus(1000), 40, 0.02),
     "hollow blade": lambda: cut(models.bar((4, 0.1, 4), divisions=(16, 2, 16)), 2, 0.97),
 }
 SHEETS = {
@@ -250,7 +250,7 @@ def test_thousands_of_leaves_and_cups_are_told_apart_soon():
     leaf = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, -0.2]], [[0, 1, 2], [0, 2, 3]])
     spike = Mesh(SPIKE, [[0, 1, 3], [0, 3, 2], [1, 2, 3]])
     cup = cut(models.sphere(42), 2, 0.8)
-    kinds = [leaf] * 3000 + [spike] * 3000 + [cup] * 300
+    kinds = [leaf] * 1500 + [spike] * 1500 + [cup] * 150
     mesh = together(*(kinds[k] for k in RNG.permutation(len(kinds))))
     began = time.process_time()
     lids = lids_of(mesh)

@@ -26,8 +26,8 @@ def drag(n):
     mesh = sd.models.cactus(n)
     height = mesh.vertices[:, 2]
     tip = np.flatnonzero(height > 0.92)
-    regions = sd.segment(mesh, 3)
-    cages = sd.fit_cages(mesh, regions, 40)
+    regions = sd.segment(mesh, 2)
+    cages = sd.fit_cages(mesh, regions, 24)
     deformer = sd.Deformer(mesh, regions, cages, fixed=height < 0.08, handle=tip)
     poses = [deformer.solve(mesh.vertices[tip] + [0.1 * k, 0.0, 0.0]).vertices for k in (1, 2)]
     return [*poses, deformer.carry(mesh.vertices[::5])]

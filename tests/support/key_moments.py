@@ -52,23 +52,19 @@ NUMBER = {"0", "1", "2", "3", "4", "minus", "backspace", "period", "kp_1"}
 def table(first: Mode, *others: Mode, daily: Collection[str] = KEYS) -> list:
     """Return every mode with every key, as parameters of a test.
 
-    Of the keys in *daily*, *first* has its own keys and those of all modes every day, each other
-    mode its own keys, and some.  All else is marked as campaign.  Mode 3 paints as mode 1 does.
+    Every day each entry of the editor's table is tested by one of its keys that are in *daily*, in
+    the first of the modes that has it, and Escape in all of them.  All else is marked as campaign.
     """
-    own = {mode: {"1", "z", "escape"} for mode in (first, *others)}
-    for b in BINDINGS:
-        for mode in b.modes & own.keys():
-            if mode is first or len(b.modes) < len(Mode):
-                own[mode].update(b.keys)
-    if Mode.REGIONS in own and Mode.HANDLES in own:
-        own[Mode.HANDLES] -= own[Mode.REGIONS]
-    return [
-        pytest.param(
-            mode, key, id=f"{mode.name}-{key}",
-            marks=[] if key in own[mode] and key in daily else [pytest.mark.campaign],
-        )
-        for mode in own for key in KEYS
-    ]  # fmt: skip
+    tested, parameters = set(), []
+    for mode in (first, *others):
+        for key in KEYS:
+            entries = {k for k, b in enumerate(BINDINGS) if key in b.keys and mode in b.modes}
+            is_new = key in daily and bool(entries - tested)
+            tested |= entries if is_new else set()
+            is_daily = is_new or (key == "escape" and key in daily)
+            marks = [] if is_daily else [pytest.mark.campaign]
+            parameters.append(pytest.param(mode, key, id=f"{mode.name}-{key}", marks=marks))
+    return parameters
 
 
 def belongs_to_the_drag(key: str, mode: Mode) -> bool:

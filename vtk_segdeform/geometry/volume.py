@@ -28,6 +28,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
+from ..mesh import cross_rows
 
 _BLOCK = 4096  # faces per partial sum; fixed, so that results do not depend on threads
 _PIECE = 16  # blocks per task
@@ -39,7 +40,7 @@ def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
         sums = _by_blocks(kernels.volume_sums, inputs(vertices, faces), np.empty(_blocks(faces)))
         return float(sums.sum() / 6.0)
     a, e, f = corner_and_edges(vertices - vertices[0], faces)
-    return float(np.einsum("ij,ij", a, np.cross(e, f)) / 6.0)
+    return float(np.einsum("ij,ij", a, cross_rows(e, f)) / 6.0)
 
 
 def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -48,7 +49,7 @@ def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
         kernels.volume_gradient(*inputs(vertices, faces), summed := np.zeros(vertices.shape))
         return summed
     _, e, f = corner_and_edges(vertices, faces)
-    normals = np.cross(e, f) / 6.0  # on a closed mesh, equal in sum to b x c, c x a, a x b
+    normals = cross_rows(e, f) / 6.0  # on a closed mesh, equal in sum to b x c, c x a, a x b
     gradient = np.empty_like(vertices)
     for axis in range(3):
         column = np.repeat(normals[:, axis], 3)
@@ -71,8 +72,8 @@ def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
     vertices, direction = path[:, :3], path[:, 3:]
     a, e, f = corner_and_edges(vertices - vertices[0], faces)
     u, v, w = corner_and_edges(direction - direction[0], faces)
-    ef, vw = np.cross(e, f), np.cross(v, w)
-    mixed = np.cross(v, f) + np.cross(e, w)
+    ef, vw = cross_rows(e, f), cross_rows(v, w)
+    mixed = cross_rows(v, f) + cross_rows(e, w)
     c0 = np.einsum("ij,ij", a, ef)
     c1 = np.einsum("ij,ij", u, ef) + np.einsum("ij,ij", a, mixed)
     c2 = np.einsum("ij,ij", u, mixed) + np.einsum("ij,ij", a, vw)

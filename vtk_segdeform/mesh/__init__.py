@@ -32,7 +32,7 @@ from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
 from .topology import HalfEdges
-from .triangles import corner_angles, least_angle, normals
+from .triangles import corner_angles, cross_rows, least_angle, normals
 
 __all__ = [
     "UNREPAIRABLE",
@@ -48,6 +48,7 @@ __all__ = [
     "connectivity_faults",
     "corner_angles",
     "counted",
+    "cross_rows",
     "distance_to_surface",
     "edge_keys",
     "face_edges",

@@ -54,6 +54,18 @@ def cross(u: FloatArray, v: FloatArray) -> FloatArray:
     return product
 
 
+def cross_rows(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the cross products of the rows of *u* and *v*, (k, 3) float: those of numpy, sooner.
+
+    >>> cross_rows(np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 2.0, 0.0]]))
+    array([[0., 0., 2.]])
+    """
+    product = np.empty_like(u)
+    for k in range(3):
+        product[:, k] = u[:, k - 2] * v[:, k - 1] - u[:, k - 1] * v[:, k - 2]
+    return product
+
+
 def norm(u: FloatArray) -> FloatArray:
     """Return the lengths of the columns of *u*, (k,) float."""
     return np.asarray(np.sqrt((u * u).sum(axis=0)))

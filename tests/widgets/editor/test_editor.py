@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+from vtk_segdeform.widgets.editor.job import _Shared
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
@@ -658,10 +660,28 @@ def test_during_a_job_only_the_camera_works(bare):
     assert bare.hand.failures == []
 
 
+@contextmanager
+def until_cancelled():
+    """Let no job continue beyond its first report of progress before it is cancelled."""
+    report = _Shared.report
+
+    def waiting(shared, fraction, text):
+        end = time.monotonic() + 20.0
+        while not shared.is_cancelled:
+            assert time.monotonic() < end, "the job was not cancelled"
+            time.sleep(0.001)
+        report(shared, fraction, text)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_Shared, "report", waiting)
+        yield
+
+
 def test_escape_cancels_a_job_and_nothing_is_changed(bare):
-    bare.hand.key("g")
-    bare.hand.key("Escape")
-    bare.settle()
+    with until_cancelled():
+        bare.hand.key("g")
+        bare.hand.key("Escape")
+        bare.settle()
     assert bare.session.regions is None
     assert not bare.session.can_undo
     assert "Cancelled" in bare.editor.status
@@ -673,11 +693,12 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
 
 
 def test_a_second_escape_does_not_restart_a_cancelled_job(bench):
-    bench.hand.key("4")
-    assert bench.editor.is_busy
-    for _ in range(3):
-        bench.hand.key("Escape")
-        bench.settle()
+    with until_cancelled():
+        bench.hand.key("4")
+        assert bench.editor.is_busy
+        for _ in range(3):
+            bench.hand.key("Escape")
+            bench.settle()
     bench.hand.key("h")
     assert not bench.editor.is_busy
     assert not bench.session.is_bound

@@ -35,8 +35,12 @@ def test_in_mid_drag(plain, mode, key):
     plain.during(mode, key)
 
 
+# One key of each kind: which entries of the table interrupt, the other two moments test.
+KINDS = {"escape", "z", "y", "4", "0", "g", "i", "x", "ctrl+s", "ctrl+o", "shift+f", "home"}
+
+
 @pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.PULL))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.PULL, daily=KINDS))
 def test_while_the_pose_converges(plain, mode, key, times):
     plain.just_after(mode, *[key] * times)
 

@@ -27,6 +27,8 @@ def stand(request, tmp_path_factory):
 # Keys that Qt itself handles, or names differently: for focus, shortcuts, menus and the keypad.
 KEYS_OF_QT = {"tab", "escape", "return", "backspace", "delete", "ctrl+z", "ctrl+s", "ctrl+o",
               "shift+g", "f1", "plus", "kp_1"}  # fmt: skip
+# A key that Qt delivers in mid-drag it delivers at the other moments too.
+DELIVERED = {"escape", "ctrl+z", "ctrl+s"}
 
 
 def without_tab(moments):
@@ -41,12 +43,12 @@ def test_in_mid_drag(stand, mode, key):
     stand.during(mode, key)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.PULL, daily=KEYS_OF_QT))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily=DELIVERED))
 def test_while_the_pose_converges(stand, mode, key):
     stand.just_after(mode, key)
 
 
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.PULL, daily=KEYS_OF_QT))
+@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily=DELIVERED))
 def test_during_a_job(stand, mode, key):
     stand.in_a_job(mode, key)
 
