@@ -13,12 +13,14 @@ from scenes import sausage
 from scipy import sparse
 from solids import rotation
 
-from vtk_segdeform import models
+from vtk_segdeform import models, sizes
+from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.deformer.locality import SurfaceSamples
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.io.surface import Surface
+from vtk_segdeform.regions import Regions
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
 from vtk_segdeform.solver.solution import Status
 
@@ -181,6 +183,25 @@ def test_a_pull_reaches_its_target_without_a_spike_and_far_away_nothing_moves(na
     assert spike(mesh, solution.vertices, vertex) - spike(mesh, x, vertex) < 0.1
     far = np.linalg.norm(solution.vertices - x, axis=1)[away > 4.0 * radius]
     assert far.max(initial=0.0) < 2e-3 * mesh.diagonal
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-7])
+def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)  # samples are coarser than the vertices
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
+    ball = models.sphere(600)
+    mesh = ball.with_vertices(size * ball.vertices * [0.4, 0.4, 1.0])
+    x, d, regions = mesh.vertices, mesh.diagonal, Regions.single(mesh)
+    cages = fit_cages(mesh, regions, 30)
+    near = np.setdiff1d(mesh.adjacency[[0]].indices, [0])
+    spread = 4.0 * np.linalg.norm(x[near] - x[0], axis=1).max()
+    local = Deformer(mesh, regions, cages, handle=[0]).local(0, 0.3 * d, spread)
+    solution = local.solve(x[[0]] + [0.1 * d, 0.0, 0.1 * d])
+    finished = local.finish(solution)
+    moved = np.linalg.norm(finished.vertices - solution.vertices, axis=1) / d
+    assert moved.max() > 1e-3
+    assert moved[near].max() < 2e-4
+    assert abs(finished.volume_change) < 1e-12
 
 
 @pytest.mark.parametrize(

@@ -127,6 +127,7 @@ class _PulledPoints:
     targets: IntArray = field(default_factory=lambda: _NONE)  # (q,), their targets
     vertices: IntArray = field(default_factory=lambda: _NONE)  # (q,)
     offsets: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from target to x~
+    spread: float = 0.0  # within which they pull, in the mesh's unit
     error: float = np.inf  # the largest, before the last correction
 
     def moved(self, places: FloatArray) -> FloatArray:
@@ -441,6 +442,7 @@ class Deformer:
         solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
         keeps = self._samples.weights(*near)
+        pulled.spread = spread
         for each in pulled.vertices:
             keeps[self._samples.distances(int(each)) < spread / self._frame.size] = np.inf
         other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
@@ -633,6 +635,7 @@ class Deformer:
         keeps, shares = self._constraints.keeps, None
         if keeps is not None:
             away = self._samples.smooth_at_vertices(np.minimum(np.sqrt(keeps / _STAYS), 1.0))
+            away = np.maximum(away, self._near_pulled_vertices())
             stays = (away == 1.0) & ~held
             places[stays] = start[stays]
             held |= stays
@@ -660,6 +663,19 @@ class Deformer:
             volume=partial(self._total_volume.relative, found.vertices),
             region_volumes=self._region_volume_changes,
         )
+
+    def _near_pulled_vertices(self) -> FloatArray:
+        """Return 1 within half the spread of pulled vertices, 0 beyond the spread, (n,) float.
+
+        Samples are coarser than the vertices, and smoothing between them would let go of the
+        neighbours of a pulled vertex, which stays.
+        """
+        x, pulled = self._rest_pose.vertices, self._constraints.pulled
+        near = np.zeros(len(x))
+        for each in pulled.vertices:
+            away = np.linalg.norm(x - x[each], axis=1) / pulled.spread
+            near = np.maximum(near, np.clip(2.0 * (1.0 - away), 0.0, 1.0))
+        return near
 
     @cached_property
     def _cell_energy(self) -> CellEnergy:
