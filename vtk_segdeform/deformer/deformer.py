@@ -597,7 +597,7 @@ class Deformer:
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
         volume, because hardly a vertex is free, is returned unchanged.
 
-        With *avoid_contact*, crossings that *solution* does not have are avoided.
+        Where *solution* has no crossings there are none after it, either.
 
         Parameters
         ----------
@@ -639,8 +639,7 @@ class Deformer:
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
         volumes = self.preserved_volumes
         finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
-        run = finisher.run_apart if self._avoid_contact else finisher.run
-        found = run(start, places[held], progress)
+        found = finisher.run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
             found = replace(found, vertices=finisher.between(start, found.vertices, shares))
         # Without enough free vertices exact handles and exact volumes exclude each other.
