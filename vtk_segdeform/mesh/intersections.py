@@ -113,10 +113,10 @@ def _suspects(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArr
     edges = np.maximum(np.abs(b - a).max(axis=1), np.abs(c - a).max(axis=1))
     size = _CUBE * float(np.quantile(edges, 0.99))
     across = np.cross(b - a, c - a)
-    normals = np.stack(
+    normals: FloatArray = np.stack(
         [np.bincount(faces.ravel(), np.repeat(axis, 3), len(vertices)) for axis in across.T], axis=1
     )
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
     links = faces.ravel(), np.roll(faces, 1, axis=1).ravel()
     graph = sparse.coo_array((np.ones(faces.size, dtype=bool), links), (len(vertices),) * 2)
     component = csgraph.connected_components(graph.tocsr(), directed=False)[1]
