@@ -597,9 +597,10 @@ class Deformer:
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
         only the surface within the reach is finished: it stays from 1.4 times the reach on, and
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
-        volume, because hardly a vertex is free, is returned unchanged.
+        volume, because hardly a vertex is free, is returned unchanged; so is a pull whose
+        surface would have more energy, or more folds.
 
-        With *avoid_contact*, crossings that *solution* does not have are avoided.
+        Where *solution* has no crossings there are none after it, either.
 
         Parameters
         ----------
@@ -642,10 +643,11 @@ class Deformer:
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
         volumes = self.preserved_volumes
         finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
-        run = finisher.run_apart if self._avoid_contact else finisher.run
-        found = run(start, places[held], progress)
+        found = finisher.run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
             found = replace(found, vertices=finisher.between(start, found.vertices, shares))
+            if not finisher.is_better(start, found.vertices):
+                return solution
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:

@@ -25,6 +25,8 @@ from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy import sparse
+from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
@@ -34,9 +36,11 @@ _FOLD = 1e-9  # radians between two faces folded over their common edge
 _NEEDLE = 1e-10  # height over longest edge; the plane of a flatter face is undefined
 _BATCH = 200_000  # pairs of boxes tested at once
 _ALL_FACES = 200_000  # beyond so many `new_crossings` tests only some
-_CUBE, _ELSEWHERE = 8.0, 4.0  # a cube in edges; a distance at rest in cubes
+_CUBE, _ELSEWHERE = 4.0, 2.0  # a cube in edges; a distance at rest in cubes
 _WIDER = 1.0 + 1e-12  # for rounding
 _FACES = 10_000  # faces whose neighbourhoods are searched at once
+
+_TINY = 1e-300
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
 _OPPOSITE = ((1, 2),)  # the edge opposite to a shared corner, which is rolled to the front
@@ -74,18 +78,21 @@ def self_intersections(vertices: ArrayLike, faces: ArrayLike) -> IntArray:
     return hits[np.lexsort((hits[:, 1], hits[:, 0]))]
 
 
-def new_crossings(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArray:
+def new_crossings(
+    vertices: FloatArray, rest: FloatArray, faces: IntArray, *, all_faces: int = _ALL_FACES
+) -> IntArray:
     """Return the faces (k,) that cross or touch others at *vertices* (n, 3) but not at *rest*.
 
     A face counts if it is in a pair of `self_intersections` at *vertices* that is none at *rest*.
-    Of more than 200,000 faces, only those are tested that are near others from elsewhere at rest:
-    a fold of a few faces is not found.
+    Of more than *all_faces*, only those are tested that are near others from elsewhere at rest, or
+    turned against others nearby: a fold of a few faces may not be found.
     """
-    corners = vertices[faces]
-    low, high = corners.min(axis=1), corners.max(axis=1)
     some = np.arange(len(faces))
-    if len(faces) > _ALL_FACES:
-        some = _from_elsewhere(vertices, rest, faces)
+    if len(faces) > all_faces:
+        some = _suspects(vertices, rest, faces)
+    low, high = (np.empty((len(faces), 3)) for _ in range(2))
+    corners = vertices[faces[some]]
+    low[some], high[some] = corners.min(axis=1), corners.max(axis=1)
     found = [np.empty((0, 2), dtype=np.int64)]
     for near in _boxes_among(low[some], high[some]):
         pairs = some[near]
@@ -94,25 +101,40 @@ def new_crossings(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> In
     return np.unique(np.concatenate(found))
 
 
-def _from_elsewhere(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArray:
-    """Return the faces (k,) near others from elsewhere *rest*, some 30 edges away or more.
+def _suspects(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> IntArray:
+    """Return the faces (k,) that may cross others.
 
     Vertices (n, 3) are sorted into cubes, four times over, each time shifted by a quarter: two
-    points less than a quarter apart share one of them.
+    points less than a quarter apart share one of them.  Surface in one cube may cross itself if it
+    comes from elsewhere at *rest*, some cubes away, if it has parts that are not connected, or if
+    the normals of the vertices are not all on one side of a plane.
     """
-    corners = vertices[faces]
-    size = _CUBE * float(np.quantile(np.ptp(corners, axis=1).max(axis=1), 0.99))
+    a, b, c = (np.take(vertices, corner, axis=0) for corner in faces.T)
+    edges = np.maximum(np.abs(b - a).max(axis=1), np.abs(c - a).max(axis=1))
+    size = _CUBE * float(np.quantile(edges, 0.99))
+    across = np.cross(b - a, c - a)
+    normals: FloatArray = np.stack(
+        [np.bincount(faces.ravel(), np.repeat(axis, 3), len(vertices)) for axis in across.T], axis=1
+    )
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
+    links = faces.ravel(), np.roll(faces, 1, axis=1).ravel()
+    graph = sparse.coo_array((np.ones(faces.size, dtype=bool), links), (len(vertices),) * 2)
+    component = csgraph.connected_components(graph.tocsr(), directed=False)[1]
     is_near = np.zeros(len(vertices), dtype=bool)
     for shift in range(4):
         cube = np.floor((vertices - vertices.min(axis=0)) / size + 0.25 * shift).astype(np.int64)
         width = cube.max(axis=0) + 1
         key = (cube[:, 0] * width[1] + cube[:, 1]) * width[2] + cube[:, 2]
-        order = np.argsort(key)
+        order = np.lexsort((component, key))
         first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        counts = np.diff(first, append=len(order))
         there = rest[order]
         spread = np.maximum.reduceat(there, first) - np.minimum.reduceat(there, first)
-        counts = np.diff(first, append=len(order))
-        is_near[order] |= np.repeat((spread > _ELSEWHERE * size).any(axis=1), counts)
+        mean = np.repeat(np.add.reduceat(normals[order], first), counts, axis=0)
+        turned = np.einsum("ij,ij->i", mean, normals[order]) <= 0.0
+        suspect = (spread > _ELSEWHERE * size).any(axis=1) | np.logical_or.reduceat(turned, first)
+        suspect |= component[order[first]] != component[order[first + counts - 1]]
+        is_near[order] |= np.repeat(suspect, counts)
     return np.flatnonzero(is_near[faces].any(axis=1))
 
 

@@ -28,7 +28,7 @@ from ..geometry import Lids, lids_of, volume_gradient
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..solver import Solution, VolumeConstraint, errors_at, total_volume
-from .finishing import Finish, moved_on
+from .finishing import Finish, Surfaces, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
 from .pulling import localised
@@ -46,6 +46,7 @@ _CONSTRAINT_OPTIONS = (
     "avoid_contact",
 )  # changed by `Deformer.hold`
 _TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
+_MAX_TURNED = 3  # rotations in memory: of the finished pose, the last one and the next
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -67,7 +68,7 @@ class PoseSolver:
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
-        self._turned: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
+        self._turned: tuple[tuple[tuple[FloatArray, ...], FloatArray], ...] = ()
         self._volumes: dict[bool | None, tuple[Lids, VolumeConstraint]] = {}
 
     def lids(self, state: State) -> Lids:
@@ -310,20 +311,24 @@ class PoseSolver:
         self, state: State, before: Pose, finished: Finished, cages: tuple[FloatArray, ...]
     ) -> Finished:
         """Return *finished*, of the pose *before*, for other *cages*."""
-        held = np.concatenate([state.fixed, state.handle])
-        preserved = self._constrain(state).preserved_volumes
-        offset = finished.vertices - self._surface(state, before.cage_vertices)
-        x = self._surface(state, cages)
-        turned = np.swapaxes(self._rotations(state, before.cage_vertices), 1, 2)
-        turns = self._rotations(state, cages) @ turned
-        turns[state.fixed] = np.eye(3)
-        return moved_on(finished, offset, x, turns=turns, held=held, constraints=preserved)
+        rotations = partial(self._rotations, state)
+        return moved_on(
+            finished,
+            before.cage_vertices,
+            cages,
+            Surfaces(self._mesh, partial(self._surface, state), rotations),
+            fixed=state.fixed,
+            handle=state.handle,
+            constraints=self._constrain(state).preserved_volumes,
+        )
 
-    def _rotations(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
+    def _rotations(self, state: State, cages: tuple[FloatArray, ...]) -> FloatArray:
         """Return `Deformer.rotations`; the last ones are kept."""
-        if self._turned[0] is not cage_vertices:
-            self._turned = cage_vertices, self.bind(state).rotations(cage_vertices)
-        return self._turned[1]
+        kept = [each for each in self._turned if each[0] is not cages]
+        known = [each for each in self._turned if each[0] is cages]
+        own = known or [(cages, self.bind(state).rotations(cages))]
+        self._turned = (*own, *kept)[:_MAX_TURNED]
+        return own[0][1]
 
     def _surface(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:
         """Return W~ p, (n, 3); the last one is kept."""

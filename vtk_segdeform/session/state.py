@@ -124,6 +124,10 @@ class Finished(Frozen):
     shifts: FloatArray
     """(h, 3) float: their positions minus the targets of the cages; nonzero only for vertices that
     were fixed, or made handles, in a finished pose."""
+    cage_vertices: tuple[FloatArray, ...]
+    """One (m_r, 3) float per region: the cages of the pose that was finished."""
+    offset: FloatArray
+    """(n, 3) float: the finished mesh then, less that of the cages."""
 
     def shifted(self, x: FloatArray) -> FloatArray:
         """Return for every vertex its place, less that of the cages, whose mesh is *x* (n, 3)."""
@@ -254,7 +258,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     pose = None
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
-        pose = replace(pose, finished=_checked_finished(mesh, state.pose.finished))
+        pose = replace(pose, finished=_checked_finished(mesh, cages, state.pose.finished))
         _require_plausible(mesh, pose)
     pulls, locality = all_of(state.pulls, str, "state.pulls"), state.locality
     if locality is not None:
@@ -329,20 +333,27 @@ def _checked_pose(
     return Pose(tuple(_frozen_copy(points) for points in places), owned)
 
 
-def _checked_finished(mesh: Mesh, finished: Finished | None) -> Finished | None:
+def _checked_finished(
+    mesh: Mesh, cages: Sequence[Cage], finished: Finished | None
+) -> Finished | None:
     if finished is None:
         return None
     require(finished, Finished, "state.pose.finished")
     vertices = as_points(finished.vertices, "state.pose.finished.vertices")
-    if len(vertices) != mesh.n_vertices:
-        raise CageError(
-            f"the finished pose must have {mesh.n_vertices} vertices; got {len(vertices)}"
-        )
+    offset = as_points(finished.offset, "state.pose.finished.offset")
+    for points in (vertices, offset):
+        if len(points) != mesh.n_vertices:
+            raise CageError(
+                f"the finished pose must have {mesh.n_vertices} vertices; got {len(points)}"
+            )
     held, _ = checked_constraints(mesh, finished.held, ())
     shifts = as_points(finished.shifts, "state.pose.finished.shifts")
     if len(shifts) != len(held) or not np.array_equal(held, finished.held):
         raise ConstraintError("the finished pose must have a shift for each held vertex")
-    return Finished(*map(_frozen_copy, (vertices, held, shifts)))
+    then = _checked_pose(cages, [], [], Pose(finished.cage_vertices, {}))
+    _require_plausible(mesh, then)
+    own = map(_frozen_copy, (vertices, held, shifts))
+    return Finished(*own, then.cage_vertices, _frozen_copy(offset))
 
 
 def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:

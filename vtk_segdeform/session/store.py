@@ -10,7 +10,8 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
     locality.npy          (c, 3) float     the cages where a pull began            if any
     finished.npy          (n, 3) float     the mesh in a finished pose             if any
-    finished_held.npy, finished_shifts.npy       as in `state.Finished`
+    finished_held.npy, finished_shifts.npy, finished_cages.npy, finished_offset.npy
+                                           as in `state.Finished`
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -191,6 +192,8 @@ def _write(
         arrays["finished"] = pose.finished.vertices
         arrays["finished_held"] = pose.finished.held
         arrays["finished_shifts"] = pose.finished.shifts
+        arrays["finished_cages"] = np.concatenate(pose.finished.cage_vertices)
+        arrays["finished_offset"] = pose.finished.offset
     if state.fixed_at is not None:
         header["fixed_in_pose"] = True
         arrays["fixed_at"] = state.fixed_at
@@ -242,6 +245,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
                 archive.array("finished", "f", (n, 3)),
                 archive.array("finished_held", "i", (held,)),
                 archive.array("finished_shifts", "f", (held, 3)),
+                tuple(split_rows(archive.array("finished_cages", "f", (total, 3)), n_vertices)),
+                archive.array("finished_offset", "f", (n, 3)),
             )
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)), finished)
     fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
