@@ -205,6 +205,15 @@ class Mesh(Frozen):
         frozen(areas)
         return areas
 
+    @cached_property
+    def vertex_areas(self) -> FloatArray:
+        """(n,) float: a third of the area of the triangles at each vertex."""
+        thirds, n = self.face_areas / 3.0, self.n_vertices
+        a, b, c = (np.bincount(corner, thirds, n) for corner in self.faces.T)
+        areas: FloatArray = a + b + c
+        frozen(areas)
+        return areas
+
     def with_vertices(self, vertices: ArrayLike) -> Mesh:
         """Return a mesh with the same triangles and other positions (n, 3).
 
