@@ -10,10 +10,13 @@ from solids import CUBE, OCTAHEDRON, SOLIDS, TETRAHEDRON, icosphere, rotation, s
 from solids import two_components as two_spheres
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
-from vtk_segdeform.cages.cage import Cage, cage_faults
+from vtk_segdeform import models
+from vtk_segdeform.cages.cage import Cage, cage_faults, encloses_region
+from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
 from vtk_segdeform.mesh.intersections import _overlapping_boxes, self_intersections
+from vtk_segdeform.regions.regions import Regions
 
 TURN = rotation([1, 2, 3], 0.7)
 VALID = {
@@ -310,3 +313,19 @@ def test_columns_through_corners_and_edges_of_a_cage_are_handled(level):
     assert np.count_nonzero(clear) > 10
     inside = Cage(vertices, faces).contains(points[clear])
     assert_array_equal(inside, winding[clear] > 0.5)
+
+
+def test_a_region_is_tested_once_and_others_anew(monkeypatch):
+    mesh = models.torus(400)
+    half = mesh.vertices[:, 0] > 0.0
+    regions = Regions.from_masks(mesh, [half, ~half])
+    cages = fit_cages(mesh, regions, 40)
+    tested = []
+    contains = Cage.contains
+    monkeypatch.setattr(Cage, "contains", lambda *args: (tested.append(1), contains(*args))[1])
+    assert encloses_region(cages[0], regions, 0)
+    assert encloses_region(cages[0], regions, 0)
+    assert len(tested) == 1
+    assert not encloses_region(cages[0], regions, 1)
+    assert not encloses_region(cages[0], Regions.from_masks(mesh, [~half, half]), 0)
+    assert len(tested) == 3

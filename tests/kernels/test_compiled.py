@@ -39,6 +39,7 @@ from vtk_segdeform.widgets.picking.line_of_sight import faces_in_beam
 MESH = models.torus(3000)
 RNG = np.random.default_rng(2)
 MOVE = RNG.normal(size=MESH.vertices.shape)
+SHEET = np.asarray(sheet(4).points, float), triangles_of(sheet(4))
 
 
 @pytest.fixture
@@ -534,6 +535,22 @@ def test_areas_of_faces_are_equal(twin, monkeypatch):
     corners = MESH.vertices[MESH.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert_allclose(quick, 0.5 * np.linalg.norm(normals, axis=1), rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["closed", "open", "two parts"])
+def test_neighbours_are_equal(twin, monkeypatch, name):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    parts = {"closed": [OCTAHEDRON], "open": [SHEET], "two parts": [torus(9, 6), SHEET]}
+    vertices, faces = together(*parts[name])
+
+    def call():
+        mesh = Mesh(vertices, faces)
+        near, numbers = mesh.adjacency, mesh._edge_numbers
+        return near.indptr, near.indices, near.data, numbers.data
+
+    for one, other in zip(*twin(call), strict=True):
+        assert one.dtype == other.dtype
+        assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ The files, in reading order:
     mean_value      mean value coordinates, eqs. (15) to (19)
 """
 
-from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
+from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
 from .fit import fit_cages, suggested_size
 from .mean_value import mean_value_coordinates
 
@@ -19,6 +19,7 @@ __all__ = [
     "MOST_CAGE_VERTICES",
     "Cage",
     "cage_faults",
+    "encloses_region",
     "fit_cages",
     "mean_value_coordinates",
     "suggested_size",

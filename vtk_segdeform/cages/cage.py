@@ -8,6 +8,7 @@ intersect; a component inside another is a cavity and faces inward.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +28,7 @@ from ..mesh import (
     self_intersections,
     winding_number,
 )
+from ..regions import Regions
 
 MOST_CAGE_VERTICES = 1600
 """Most vertices of all cages together: the solver factors matrices of three rows per vertex."""
@@ -34,6 +36,8 @@ MOST_CAGE_VERTICES = 1600
 _LONGEST_NAME = 100  # characters of a cage's name in a message
 _MANY, _BOXES = 20_000, 64  # points that are tested box by box; boxes along the longest side
 _LARGEST = 1e70  # coordinate, as for a mesh
+
+_known: WeakKeyDictionary[Cage, WeakKeyDictionary[Regions, dict[int, bool]]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -117,6 +121,14 @@ class Cage(Frozen):
                 f"{len(outside)} of {len(x)} {name} are outside the cage, "
                 f"the farthest by {farthest:.3g}; enlarge the cage"
             )
+
+
+def encloses_region(cage: Cage, regions: Regions, r: int) -> bool:
+    """Return whether *cage* encloses region *r*; a cage and a region are tested only once."""
+    known = _known.setdefault(cage, WeakKeyDictionary()).setdefault(regions, {})
+    if r not in known:
+        known[r] = bool(cage.contains(regions.mesh.vertices[regions.membership[r]]).all())
+    return known[r]
 
 
 def _inside_of_many(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:

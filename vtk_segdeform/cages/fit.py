@@ -38,7 +38,7 @@ from ..kernels import n_threads, one_blas_thread
 from ..mesh import Mesh, distance_to_surface, inside_points, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
-from .cage import MOST_CAGE_VERTICES, Cage, cage_faults
+from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
 from .contour import contour_surface
 from .region_solid import Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
@@ -123,6 +123,8 @@ def fit_cages(
     """
     require_mesh(mesh)
     require_regions(regions, mesh)
+    if regions.mesh is not mesh:
+        regions = Regions(mesh, regions.membership)
     _check_offset(offset, mesh)
     n_regions = regions.n_regions
     _require_enough(n_vertices, n_regions)
@@ -152,8 +154,7 @@ def fit_cages(
         ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
         piece = part(progress, *map(float, ends))
         cage = _fit(patch, int(number), offset, piece, spacing)
-        x = mesh.vertices[regions.membership[r]]
-        if cluster is not None and not cage.contains(x).all():
+        if cluster is not None and not encloses_region(cage, regions, r):
             patch = Patch.of(Surface.of(mesh), regions.membership[r])
             apart = None if spacing is None else spacing[cluster]
             cage = _fit(patch, int(number), offset, piece, apart)

@@ -50,7 +50,7 @@ def cage_spacing(mesh: Mesh, density: FloatArray, n_vertices: int) -> FloatArray
 
     *density* (n,) is relative: not negative, and not zero everywhere.
     """
-    area = np.maximum(_areas(mesh), np.finfo(float).tiny)
+    area = np.maximum(mesh.vertex_areas, np.finfo(float).tiny)
     i, j = mesh.edges.T
     length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
     length = _SLOPE * np.maximum(length, _SHORTEST * mesh.diagonal)
@@ -83,7 +83,7 @@ def thickness(mesh: Mesh) -> FloatArray:
 
     At most the diagonal of the mesh, and smoothed over neighbours.
     """
-    x, area = mesh.vertices, _areas(mesh)
+    x, area = mesh.vertices, mesh.vertex_areas
     near = sparse.csr_array(mesh.adjacency > 0.0).astype(np.float64)
     normal = _normals(mesh)
     normal += near @ normal
@@ -111,12 +111,6 @@ def thickness(mesh: Mesh) -> FloatArray:
     for _ in range(_SMOOTH):
         log = (area * log + near @ (area * log)) / total
     return np.asarray(np.exp(log) * mesh.diagonal)
-
-
-def _areas(mesh: Mesh) -> FloatArray:
-    """Return a third of the area of the faces at each vertex, (n,)."""
-    thirds = np.repeat(mesh.face_areas / 3.0, 3)
-    return np.bincount(mesh.faces.ravel(), thirds, minlength=mesh.n_vertices).astype(np.float64)
 
 
 def _normals(mesh: Mesh) -> FloatArray:

@@ -89,14 +89,13 @@ class SurfaceSamples:
     def of(cls, rest: Mesh, coarse: CoarseVolume) -> SurfaceSamples:
         """Return the samples of a mesh at *rest* with its *coarse* volume."""
         n = rest.n_vertices
-        at_vertices = np.bincount(rest.faces.ravel(), np.repeat(rest.face_areas, 3), n)
         cells, faces, points = np.arange(n), rest.faces, rest.vertices
         if coarse.cells is not None and coarse.shares is not None:
             cells, faces = coarse.cells, faces_between(coarse.cells, rest.faces)
             shared = [coarse.shares * axis for axis in rest.vertices.T]
             points = np.stack([np.bincount(cells, axis) for axis in shared], axis=1)
         count = len(points)
-        areas = np.asarray(np.bincount(cells, at_vertices, count), dtype=np.float64)
+        areas = np.asarray(np.bincount(cells, rest.vertex_areas, count), dtype=np.float64)
         i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
         near = sparse.coo_array((np.ones(len(i)), (i, j)), (count, count)).tocsr().tocoo()
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)

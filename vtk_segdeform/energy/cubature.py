@@ -73,9 +73,7 @@ class Sample:
         number = max(sizes.CUBATURE_SAMPLE, each)
         if n < sizes.CUBATURE_FACTOR * number:
             return None
-        thirds = np.repeat(mesh.face_areas / 3.0, 3)
-        areas = np.asarray(np.bincount(faces.ravel(), thirds, n), dtype=np.float64)
-        weights = _weights(_along_curve(x, clusters), clusters, areas, number)
+        weights = _weights(_along_curve(x, clusters), clusters, mesh.vertex_areas, number)
         near = _touched(weights > 0.0, faces)
         ids, corners = _numbered(faces[near], n)
         surface = IntrinsicTriangulation.of(x[ids], corners)

@@ -135,22 +135,29 @@ def reduced_operators(
     order = np.argsort(_last_region(subspace) if clusters is None else clusters, kind="stable")
     size = max(_PIECE // m, 1)
     found: dict[int, tuple[IntArray, list[FloatArray]]] = {}
-    traces = np.empty(subspace.n_vertices)
+    traces = np.zeros(subspace.n_vertices)
 
     def work(first: int, start: int, stop: int) -> None:
         vertices = order[first + start : first + stop]
-        rings = [each[vertices] for each in both]
+        bent = np.flatnonzero(strength[vertices])  # of a sample, only the sampled vertices
+        rings = [each[vertices] for each in both[-1:]]
+        if len(both) > 1:
+            rings.insert(0, laplacian[vertices[bent]])
         met = [vertices, *(ring.indices.astype(np.int64) for ring in rings)]
         used, place = np.unique(np.concatenate(met), return_inverse=True)
         columns, w = subspace.nonzeros(used)
         own, *places = np.split(place.astype(np.int32), np.cumsum([len(ids) for ids in met[:-1]]))
-        here, products = w[own], []
+        products = []
         for ring, at in zip(rings, places, strict=True):
             compact = ring.data, at, ring.indptr.astype(np.int32)
-            products.append(sparse.csr_array(compact, (len(vertices), len(used))) @ w)
-        traces[vertices] = strength[vertices] * np.einsum("ij,ij->i", products[0], products[0])
-        squares = (products[0] * strength[vertices][:, None]).T @ products[0]
-        plain, masses = here.T @ products[-1], (here * mass[vertices][:, None]).T @ here
+            products.append(sparse.csr_array(compact, (ring.shape[0], len(used))) @ w)
+        normals = products[0] if len(both) > 1 else products[0][bent]
+        scaled = normals * strength[vertices[bent], None]
+        traces[vertices[bent]] = np.einsum("ij,ij->i", scaled, normals)
+        squares, plain = scaled.T @ normals, w[own].T @ products[-1]
+        heavy = np.flatnonzero(mass[vertices])
+        here = w[own[heavy]]
+        masses = (here * mass[vertices[heavy], None]).T @ here
         found[start] = columns, [squares, plain, masses]
 
     totals = np.zeros((3, m, m))

@@ -31,6 +31,7 @@ from .triangles import corner_columns, cross, norm
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 _LARGE_PIECE = 200_000  # faces per task of compiled kernels
+_BITS = 32  # of the second vertex in the number of an edge
 
 
 @dataclass(frozen=True, init=False, eq=False)
@@ -139,23 +140,29 @@ class Mesh(Frozen):
     def edges(self) -> IntArray:
         """(e, 2) int: the edges, smaller vertex first, in lexicographic order."""
         # An edge that is not in the boundary has faces in both directions.
-        n, (a, b, c) = self.n_vertices, self.faces.T.copy()
-        one, other = self.boundary.T
+        (a, b, c), (one, other) = self.faces.T.copy(), self.boundary.T
         forth = [
-            tail[tail < head] * n + head[tail < head] for tail, head in ((a, b), (b, c), (c, a))
+            (tail[tail < head] << _BITS) + head[tail < head]
+            for tail, head in ((a, b), (b, c), (c, a))
         ]
-        keys = np.concatenate([*forth, edge_keys(one, other, n)])
+        keys = np.concatenate([*forth, edge_keys(one, other, 1 << _BITS)])
         keys.sort()
-        return read_only(np.stack(np.divmod(keys[begins(keys)], n), axis=1))
+        keys = keys[begins(keys)]
+        return read_only(np.stack([keys >> _BITS, keys & ((1 << _BITS) - 1)], axis=1))
 
     @cached_property
     def adjacency(self) -> sparse.csr_array:
         """(n, n) symmetric sparse: edge lengths between neighbouring vertices."""
-        i, j = self.edges.T
-        length = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
-        length = np.maximum(length, np.finfo(float).tiny)  # csgraph reads a zero as "no edge"
+        least = np.finfo(float).tiny  # csgraph reads a zero as "no edge"
         at = self._edge_numbers
-        lengths = sparse.csr_array((length[at.data - 1], at.indices, at.indptr), at.shape)
+        if kernels := compiled_checks(self.n_faces):
+            length = np.empty(len(at.data))
+            kernels.edge_lengths(length, least, *inputs(at.indptr, at.indices, self.vertices))
+        else:
+            i, j = self.edges.T
+            each = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
+            length = np.maximum(each, least)[at.data - 1]
+        lengths = sparse.csr_array((length, at.indices, at.indptr), at.shape)
         for array in (lengths.data, lengths.indices, lengths.indptr):
             frozen(array)
         return lengths
@@ -164,6 +171,12 @@ class Mesh(Frozen):
     def _edge_numbers(self) -> sparse.csr_array:
         """(n, n) symmetric sparse: 1 + the edge index between neighbouring vertices."""
         i, j = self.edges.T
+        if kernels := compiled_checks(self.n_faces):
+            starts, ends, data = (
+                np.empty(k, dtype=np.int32) for k in (self.n_vertices + 1, 2 * len(i), 2 * len(i))
+            )
+            kernels.edge_rows(starts, ends, data, *inputs(self.edges))
+            return sparse.csr_array((data, ends, starts), (self.n_vertices,) * 2)
         numbers = np.arange(1, len(i) + 1, dtype=np.int32)
         # In this order the neighbours of each vertex are sorted already.
         ends = np.concatenate([j, i], dtype=np.int32), np.concatenate([i, j], dtype=np.int32)
@@ -189,6 +202,15 @@ class Mesh(Frozen):
             in_parallel(partial(kernels.face_areas, areas, *given), self.n_faces, _LARGE_PIECE)
         else:
             in_parallel(work, self.n_faces, _PIECE)
+        frozen(areas)
+        return areas
+
+    @cached_property
+    def vertex_areas(self) -> FloatArray:
+        """(n,) float: a third of the area of the triangles at each vertex."""
+        thirds, n = self.face_areas / 3.0, self.n_vertices
+        a, b, c = (np.bincount(corner, thirds, n) for corner in self.faces.T)
+        areas: FloatArray = a + b + c
         frozen(areas)
         return areas
 

@@ -69,8 +69,7 @@ class CoarseVolume:
         if n <= sizes.COARSE_VOLUME or whole:
             return cls(subspace)
         rng = np.random.default_rng(0)
-        corners = np.repeat(mesh.face_areas, 3)
-        areas = np.asarray(np.bincount(mesh.faces.ravel(), corners, n), dtype=np.float64)
+        areas = mesh.vertex_areas
         if n > sizes.DECIMATED:
             coarse, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
             _, cells = voronoi_cells(coarse, sizes.COARSE_VOLUME_POINTS, rng, progress)

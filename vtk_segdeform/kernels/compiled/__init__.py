@@ -8,7 +8,7 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
-    half_edges      `topology.HalfEdges`, `grouping.connected`
+    half_edges      `topology.HalfEdges`, `grouping.connected`, `Mesh.adjacency`
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
@@ -24,6 +24,8 @@ from .beams import beam_meets, beyond_sides
 from .factor import solve_factored
 from .half_edges import (
     border_half_edges,
+    edge_lengths,
+    edge_rows,
     link,
     link_corners,
     number_trees,
@@ -54,6 +56,8 @@ __all__ = [
     "corners_of_lines",
     "determinants",
     "distances_inside",
+    "edge_lengths",
+    "edge_rows",
     "face_areas",
     "facet_corners",
     "facing_pairs",

@@ -6,6 +6,8 @@ face (a, b, c) links b to c; around a vertex with one fan, the links are a cycle
 
 from __future__ import annotations
 
+import numpy as np
+
 from .kernels import kernel
 
 _compile = kernel()
@@ -212,3 +214,42 @@ def used_vertices(used, faces):
         n_repeating += (a == b) | (b == c) | (c == a)
         used[a] = used[b] = used[c] = True
     return n_repeating
+
+
+@_compile
+def edge_rows(starts, ends, numbers, edges):
+    """Put the neighbours of each vertex into *ends* (2e,), and 1 + the edge to each into *numbers*.
+
+    Those of vertex v are from starts[v] to starts[v + 1], in ascending order; *starts* is (n + 1,).
+    *edges* (e, 2) have the smaller vertex first, and are in lexicographic order.
+    """
+    starts[:] = 0
+    for e in range(len(edges)):
+        starts[edges[e, 0]] += 1
+        starts[edges[e, 1]] += 1
+    total = 0
+    for v in range(len(starts)):
+        starts[v], total = total, total + starts[v]
+    for e in range(len(edges)):
+        i, j = edges[e, 0], edges[e, 1]
+        k = starts[i]
+        starts[i], ends[k], numbers[k] = k + 1, j, e + 1
+        k = starts[j]
+        starts[j], ends[k], numbers[k] = k + 1, i, e + 1
+    for v in range(len(starts) - 1, 0, -1):
+        starts[v] = starts[v - 1]
+    starts[0] = 0
+
+
+@_compile
+def edge_lengths(lengths, least, starts, ends, points):
+    """Put the lengths of these edges, at least *least*, into *lengths* (2e,); see `edge_rows`."""
+    for i in range(len(starts) - 1):
+        for k in range(starts[i], starts[i + 1]):
+            j = ends[k]
+            x, y, z = (
+                points[i, 0] - points[j, 0],
+                points[i, 1] - points[j, 1],
+                points[i, 2] - points[j, 2],
+            )
+            lengths[k] = max(np.sqrt((x * x + y * y) + z * z), least)
