@@ -210,7 +210,7 @@ class Mesh(Frozen):
         """(n,) float: a third of the area of the triangles at each vertex."""
         thirds, n = self.face_areas / 3.0, self.n_vertices
         a, b, c = (np.bincount(corner, thirds, n) for corner in self.faces.T)
-        areas: FloatArray = a + b + c
+        areas = np.asarray(a + b + c, dtype=np.float64)
         frozen(areas)
         return areas
 
