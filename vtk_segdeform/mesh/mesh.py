@@ -172,11 +172,11 @@ class Mesh(Frozen):
         """(n, n) symmetric sparse: 1 + the edge index between neighbouring vertices."""
         i, j = self.edges.T
         if kernels := compiled_checks(self.n_faces):
-            starts, ends, data = (
+            starts, columns, data = (
                 np.empty(k, dtype=np.int32) for k in (self.n_vertices + 1, 2 * len(i), 2 * len(i))
             )
-            kernels.edge_rows(starts, ends, data, *inputs(self.edges))
-            return sparse.csr_array((data, ends, starts), (self.n_vertices,) * 2)
+            kernels.edge_rows(starts, columns, data, *inputs(self.edges))
+            return sparse.csr_array((data, columns, starts), (self.n_vertices,) * 2)
         numbers = np.arange(1, len(i) + 1, dtype=np.int32)
         # In this order the neighbours of each vertex are sorted already.
         ends = np.concatenate([j, i], dtype=np.int32), np.concatenate([i, j], dtype=np.int32)
@@ -210,7 +210,7 @@ class Mesh(Frozen):
         """(n,) float: a third of the area of the triangles at each vertex."""
         thirds, n = self.face_areas / 3.0, self.n_vertices
         a, b, c = (np.bincount(corner, thirds, n) for corner in self.faces.T)
-        areas: FloatArray = a + b + c
+        areas = np.asarray(a + b + c, dtype=np.float64)
         frozen(areas)
         return areas
 
