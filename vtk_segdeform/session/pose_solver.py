@@ -8,6 +8,8 @@
 The vertices of a pose do not depend on how it was reached: after undo, redo or loading they are
 bitwise identical.  A finished pose has its own vertices, as in `finishing`; its cages are solved
 for the places of handles and fixed vertices less the shifts in it.
+
+Long by a few lines because the caches above depend on each other.
 """
 
 from __future__ import annotations
@@ -311,12 +313,12 @@ class PoseSolver:
         self, state: State, before: Pose, finished: Finished, cages: tuple[FloatArray, ...]
     ) -> Finished:
         """Return *finished*, of the pose *before*, for other *cages*."""
-        rotations = partial(self._rotations, state)
+        own = partial(self._surface, state), partial(self._rotations, state)
         return moved_on(
             finished,
             before.cage_vertices,
             cages,
-            Surfaces(self._mesh, partial(self._surface, state), rotations),
+            Surfaces(self._mesh, *own),
             fixed=state.fixed,
             handle=state.handle,
             constraints=self._constrain(state).preserved_volumes,
@@ -324,10 +326,10 @@ class PoseSolver:
 
     def _rotations(self, state: State, cages: tuple[FloatArray, ...]) -> FloatArray:
         """Return `Deformer.rotations`; the last ones are kept."""
-        kept = [each for each in self._turned if each[0] is not cages]
-        known = [each for each in self._turned if each[0] is cages]
-        own = known or [(cages, self.bind(state).rotations(cages))]
-        self._turned = (*own, *kept)[:_MAX_TURNED]
+        own = [each for each in self._turned if each[0] is cages]
+        own = own or [(cages, self.bind(state).rotations(cages))]
+        others = (each for each in self._turned if each[0] is not cages)
+        self._turned = (*own, *others)[:_MAX_TURNED]
         return own[0][1]
 
     def _surface(self, state: State, cage_vertices: tuple[FloatArray, ...]) -> FloatArray:

@@ -352,8 +352,8 @@ def _checked_finished(
         raise ConstraintError("the finished pose must have a shift for each held vertex")
     then = _checked_pose(cages, [], [], Pose(finished.cage_vertices, {}))
     _require_plausible(mesh, then)
-    own = map(_frozen_copy, (vertices, held, shifts))
-    return Finished(*own, then.cage_vertices, _frozen_copy(offset))
+    vertices, held, shifts, offset = map(_frozen_copy, (vertices, held, shifts, offset))
+    return Finished(vertices, held, shifts, then.cage_vertices, offset)
 
 
 def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:
