@@ -181,7 +181,9 @@ class PlotterTools:
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False
-        if self._plotter.notebook and notebook.is_used_by(self._plotter.theme):
+        # A QtInteractor has no such attribute.
+        is_shown_in_notebook = getattr(self._plotter, "notebook", False)
+        if is_shown_in_notebook and notebook.is_used_by(self._plotter.theme):
             name = _name_of(path)
             return notebook.add_to(self._plotter, session, path=path, name=name, keys=keys)
         editor = add_editor(self._plotter, session, keys=keys)
