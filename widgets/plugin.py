@@ -33,7 +33,8 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.regions import segment
 from vtk_segdeform.session import Session
 
-from .web import notebook
+from .hosting import add_editor, edited, session_of
+from .web import add_to_notebook, edit_in_notebook, shows_in_notebook
 
 if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
@@ -106,8 +107,8 @@ def edit(
     session = session_of(mesh)
     path = None if path is None else as_path(path)
     as_text(title, "title")
-    if notebook.is_used_by(pv.global_theme):
-        return notebook.edit(mesh, session, name=_name_of(path), keys=keys)
+    if shows_in_notebook(pv.global_theme):
+        return edit_in_notebook(mesh, session, name=_name_of(path), keys=keys)
     if not pv.OFF_SCREEN:
         require_screen()
     plotter = pv.Plotter(title=title, notebook=False)
@@ -124,15 +125,6 @@ def edit(
 
 def _name_of(path: Path | None) -> str:
     return "Untitled" if path is None else path.name
-
-
-def edited(mesh: Any, session: Session) -> Any:
-    """Return what *session* made of *mesh*, of the same type."""
-    if isinstance(mesh, Session):
-        return session
-    if isinstance(mesh, Mesh):
-        return session.mesh.with_vertices(session.vertices)
-    return session.deformed
 
 
 @pv.register_plotter_component("segdeform")
@@ -183,9 +175,9 @@ class PlotterTools:
                     actor.visibility = False
         # A QtInteractor has no such attribute.
         is_shown_in_notebook = getattr(self._plotter, "notebook", False)
-        if is_shown_in_notebook and notebook.is_used_by(self._plotter.theme):
+        if is_shown_in_notebook and shows_in_notebook(self._plotter.theme):
             name = _name_of(path)
-            return notebook.add_to(self._plotter, session, path=path, name=name, keys=keys)
+            return add_to_notebook(self._plotter, session, path=path, name=name, keys=keys)
         editor = add_editor(self._plotter, session, keys=keys)
         if path is not None:
             editor.path = path
@@ -205,19 +197,6 @@ class PlotterTools:
     def __plotter_close__(self) -> None:
         while self.added:
             self.added.pop().remove()
-
-
-def add_editor(plotter: pv.BasePlotter, session: Session, *, keys: KeyChoice) -> DeformEditor:
-    """Add an editor to the current subplot of *plotter*, aim the camera, and switch it on."""
-    from .editor import DeformEditor
-
-    editor = DeformEditor(plotter, session, keys=keys)
-    plotter.segdeform.added.append(editor)
-    if not plotter.camera_set:
-        editor.controller.camera.begin(is_aimed=False)
-        plotter.camera_set = True  # otherwise `show` would aim it again
-    editor.On()
-    return editor
 
 
 @pv.register_dataset_accessor("segdeform", pv.PolyData)
@@ -327,25 +306,3 @@ class PolyDataTools:
         if done.advice:
             _log.warning("repair: %s", done.advice)
         return closed
-
-
-def session_of(mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session) -> Session:
-    """Return a session over *mesh*; a session is returned itself.
-
-    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface.
-    """
-    if isinstance(mesh, Session):
-        return mesh
-    if isinstance(mesh, Mesh | Surface):
-        return Session(mesh)
-    if isinstance(mesh, pv.PolyData):
-        return Session(Surface(mesh))
-    blocks = list(mesh.recursive_iterator()) if isinstance(mesh, pv.MultiBlock) else []
-    surfaces = [block for block in blocks if block is not None]
-    if surfaces and all(isinstance(block, pv.PolyData) for block in surfaces):
-        first, *others = surfaces
-        return Session(Surface(first.append_polydata(*others)))
-    raise ArgumentError(
-        "mesh must be a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session; "
-        f"got {shown(mesh)}"
-    )

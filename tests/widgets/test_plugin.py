@@ -27,6 +27,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert
 from vtk_segdeform.pictures import canvas
 from vtk_segdeform.widgets import plugin
+from vtk_segdeform.widgets.hosting import session_of
 from vtk_segdeform.widgets.scene.view import View
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -332,12 +333,12 @@ def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):
     whole = pv.read(tmp_path / "bar.glb")
     assert isinstance(whole, pv.MultiBlock)
     two = pv.MultiBlock([whole, None, bar.translate((9.0, 0.0, 0.0))])
-    mesh = plugin.session_of(two).mesh
+    mesh = session_of(two).mesh
     assert mesh.n_vertices == 2 * bar.n_points
     assert_allclose(mesh.vertices.max(axis=0), np.max(bar.points + [9.0, 0.0, 0.0], axis=0))
     for wrong in (pv.MultiBlock([bar, pv.ImageData()]), pv.MultiBlock()):
         with pytest.raises(ValueError, match="a MultiBlock of PolyData, a Surface"):
-            plugin.session_of(wrong)
+            session_of(wrong)
 
 
 def test_other_types_are_refused():

@@ -9,7 +9,7 @@ The vertices of a pose do not depend on how it was reached: after undo, redo or 
 bitwise identical.  A finished pose has its own vertices, as in `finishing`; its cages are solved
 for the places of handles and fixed vertices less the shifts in it.
 
-Long by a few lines because the caches above depend on each other.
+Long because the caches above depend on each other.
 """
 
 from __future__ import annotations

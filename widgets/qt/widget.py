@@ -20,8 +20,8 @@ from qtpy import QtCore, QtGui, QtWidgets
 from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
-from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor
+from ..hosting import session_of
 from ..scene import View, set_background, set_lights
 from .first_steps import FirstSteps
 from .panel import DeformPanel
@@ -59,7 +59,7 @@ class DeformWidget(QtWidgets.QWidget):
     def __init__(self, mesh: Any, parent: Any = None, *, first_run: Any = None) -> None:
         if first_run is not None:
             require(first_run, QtCore.QSettings, "first_run")
-        session = plugin.session_of(mesh)
+        session = session_of(mesh)
         super().__init__(_checked(parent))
         self._is_closed = False
         self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
@@ -185,7 +185,7 @@ def deform_dock(view: Any, mesh: Any, parent: Any = None) -> DeformDock:
     if hasattr(view, "segdeform"):
         editor = view.segdeform.edit(mesh)
     else:
-        editor = DeformEditor(view, plugin.session_of(mesh))
+        editor = DeformEditor(view, session_of(mesh))
         editor.On()
     return DeformDock(editor, parent)
 

@@ -28,13 +28,18 @@ from typing import TYPE_CHECKING, Any
 from vtk_segdeform.errors import MissingDependencyError
 
 if TYPE_CHECKING:
+    from .notebook import add_to_notebook, edit_in_notebook, shows_in_notebook
     from .web_editor import WebEditor
 
-__all__ = ["WebEditor"]
+__all__ = ["WebEditor", "add_to_notebook", "edit_in_notebook", "shows_in_notebook"]
 
 
 def __getattr__(name: str) -> Any:
-    """Import `WebEditor` when it is first used, because trame is optional."""
+    """Import a name when it is first used: trame is optional, and `serving` loads no VTK."""
+    if name in {"add_to_notebook", "edit_in_notebook", "shows_in_notebook"}:
+        from . import notebook
+
+        return getattr(notebook, name)
     if name != "WebEditor":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.errors import SegDeformError
+from vtk_segdeform.files import replacing
 from vtk_segdeform.models import cactus
 from vtk_segdeform.session import Session, save_session
 
@@ -61,7 +62,8 @@ class Autosave:
             return
         try:
             save_session(self._place, session, view=controller.camera.settings(controller.mode))
-            _name_file(self._place).write_text(self._web.model.name, encoding="utf-8")
+            with replacing(_name_file(self._place)) as draft:
+                draft.write_text(self._web.model.name, encoding="utf-8")
             self._saved = state
         except SegDeformError as error:
             self._saved = state  # tried again after the next change

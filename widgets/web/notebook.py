@@ -31,6 +31,8 @@ from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.pictures import require_offscreen
 from vtk_segdeform.session import Session
 
+from ..hosting import add_editor, edited
+
 if TYPE_CHECKING:
     from ..editor import DeformEditor, KeyChoice
     from .pictures import Pictures
@@ -50,7 +52,7 @@ _CHOOSE = (
 )
 
 
-def is_used_by(theme: Any) -> bool:
+def shows_in_notebook(theme: Any) -> bool:
     """Return whether plotters with this *theme* show in the notebook that runs this code."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     has_kernel = getattr(shell, "kernel", None) is not None
@@ -86,8 +88,6 @@ class NotebookEditor:
     @property
     def mesh(self) -> Any:
         """The deformed surface as it is now, of the type that was given to `edit`."""
-        from ..plugin import edited
-
         return edited(self._given, self.session)
 
     @property
@@ -155,7 +155,7 @@ class NotebookEditor:
         return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(values)
 
 
-def edit(given: Any, session: Session, *, name: str, keys: KeyChoice) -> NotebookEditor:
+def edit_in_notebook(given: Any, session: Session, *, name: str, keys: KeyChoice) -> NotebookEditor:
     """Return the editor of *session*, served, or a picture and what would be needed."""
     if _backend(pv.global_theme) not in _LIVE:
         return NotebookEditor(given, session, None, _CHOOSE)
@@ -167,12 +167,10 @@ def edit(given: Any, session: Session, *, name: str, keys: KeyChoice) -> Noteboo
     return editor
 
 
-def add_to(
+def add_to_notebook(
     plotter: Any, session: Session, *, path: Path | None, name: str, keys: KeyChoice
 ) -> DeformEditor:
     """Add an editor to *plotter*, whose `show` then shows the page of its first editor."""
-    from ..plugin import add_editor
-
     is_first = "show" not in vars(plotter)
     web_editor = _web_editor() if is_first else None
     if web_editor is None:
@@ -260,7 +258,7 @@ def _encoded(pictures: Pictures) -> str:
 
 def _picture_of(session: Session) -> str:
     """Return a picture of *session* as an editor shows it first."""
-    from ..plugin import add_editor
+    from ..hosting import add_editor
     from ..scene import set_background, set_lights
     from .pictures import Pictures
 

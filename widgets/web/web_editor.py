@@ -31,8 +31,8 @@ from vtk_segdeform.checks import as_text
 from vtk_segdeform.pictures import require_offscreen
 from vtk_segdeform.session import Session
 
-from .. import plugin  # registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor, KeyChoice, keys_of
+from ..hosting import add_editor, session_of
 from ..scene import set_background, set_lights
 from .page_drawing import PageDrawing, Surface, Update
 from .page_model import PageModel
@@ -101,7 +101,7 @@ class WebEditor:
         folder: Path | None = None,
         upload_limit: int = UPLOAD_LIMIT,
     ) -> None:
-        session = plugin.session_of(mesh)
+        session = session_of(mesh)
         as_text(name, "name")
         require_offscreen()
         own = Path(tempfile.gettempdir()) / f"segdeform-{secrets.token_hex(16)}"
@@ -116,7 +116,7 @@ class WebEditor:
             set_background(self.plotter.renderer)
         timers = Timers(self.plotter.iren.interactor)  # before the editor creates the first one
         table = {**keys_of(keys).changes, **_NO_KEYS}
-        self.editor: DeformEditor = plugin.add_editor(self.plotter, session, keys=table)
+        self.editor: DeformEditor = add_editor(self.plotter, session, keys=table)
         self.editor.controller.messages.show_line(False)  # which the page shows
         if self._is_plotter_ours:
             self.plotter.show(interactive=False, auto_close=False)

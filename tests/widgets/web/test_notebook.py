@@ -102,8 +102,11 @@ def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, address: s
     assert status(second) == 200
 
 
-def test_a_page_that_ends_its_server_does_not_end_the_kernel(cells: Kernel, address: str) -> None:
-    cells.run("editor.web.server.protocol.exit(); await asyncio.sleep(0.3)")  # application.exit
+def test_a_page_cannot_end_its_server_and_the_end_of_that_does_not_end_the_kernel(
+    cells: Kernel, address: str
+) -> None:
+    assert cells.value("editor.web.server.protocol.exit is None") == "True"  # application.exit
+    cells.run("await editor.web.server.stop(); await asyncio.sleep(0.3)")
     cells.wait("not editor.is_live")
     assert status(address) is None
     assert cells.value("editor.session.position") == "0"

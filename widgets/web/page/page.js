@@ -184,10 +184,8 @@ const Page = {
   },
   template: `
     <div class="sd" :class="{ dark }" @click="settle" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
-      <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark, extended, setDrawable,
-        forget, closeSteps, cardIcon, touchSentence }"></slot>
       <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
-        forget, closeSteps, cardIcon, preview, jump }"></slot>
+        extended, setDrawable, forget, closeSteps, cardIcon, preview, jump }"></slot>
       <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
       <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">
         <span>Drop to open</span></div>

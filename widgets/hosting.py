@@ -1,0 +1,60 @@
+"""What every host of the editor does: sessions from surfaces, editors in plotters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pyvista as pv
+
+from vtk_segdeform.checks import shown
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.io import Surface
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.session import Session
+
+if TYPE_CHECKING:
+    from .editor import DeformEditor, KeyChoice
+
+
+def session_of(mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session) -> Session:
+    """Return a session over *mesh*; a session is returned itself.
+
+    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface.
+    """
+    if isinstance(mesh, Session):
+        return mesh
+    if isinstance(mesh, Mesh | Surface):
+        return Session(mesh)
+    if isinstance(mesh, pv.PolyData):
+        return Session(Surface(mesh))
+    blocks = list(mesh.recursive_iterator()) if isinstance(mesh, pv.MultiBlock) else []
+    surfaces = [block for block in blocks if block is not None]
+    if surfaces and all(isinstance(block, pv.PolyData) for block in surfaces):
+        first, *others = surfaces
+        return Session(Surface(first.append_polydata(*others)))
+    raise ArgumentError(
+        "mesh must be a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session; "
+        f"got {shown(mesh)}"
+    )
+
+
+def edited(mesh: Any, session: Session) -> Any:
+    """Return what *session* made of *mesh*, of the same type."""
+    if isinstance(mesh, Session):
+        return session
+    if isinstance(mesh, Mesh):
+        return session.mesh.with_vertices(session.vertices)
+    return session.deformed
+
+
+def add_editor(plotter: pv.BasePlotter, session: Session, *, keys: KeyChoice) -> DeformEditor:
+    """Add an editor to the current subplot of *plotter*, aim the camera, and switch it on."""
+    from .editor import DeformEditor
+
+    editor = DeformEditor(plotter, session, keys=keys)
+    plotter.segdeform.added.append(editor)
+    if not plotter.camera_set:
+        editor.controller.camera.begin(is_aimed=False)
+        plotter.camera_set = True  # otherwise `show` would aim it again
+    editor.On()
+    return editor
