@@ -20,6 +20,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
+from .. import plugin  # noqa: F401 - registers `segdeform` on plotters even without entry points
 from ..editor import DeformEditor
 from ..hosting import session_of
 from ..scene import View, set_background, set_lights
