@@ -8,6 +8,8 @@ from collections.abc import Iterator
 import pytest
 import pyvista as pv
 
+from vtk_segdeform.widgets.editor import finishing
+
 
 @pytest.fixture(scope="module", autouse=True)
 def in_haste() -> Iterator[None]:
@@ -20,3 +22,9 @@ def in_haste() -> Iterator[None]:
     yield
     gc.enable()
     pv.global_theme.anti_aliasing = smooth
+
+
+@pytest.fixture(autouse=True)
+def poses_are_not_finished(monkeypatch):
+    """Leave poses as they are after a drag: a later change would be saved once more."""
+    monkeypatch.setattr(finishing, "MOST_VERTICES", 0)
