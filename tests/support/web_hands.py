@@ -11,7 +11,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, TypeVar
 
-from chromium import Chromium, Page
+from chromium import Chromium, Page, PageError
 
 T = TypeVar("T")
 _SHOWN = "Number(document.querySelector('canvas')?.dataset.number) > 0"
@@ -70,7 +70,11 @@ class Served:
     def page(self, browser: Chromium, **keywords: Any) -> Page:
         """Open the page, and wait for its first picture."""
         page = browser.page(self.url, **keywords)
-        page.wait(_SHOWN)
+        try:
+            page.wait(_SHOWN, 10.0)
+        except PageError:  # once in some hundred loads the first picture does not come
+            page.go(self.url)
+            page.wait(_SHOWN, 60.0)
         self.wait(lambda: self.is_at_rest)
         return page
 
