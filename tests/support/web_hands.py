@@ -72,7 +72,7 @@ class Served:
         page = browser.page(self.url, **keywords)
         try:
             page.wait(_SHOWN, 10.0)
-        except PageError:  # once in some hundred loads the first picture does not come
+        except PageError:  # seen once on a busy machine: no first picture
             page.go(self.url)
             page.wait(_SHOWN, 60.0)
         self.wait(lambda: self.is_at_rest)
