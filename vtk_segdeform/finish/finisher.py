@@ -208,7 +208,7 @@ class Finisher:
         return x if np.isfinite(x).all() else end
 
     def is_better(self, begin: FloatArray, end: FloatArray) -> bool:
-        """Return whether *end* has less energy than *begin*, and no more folds."""
+        """Return whether *end* has lower energy than *begin* without additional folds."""
         shares, folds = [np.full((len(begin), 1), SHARE)], Folds.of(self._mesh)
         before, after = (self._evaluated(x, shares).value for x in (begin, end))
         return after < before and bool(folds.at(end).sum() <= folds.at(begin).sum())

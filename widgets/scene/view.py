@@ -230,7 +230,7 @@ class View(Projection):
         return _once(lambda: self.renderer.RemoveObserver(tag))
 
     def lay_out(self) -> None:
-        """Call what `before_render` calls, without drawing: the host draws by itself."""
+        """Run the callbacks of `before_render` without drawing, for hosts that draw themselves."""
         self.renderer.InvokeEvent("StartEvent")
 
     def every(self, milliseconds: int, callback: Callable[[], None]) -> Stop:
