@@ -416,7 +416,8 @@ class Controller:
         return confined_path(self.view.interactor, self.file.path)
 
     def save(self) -> None:
-        """Write the session to the file."""
+        """Write the session to the file, in the pose that is shown."""
+        self.finishing.interrupt()
         place = self.place
         self.file.write(self.session, place, self.camera.settings(self._mode))
         self.say(f"Saved to {place}")

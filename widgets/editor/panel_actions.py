@@ -192,6 +192,7 @@ def exporting(path: Path) -> Action:
         session = controller.session
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
+        controller.finishing.interrupt()
         session.write_deformed(path)
         controller.say(f"Mesh saved to {path}")
 

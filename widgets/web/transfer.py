@@ -133,6 +133,7 @@ class Transfer:
         editor, session = self._editor, self._editor.session
         if editor.is_busy or session.is_dragging:
             raise SessionError("Finish the drag or the work before downloading.")
+        editor.controller.finishing.interrupt()
         if place.suffix != _SESSION:
             session.write_deformed(place)
             return

@@ -9,10 +9,10 @@ import pytest
 from hands import plain_view
 from test_editor import Bench, bench, pull_handle, ready  # noqa: F401 - two of them are fixtures
 
-from vtk_segdeform import load_session
+from vtk_segdeform import load_session, read_mesh
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session import save_session
-from vtk_segdeform.widgets.editor import finishing, finishing_after_drags, opening
+from vtk_segdeform.widgets.editor import exporting, finishing, finishing_after_drags, opening
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.scene import glide
 
@@ -87,6 +87,29 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
     bench.editor.do(finishing_after_drags(False))
     bench.hand.tick()
     assert running.fraction is None
+
+
+@pytest.mark.parametrize("write", ["session", "mesh"])
+def test_what_is_saved_is_what_was_shown_and_is_not_changed_later(bench, tmp_path, write):  # noqa: F811
+    bench.editor.path = tmp_path / "work.segdeform"
+    mesh_file = tmp_path / "posed.ply"
+    bench.type("4")
+    running = bench.editor.controller.finishing
+    pull_handle(bench, (5, 8))
+    until(bench, lambda: running.fraction is not None)
+    shown = np.array(bench.editor.widgets.surface.points)
+    if write == "session":
+        bench.type("ctrl+s")
+        written = load_session(bench.editor.path).vertices
+    else:
+        bench.editor.do(exporting(mesh_file))
+        written = read_mesh(mesh_file).vertices
+    assert np.allclose(written, shown, rtol=0.0, atol=1e-6)
+    assert running.fraction is None
+    for _ in range(30):
+        bench.hand.tick()
+    assert np.array_equal(bench.editor.widgets.surface.points, shown)
+    assert bench.editor.controller.file.is_modified(bench.session) == (write == "mesh")
 
 
 def grabbed(bench, fraction=0.6):  # noqa: F811
