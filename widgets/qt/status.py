@@ -16,7 +16,7 @@ from ..panel import Word, status, tooltip
 from .controls import Press, push_button
 
 _LINES = 2
-_BAR_LETTERS = 18  # width of the progress bar
+_BAR_LETTERS = 20  # width of the progress bar
 
 
 class StatusPart(QtWidgets.QWidget):
@@ -82,6 +82,7 @@ class StatusPart(QtWidgets.QWidget):
         self.sign.setVisible(now.is_error)
         for each in (self.bar, self.cancel):
             each.setVisible(now.cancel.visible)
+        self.bar.setFormat("%p %" if now.is_busy else f"{now.work} %p %")  # a job is in the words
         self.bar.setValue(round(1000.0 * (now.progress or 0.0)))
         self.cancel.setToolTip(tooltip(now.cancel, self._editor.keys))
 
