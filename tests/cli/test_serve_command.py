@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import configparser
+import re
 import socket
+from pathlib import Path
 
 import pytest
 
 from vtk_segdeform.cli import main, serving
+
+LIBRARIES = serving._LIBRARIES
 
 
 @pytest.fixture(autouse=True)
@@ -43,3 +48,11 @@ def test_a_missing_library_is_named_with_its_cure(capsys, monkeypatch):
     assert "no_such_library; install it with pip install 'vtk-segdeform[web]'" in (
         capsys.readouterr().err
     )
+
+
+def test_the_required_libraries_are_those_that_the_extra_installs():
+    setup = configparser.ConfigParser()
+    setup.read(Path(__file__).parents[2] / "setup.cfg", encoding="utf-8")
+    extra = setup["options.extras_require"]["web"].split("\n")
+    installed = {re.split("[<>=!;]", line)[0].strip().replace("-", "_") for line in extra}
+    assert set(LIBRARIES) <= installed

@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # not imported at run time, so that the server loads neither 
     from ..widgets.web.serving import Server
     from .outputs import Say
 
-_LIBRARIES = ("aiohttp", "trame", "trame_rca", "trame_vuetify")
+_LIBRARIES = "aiohttp", "trame", "trame_vuetify"
 
 
 def serve(options: Namespace, say: Say, progress: Progress) -> bool:

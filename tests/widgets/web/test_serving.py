@@ -61,6 +61,7 @@ def test_the_page_has_a_cookie_of_its_own_and_no_token(server, do):
     assert "token" not in headers["Location"]
     cookie = headers["Set-Cookie"]
     assert cookie.startswith(f"segdeform-{server.port}=")
+    assert "Max-Age=" in cookie  # a browser that was killed continues
     for attribute in ("HttpOnly", "SameSite=Strict", f"Path={headers['Location']}"):
         assert attribute in cookie
     assert headers["Referrer-Policy"] == "no-referrer"

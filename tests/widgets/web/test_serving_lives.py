@@ -29,9 +29,8 @@ ON_LINUX = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="rea
 # The command line with a stand-in for the client process.
 PROGRAM = f"""
 import sys, tempfile
-from vtk_segdeform.cli import main, serving
+from vtk_segdeform.cli import main
 from vtk_segdeform.widgets.web.serving import server
-serving._LIBRARIES = ()
 server.client_command = lambda file: {STANDIN!r}
 tempfile.tempdir = sys.argv[1]
 sys.exit(main(["serve", "--port", "0"]))

@@ -1,7 +1,8 @@
 """Who may talk to the server: the token, cookies, Host, Origin and the headers of every answer.
 
 The address that the server prints contains a token made for this run.  Opening it starts a client
-and sets a cookie with a key that only this client has, valid below its own path ``/s/ID/``.
+and sets a cookie with a key that only this client has, valid below its own path ``/s/ID/``.  It
+outlives the browser, so that a page whose browser was killed is continued by the next one.
 
 A page of another site cannot use that cookie (SameSite, HttpOnly), cannot open a WebSocket or post
 (its Origin differs from our Host), and cannot give our address another name (Host).  Host is
@@ -19,6 +20,7 @@ from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
+_DAYS = 90  # that a browser keeps a cookie: longer than a client is expected to live
 ANY = frozenset({"0.0.0.0", "::", ""})  # reached by all names of the machine
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::\d{1,5})?")
 
@@ -69,8 +71,11 @@ class Access:
             refuse(403, "Open the address that segdeform serve printed; it contains a token.")
 
     def set_cookie(self, response: web.StreamResponse, key: str, path: str) -> None:
-        """Let the browser send *key* with requests below *path*."""
-        response.set_cookie(self._cookie, key, path=path, httponly=True, samesite="Strict")
+        """Let the browser send *key* with requests below *path*, also after a restart."""
+        age = _DAYS * 24 * 3600
+        response.set_cookie(
+            self._cookie, key, path=path, max_age=age, httponly=True, samesite="Strict"
+        )
 
     def has_key(self, request: web.Request, key: str) -> bool:
         """Return whether *request* has the cookie with *key*."""

@@ -1,0 +1,209 @@
+"""``segdeform serve`` as it is started by hand: in short, and by real pages in the campaign."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("trame")
+aiohttp = pytest.importorskip("aiohttp")
+
+from chromium import CTRL, Chromium, Page, needs_chromium
+from visitors import Visitor
+from web_hands import line, only_file
+
+from vtk_segdeform import load_session, models
+from vtk_segdeform.io import write_mesh
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+BYTES = 5_000_000  # of an upload, at most
+
+
+class Program:
+    """``segdeform serve FILE``, run as a user runs it."""
+
+    def __init__(self, file: Path, folder: Path, *options: str) -> None:
+        command = [sys.executable, "-m", "vtk_segdeform", "serve", str(file), "--port", "0"]
+        self.process = subprocess.Popen(
+            [*command, *options], stdout=subprocess.PIPE, text=True,
+            env={**os.environ, "TMPDIR": str(folder)},
+        )  # fmt: skip
+        said = self.process.stdout.readline()
+        self.address = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", said)[0]
+
+    @property
+    def children(self) -> list[int]:
+        """The client processes."""
+        task = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
+        return [int(word) for word in task.read_text().split()]
+
+    @property
+    def left_behind(self) -> tuple[int, int, int]:
+        """Numbers of threads and open files, and resident memory in bytes."""
+        of = Path(f"/proc/{self.process.pid}")
+        pages = int((of / "statm").read_text().split()[1])
+        threads, files = len([*(of / "task").iterdir()]), len([*(of / "fd").iterdir()])
+        return threads, files, pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@contextmanager
+def served(folder: Path, *options: str, n: int = 700) -> Iterator[Program]:
+    write_mesh(folder / "cactus.ply", models.cactus(n))
+    program = Program(folder / "cactus.ply", folder, *options)
+    try:
+        yield program
+    finally:
+        program.process.terminate()
+        program.process.communicate(timeout=60)
+
+
+def until(true: Callable[[], object], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "did not happen"
+        time.sleep(0.1)
+
+
+def opened(browser: Chromium, address: str) -> Page:
+    """Open *address* and wait for the first picture and the end of the preparation."""
+    page = browser.page(address)
+    rested(page)
+    return page
+
+
+def rested(page: Page) -> None:
+    """Wait until the page shows a picture, and nothing is computed."""
+    page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0", 120.0)
+    since = time.monotonic()
+    while time.monotonic() < since + 1.0:
+        if page.evaluate("!!document.querySelector('.sd-work, .sd-progress')"):
+            since = time.monotonic()
+        time.sleep(0.05)
+
+
+def pulled(page: Page, by: tuple[float, float], *, release: bool = True) -> None:
+    """Pull the surface in the middle of the view."""
+    x, y = page.centre(".sd-canvas")
+    page.drag(line((x, y), (x + by[0], y + by[1]), 8), pause=0.05, release=release)
+
+
+def saved(page: Page, folder: Path) -> object:
+    """Download the session of *page* and return it."""
+    folder.mkdir()
+    page.save_downloads(folder)
+    page.key("s", modifiers=CTRL)
+    return load_session(only_file(folder, "*.segdeform"))
+
+
+def test_the_program_serves_the_editor(tmp_path: Path) -> None:
+    async def visit(address: str) -> tuple[int, str]:
+        base, token = address.split("/?token=")
+        server = SimpleNamespace(
+            port=int(base.rpartition(":")[2]), access=SimpleNamespace(token=token)
+        )
+        async with aiohttp.ClientSession(cookie_jar=aiohttp.DummyCookieJar()) as session:
+            guest = Visitor(server, session)
+            _, _, headers = await guest.get(f"/?token={token}")
+            guest.path, guest.cookie = headers["Location"], headers["Set-Cookie"].split(";")[0]
+            await guest.get(f"{guest.path}index.html")
+            status, text, _ = await guest.get(f"{guest.path}index.html")
+            return status, text
+
+    with served(tmp_path) as program:
+        status, text = asyncio.run(visit(program.address))
+        assert status == 200
+        assert "<html" in text
+        assert len(program.children) == 1
+
+
+@pytest.mark.campaign
+@needs_chromium
+def test_two_pages_do_not_see_each_other(tmp_path: Path) -> None:
+    with served(tmp_path) as program, Chromium(900, 600) as browser:
+        one, other = opened(browser, program.address), opened(browser, program.address)
+        pulled(one, (60.0, 10.0))
+        pulled(other, (-40.0, 20.0))
+        rested(one)
+        rested(other)
+        first, second = saved(one, tmp_path / "one"), saved(other, tmp_path / "other")
+        assert len(first.history) == len(second.history) == 2
+        for session in (first, second):
+            assert abs(session.volume_change) < 1e-12
+        assert np.abs(first.vertices - second.vertices).max() > 0.05 * first.mesh.diagonal
+
+
+@pytest.mark.campaign
+@needs_chromium
+def test_a_browser_killed_in_a_drag_loses_nothing(tmp_path: Path) -> None:
+    profile = tmp_path / "profile"
+    with served(tmp_path) as program:
+        with Chromium(900, 600, profile) as browser:
+            page = opened(browser, program.address)
+            pulled(page, (60.0, 10.0))
+            rested(page)
+            before = saved(page, tmp_path / "before")
+            pulled(page, (-30.0, 30.0), release=False)
+            place = page.evaluate("location.href")
+            time.sleep(2.0)  # for the browser to store its cookies, as it does now and then
+            browser.kill()
+        with Chromium(900, 600, profile) as browser:
+            page = opened(browser, place)
+            after = saved(page, tmp_path / "after")
+        assert len(program.children) == 1
+    assert len(after.history) >= len(before.history)
+    assert abs(after.volume_change) < 1e-12
+    after.undo()
+    np.testing.assert_array_equal(after.vertices, before.vertices)
+
+
+@pytest.mark.campaign
+@needs_chromium
+def test_fifty_pages_leave_nothing_behind(tmp_path: Path) -> None:
+    with served(tmp_path, "--keep", "1") as program, Chromium(900, 600) as browser:
+        first = None
+        for k in range(50):
+            page = browser.page(program.address)
+            page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0", 120.0)
+            page.close()
+            until(lambda: not program.children)
+            if k == 4:
+                first = program.left_behind
+        threads, files, memory = program.left_behind
+        print(f"after 5 and 50 pages: threads, files, bytes {first}, {(threads, files, memory)}")
+        assert threads <= first[0]
+        assert files <= first[1]
+        assert memory < first[2] + 3e6
+        (folder,) = tmp_path.glob("segdeform-serve-*")
+        assert [each.name for each in folder.iterdir()] == ["lock"]
+
+
+@pytest.mark.campaign
+@needs_chromium
+def test_an_upload_of_two_gigabytes_is_refused_by_name(tmp_path: Path) -> None:
+    large = tmp_path / "large.ply"
+    with large.open("wb") as file:
+        file.truncate(2_000_000_000)
+    with served(tmp_path, "--upload-limit", "5") as program, Chromium(900, 600) as browser:
+        page = opened(browser, program.address)
+        memory = program.left_behind[2]
+        page.choose_files(".sd-file", large)
+        with suppress(TimeoutError):
+            page.wait("document.body.innerText.includes('larger than')", 120.0)
+        assert "larger than 5 MB, the limit of this server" in page.evaluate(
+            "document.body.innerText"
+        )
+        assert program.left_behind[2] < memory + 20e6
+        pulled(page, (60.0, 10.0))  # and the page works on
+        rested(page)
+        assert len(saved(page, tmp_path / "after").history) == 2
