@@ -6,8 +6,7 @@
         page.drag([(100, 100), (160, 120)])
         page.key("z")
 
-Pages do not share cookies or storage: each has a browser context of its own, unless the browser is
-given a profile.
+Pages do not share cookies or storage: each has a browser context of its own.
 """
 
 from __future__ import annotations
@@ -64,22 +63,12 @@ class PageError(RuntimeError):
 
 
 class Chromium:
-    """A browser process of its own.
+    """A browser process of its own, with a profile that is deleted at the end."""
 
-    Parameters
-    ----------
-    width, height : int
-        Size of its pages in CSS pixels.
-    profile : Path, optional
-        Folder of the profile, which is kept, and which the pages share; by default a new one is
-        deleted at the end, and pages share nothing.
-    """
-
-    def __init__(self, width: int = 1200, height: int = 800, profile: Path | None = None) -> None:
+    def __init__(self, width: int = 1200, height: int = 800) -> None:
         path = chromium_path()
         assert path is not None
-        self._profile = profile or tempfile.mkdtemp(prefix="chromium-")
-        self._keeps_profile = profile is not None
+        self._profile = tempfile.mkdtemp(prefix="chromium-")
         # Chromium reads commands from descriptor 3 and writes answers to 4.
         theirs_in, self._out = os.pipe()
         self._in, theirs_out = os.pipe()
@@ -122,10 +111,10 @@ class Chromium:
         touch: bool = False,
     ) -> Page:
         """Open *url* in a context of its own, with a viewport of *size* in CSS pixels."""
-        apart = {} if self._keeps_profile else self.call("Target.createBrowserContext")
-        target = self.call("Target.createTarget", url="about:blank", **apart)
+        context = self.call("Target.createBrowserContext")["browserContextId"]
+        target = self.call("Target.createTarget", url="about:blank", browserContextId=context)
         session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        page = Page(self, session["sessionId"], target["targetId"], apart.get("browserContextId"))
+        page = Page(self, session["sessionId"], target["targetId"], context)
         width, height = size or self._size
         for domain in ("Page", "Runtime", "Network", "Log"):
             page.call(f"{domain}.enable")
@@ -192,16 +181,13 @@ class Chromium:
         for name in ("_in", "_out"):
             if (fd := self.__dict__.pop(name, None)) is not None:
                 os.close(fd)
-        if not self._keeps_profile:
-            shutil.rmtree(self._profile, ignore_errors=True)
+        shutil.rmtree(self._profile, ignore_errors=True)
 
 
 class Page:
     """One page; coordinates are CSS pixels from the upper left."""
 
-    def __init__(
-        self, browser: Chromium, session: str, target: str, context: str | None
-    ) -> None:
+    def __init__(self, browser: Chromium, session: str, target: str, context: str) -> None:
         self.browser, self._session, self._target = browser, session, target
         self._context = context
         self._held = "none"
@@ -331,9 +317,8 @@ class Page:
 
     def save_downloads(self, folder: Path) -> None:
         """Save downloads into *folder*, under their suggested names."""
-        apart = {} if self._context is None else {"browserContextId": self._context}
         self.browser.call("Browser.setDownloadBehavior", behavior="allow",
-                          downloadPath=str(folder), **apart)  # fmt: skip
+                          browserContextId=self._context, downloadPath=str(folder))  # fmt: skip
 
     def picture(self, path: Path) -> None:
         """Save a PNG of the page."""
@@ -342,10 +327,7 @@ class Page:
 
     def close(self) -> None:
         """Close the page and its context."""
-        if self._context is None:
-            self.browser.call("Target.closeTarget", targetId=self._target)
-        else:
-            self.browser.call("Target.disposeBrowserContext", browserContextId=self._context)
+        self.browser.call("Target.disposeBrowserContext", browserContextId=self._context)
 
     def _mouse(self, kind: str, point: tuple[float, float], button: str, modifiers: int) -> None:
         held = 0 if kind == "mouseReleased" else _BUTTONS[button]

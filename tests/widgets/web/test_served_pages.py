@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,11 +23,10 @@ from chromium import CTRL, Chromium, Page, needs_chromium
 from visitors import Visitor
 from web_hands import line, only_file
 
-from vtk_segdeform import load_session, models
+from vtk_segdeform import Session, load_session, models
 from vtk_segdeform.io import write_mesh
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-BYTES = 5_000_000  # of an upload, at most
 
 
 class Program:
@@ -98,12 +97,17 @@ def pulled(page: Page, by: tuple[float, float], *, release: bool = True) -> None
     page.drag(line((x, y), (x + by[0], y + by[1]), 8), pause=0.05, release=release)
 
 
-def saved(page: Page, folder: Path) -> object:
+def saved(page: Page, folder: Path) -> Session:
     """Download the session of *page* and return it."""
     folder.mkdir()
     page.save_downloads(folder)
     page.key("s", modifiers=CTRL)
     return load_session(only_file(folder, "*.segdeform"))
+
+
+def moved(session: Session, vertices: object) -> float:
+    """Return the largest distance of *session*'s pose from *vertices*, in diagonals."""
+    return float(np.abs(session.vertices - vertices).max() / session.mesh.diagonal)
 
 
 def test_the_program_serves_the_editor(tmp_path: Path) -> None:
@@ -137,34 +141,34 @@ def test_two_pages_do_not_see_each_other(tmp_path: Path) -> None:
         rested(one)
         rested(other)
         first, second = saved(one, tmp_path / "one"), saved(other, tmp_path / "other")
-        assert len(first.history) == len(second.history) == 2
         for session in (first, second):
+            assert moved(session, session.mesh.vertices) > 0.03
             assert abs(session.volume_change) < 1e-12
-        assert np.abs(first.vertices - second.vertices).max() > 0.05 * first.mesh.diagonal
+        assert moved(first, second.vertices) > 0.05
 
 
 @pytest.mark.campaign
 @needs_chromium
 def test_a_browser_killed_in_a_drag_loses_nothing(tmp_path: Path) -> None:
-    profile = tmp_path / "profile"
     with served(tmp_path) as program:
-        with Chromium(900, 600, profile) as browser:
+        with Chromium(900, 600) as browser:
             page = opened(browser, program.address)
             pulled(page, (60.0, 10.0))
             rested(page)
             before = saved(page, tmp_path / "before")
             pulled(page, (-30.0, 30.0), release=False)
-            place = page.evaluate("location.href")
-            time.sleep(2.0)  # for the browser to store its cookies, as it does now and then
             browser.kill()
-        with Chromium(900, 600, profile) as browser:
-            page = opened(browser, place)
+        time.sleep(6.0)  # until it is no reload
+        with Chromium(900, 600) as browser:
+            page = opened(browser, program.address)
             after = saved(page, tmp_path / "after")
+            page.key("z")
+            rested(page)
+            undone = saved(page, tmp_path / "undone")
         assert len(program.children) == 1
-    assert len(after.history) >= len(before.history)
     assert abs(after.volume_change) < 1e-12
-    after.undo()
-    np.testing.assert_array_equal(after.vertices, before.vertices)
+    assert moved(after, before.vertices) > 0.03
+    np.testing.assert_array_equal(undone.vertices, before.vertices)
 
 
 @pytest.mark.campaign
@@ -198,12 +202,9 @@ def test_an_upload_of_two_gigabytes_is_refused_by_name(tmp_path: Path) -> None:
         page = opened(browser, program.address)
         memory = program.left_behind[2]
         page.choose_files(".sd-file", large)
-        with suppress(TimeoutError):
-            page.wait("document.body.innerText.includes('larger than')", 120.0)
-        assert "larger than 5 MB, the limit of this server" in page.evaluate(
-            "document.body.innerText"
-        )
+        page.wait("document.body.innerText.includes('large.ply is larger than 5 MB')", 120.0)
         assert program.left_behind[2] < memory + 20e6
         pulled(page, (60.0, 10.0))  # and the page works on
         rested(page)
-        assert len(saved(page, tmp_path / "after").history) == 2
+        session = saved(page, tmp_path / "after")
+        assert moved(session, session.mesh.vertices) > 0.03

@@ -77,7 +77,8 @@ def test_the_life_of_two_clients(do, tmp_path):
                 assert "pulled" not in text
             assert await one.load() == (first, "pulled")
 
-            status, text, _ = await third.get(f"/?token={server.access.token}")
+            async with one.socket(), other.socket():
+                status, text, _ = await third.get(f"/?token={server.access.token}")
             assert (status, text[:27]) == (503, "All 2 clients of this serve")
 
             async with one.socket() as socket:
@@ -118,6 +119,38 @@ def test_a_client_ends_some_time_after_its_page(do, tmp_path):
             await until(lambda: [each.name for each in folder.iterdir()] == ["lock"])
             assert server.clients.is_empty
             assert (await guest.get(guest.path))[0] == 403
+
+    do(story())
+
+
+@ON_LINUX
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_the_address_continues_the_work_of_a_page_that_has_gone_on_this_machine_only(
+    do, tmp_path, host
+):
+    async def story():
+        async with serving(tmp_path, replace(LIMITS, keep=KEEP)) as (server, visitor):
+            server.host = host
+            one, other = visitor(), visitor()
+            first, _ = await one.enter()
+            async with one.socket() as socket:
+                await socket.send_str("set pulled")
+                await socket.receive(PATIENCE)
+                await pass_by(100.0)
+                second, _ = await other.enter()
+                assert second != first  # whose page is open
+            await pass_by(1.0)  # it may be loaded again
+            later = visitor()
+            third, _ = await later.enter()
+            assert third not in (first, second)
+            await pass_by(100.0)
+            again = visitor()
+            found = await again.enter()
+            if host == "127.0.0.1":
+                assert found == (first, "pulled")
+            else:
+                assert found[0] not in (first, second, third)
+                assert found[1] == ""
 
     do(story())
 

@@ -29,6 +29,7 @@ from .limits import Limits
 _log = logging.getLogger(__name__)
 _NO_START = "The editor could not be started."
 _MOMENT = 1.0  # seconds
+_RELOAD = 5.0  # seconds
 _LAST_WORDS = 4000  # bytes of the error output that are kept
 _RUN = (
     "import runpy, sys; sys.path[:] = {path!r}; "
@@ -77,7 +78,7 @@ class Client:
         self._task: asyncio.Task[None] | None = None
         self._started, self._is_ending, self._is_closed = asyncio.Event(), False, False
         self._pid: int | None = None
-        self._visits, self._seen = 0, asyncio.get_running_loop().time()
+        self._had_page, self._visits, self._seen = False, 0, asyncio.get_running_loop().time()
 
     @property
     def is_running(self) -> bool:
@@ -88,6 +89,18 @@ class Client:
     def absent(self) -> float:
         """Seconds since the last request was answered or the last WebSocket closed."""
         return 0.0 if self._visits else asyncio.get_running_loop().time() - self._seen
+
+    @property
+    def is_left(self) -> bool:
+        """Whether it had a page, which is gone for longer than a reload takes."""
+        return self._had_page and self.absent > _RELOAD
+
+    @contextmanager
+    def page(self) -> Iterator[None]:
+        """Count the WebSocket of a page while it lasts."""
+        self._had_page = True
+        with self.visit():
+            yield
 
     @contextmanager
     def visit(self) -> Iterator[None]:

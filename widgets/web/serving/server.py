@@ -1,6 +1,7 @@
 """The server in front of all client processes: addresses, pages while waiting, start and end.
 
-    /?token=...     start a client; sets its cookie and redirects to its page
+    /?token=...     start a client, or on this machine continue one that lost its page; sets its
+                    cookie and redirects to its page
     /s/ID/          its page, and everything below: passed to its process (`proxy`)
 
 The page starts the process, and starts it again if it has ended.
@@ -89,13 +90,15 @@ class Server:
 
     async def _enter(self, request: web.Request) -> web.StreamResponse:
         self.access.require_token(request)
-        if self.clients.is_full:
+        # On this machine the work is that of the same user, whose page or browser has gone.
+        client = self.clients.left() if self.is_local else None
+        if client is None and self.clients.is_full:
             refuse(
                 503,
                 f"All {self.limits.clients} clients of this server are in use. A client ends "
                 f"{self.limits.keep:.0f} s after its page was closed.",
             )
-        client = self.clients.new()
+        client = client or self.clients.new()
         path = f"/s/{client.id}/"
         response = web.Response(status=303, headers={hdrs.LOCATION: path})
         self.access.set_cookie(response, client.key, path)
@@ -114,7 +117,8 @@ class Server:
             refuse(404, "There is no such file.")
         with client.visit():
             if tail == _SOCKET and hdrs.UPGRADE in request.headers:
-                return await pass_socket(self._session, client, request, self.limits)
+                with client.page():
+                    return await pass_socket(self._session, client, request, self.limits)
             if request.method == hdrs.METH_POST:
                 return await self._upload(client, request, tail)
             if tail in _PAGES and (note := await self._start(client)):
