@@ -174,7 +174,7 @@ def test_a_browser_killed_in_a_drag_loses_nothing(tmp_path: Path) -> None:
 @pytest.mark.campaign
 @needs_chromium
 def test_fifty_pages_leave_nothing_behind(tmp_path: Path) -> None:
-    with served(tmp_path, "--keep", "1") as program, Chromium(900, 600) as browser:
+    with served(tmp_path, "--keep", "4") as program, Chromium(900, 600) as browser:
         first = None
         for k in range(50):
             page = browser.page(program.address)
@@ -183,11 +183,9 @@ def test_fifty_pages_leave_nothing_behind(tmp_path: Path) -> None:
             until(lambda: not program.children)
             if k == 4:
                 first = program.left_behind
-        threads, files, memory = program.left_behind
-        print(f"after 5 and 50 pages: threads, files, bytes {first}, {(threads, files, memory)}")
-        assert threads <= first[0]
-        assert files <= first[1]
-        assert memory < first[2] + 3e6
+        until(lambda: program.left_behind[:2] <= first[:2])  # connections are being closed
+        print(f"threads, files, bytes after 5 and 50: {first}, {program.left_behind}")
+        assert program.left_behind[2] < first[2] + 3e6
         (folder,) = tmp_path.glob("segdeform-serve-*")
         assert [each.name for each in folder.iterdir()] == ["lock"]
 
