@@ -303,6 +303,11 @@ def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar, monkeyp
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pv, "OFF_SCREEN", False)
+    monkeypatch.setattr(pv.Plotter, "show", lambda _: pytest.fail("a window was opened"))
+    with pytest.raises(MissingDependencyError, match="there is no screen"):
+        sd.edit(bar)
+    monkeypatch.setattr(plugin, "edit", lambda *_, **__: pytest.fail("edit was called"))
+    capfd.readouterr()
     assert main(["edit", str(path), "-o", str(tmp_path / "o.vtp")]) == 1
     told = capfd.readouterr().err
     assert told.count("\n") == 1

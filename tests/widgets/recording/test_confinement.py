@@ -129,17 +129,17 @@ def test_a_missing_folder_is_an_error_before_any_event(bench, tmp_path):
 @pytest.mark.parametrize(
     ("lines", "says", "limits"),
     [
-        (itertools.repeat("0 MouseMove 2 1"), "limit of 2,000 events", {"events": 2000}),
-        (itertools.repeat("# a word"), "limit of 2,000 events", {"events": 2000}),
-        (["0 Timer 100000"] * 3, "limit of 200,000 events", {}),
-        (["0 Window 16384 16384"], "16384 x 16384 exceeds the limit of 16,000,000 pixels", {}),
+        (itertools.repeat("0 MouseMove 2 1"), "2002: the limit of 2,000 events", {"events": 2000}),
+        (itertools.repeat("# a word"), "2002: the limit of 2,000 events", {"events": 2000}),
+        (["0 Timer 100000"] * 3, "4: the limit of 200,000 events", {}),
+        (["0 Window 16384 16384"], "3: .*16384 x 16384 exceeds the limit of 16,000,000 pixels", {}),
     ],
 )
 def test_a_recording_beyond_the_limits_is_refused_before_any_event(lines, says, limits):
     view = plain_view((50, 50))
     moved = []
     view.observe("MouseMoveEvent", lambda: moved.append("moved"))
-    with pytest.raises(SessionError, match=rf"^recording, line \d+: .*{says}"):
+    with pytest.raises(SessionError, match=f"^recording, line {says}"):
         replay(
             view,
             itertools.chain([TITLE, "0 MouseMove 1 1"], lines),
