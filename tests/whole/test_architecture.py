@@ -101,6 +101,7 @@ class Import(NamedTuple):
     ours: bool
 
 
+@functools.cache
 def room_of(name: str) -> str:
     """Return the room of a file or a module: the longest prefix of its name in `ROOMS`."""
     parts = name.removesuffix(".__init__").split(".")
@@ -165,12 +166,15 @@ def face(room: str) -> frozenset[str]:
     return frozenset()
 
 
-def between_rooms() -> Iterator[tuple[str, Import]]:
-    """Yield every file, faces left out, with each of its imports from another room."""
-    for name in NAMES:
-        for what in imports(name):
-            if what.ours and room_of(what.module) != room_of(name):
-                yield name, what
+@functools.cache
+def between_rooms() -> tuple[tuple[str, Import], ...]:
+    """Return every file, faces left out, with each of its imports from another room."""
+    return tuple(
+        (name, what)
+        for name in NAMES
+        for what in imports(name)
+        if what.ours and room_of(what.module) != room_of(name)
+    )
 
 
 def floors() -> dict[str, int]:

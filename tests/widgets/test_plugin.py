@@ -5,7 +5,6 @@ from __future__ import annotations
 import configparser
 import importlib
 import logging
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -212,6 +211,8 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
         ("import pyvista, vtk_segdeform", [True, True]),
         (
             "import sys, vtk_segdeform; assert 'pyvista' not in sys.modules;"
+            "import vtk_segdeform.cli.commands, vtk_segdeform.widgets.editor;"
+            "assert 'pyvista.plotting' not in sys.modules;"
             "import pyvista, vtk_segdeform.widgets.plugin",
             [True, True],
         ),
@@ -222,7 +223,8 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
         ),
     ],
 )
-def test_it_is_registered_in_any_order_and_the_package_alone_does_not_load_pyvista(imports, there):
+def test_it_is_registered_in_any_order_and_nothing_else_loads_pyvistas_plotters(imports, there):
+    """The package alone does not load pyvista, commands and the editor only its meshes."""
     code = (
         f"{imports}; import pyvista.plotting as p; "
         "print([hasattr(c, 'segdeform') for c in (pyvista.BasePlotter, pyvista.PolyData)])"
@@ -294,23 +296,22 @@ def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, ca
     assert_array_equal(convert.read_polydata(out).points, session.vertices)
 
 
-def without_screen() -> dict[str, str]:
-    """Return an environment without a screen."""
-    hidden = ("DISPLAY", "WAYLAND_DISPLAY", "PYVISTA_OFF_SCREEN")
-    return {name: value for name, value in os.environ.items() if name not in hidden}
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a screen")
-def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar):
+def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar, monkeypatch, capfd):
     path = tmp_path / "bar.vtp"
     convert.write_mesh(path, bar)
-    done = subprocess.run(
-        [sys.executable, "-m", "vtk_segdeform", "edit", str(path), "-o", str(tmp_path / "o.vtp")],
-        cwd=ROOT, env=without_screen(), capture_output=True, text=True, timeout=60,
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "no window can be opened: there is no screen; set DISPLAY" in done.stderr
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pv, "OFF_SCREEN", False)
+    monkeypatch.setattr(pv.Plotter, "show", lambda _: pytest.fail("a window was opened"))
+    with pytest.raises(MissingDependencyError, match="there is no screen"):
+        sd.edit(bar)
+    monkeypatch.setattr(plugin, "edit", lambda *_, **__: pytest.fail("edit was called"))
+    capfd.readouterr()
+    assert main(["edit", str(path), "-o", str(tmp_path / "o.vtp")]) == 1
+    told = capfd.readouterr().err
+    assert told.count("\n") == 1
+    assert "no window can be opened: there is no screen; set DISPLAY" in told
     assert list(tmp_path.iterdir()) == [path]
 
 

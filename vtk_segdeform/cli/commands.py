@@ -25,7 +25,6 @@ from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..session import Session, load_session
-from ..widgets import plugin
 from . import motion
 from .outputs import (
     HANDLE_TOLERANCE,
@@ -91,6 +90,8 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
 
 def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     """Edit a mesh or a saved session in a window; write the deformed mesh."""
+    from ..widgets import plugin  # loads pyvista's plotters, which other commands do not need
+
     del progress  # the window shows progress itself
     if options.output is not None:
         io.require_writable(options.output)

@@ -28,7 +28,8 @@ from ..errors import MeshError, MissingDependencyError
 from ..files import replacing, require_place
 from .palette import INK, PAPER
 
-Draw = Callable[[pv.Plotter], None]
+# In quotes: importing plotters, and matplotlib with them, takes most of a second.
+Draw = Callable[["pv.Plotter"], None]
 
 _HEIGHT = 800  # pixels of a picture
 _TITLE, _MARGIN = 0.1, 0.04  # of the height: title, and margins

@@ -6,6 +6,7 @@ import itertools
 import os
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hands import plain_view
@@ -15,6 +16,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.widgets import DeformEditor, ReplayLimits, replay
+from vtk_segdeform.widgets.recording import limits
 from vtk_segdeform.widgets.recording.confinement import confined, confined_path
 from vtk_segdeform.widgets.recording.reading import read_recording
 
@@ -127,20 +129,24 @@ def test_a_missing_folder_is_an_error_before_any_event(bench, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("lines", "says"),
+    ("lines", "says", "given"),
     [
-        (itertools.repeat("0 MouseMove 2 1"), "limit of 200,000 events"),
-        (itertools.repeat("# a word"), "limit of 200,000 events"),
-        (["0 Timer 100000"] * 3, "limit of 200,000 events"),
-        (["0 Window 16384 16384"], "16384 x 16384 exceeds the limit of 16,000,000 pixels"),
+        (itertools.repeat("0 MouseMove 2 1"), "2002: the limit of 2,000 events", {"events": 2000}),
+        (itertools.repeat("# a word"), "2002: the limit of 2,000 events", {"events": 2000}),
+        (["0 Timer 100000"] * 3, "4: the limit of 200,000 events", {}),
+        (["0 Window 16384 16384"], "3: .*16384 x 16384 exceeds the limit of 16,000,000 pixels", {}),
     ],
 )
-def test_a_recording_beyond_the_limits_is_refused_before_any_event(lines, says):
+def test_a_recording_beyond_the_limits_is_refused_before_any_event(lines, says, given):
     view = plain_view((50, 50))
     moved = []
     view.observe("MouseMoveEvent", lambda: moved.append("moved"))
-    with pytest.raises(SessionError, match=rf"^recording, line \d+: .*{says}"):
-        replay(view, itertools.chain([TITLE, "0 MouseMove 1 1"], lines))
+    with pytest.raises(SessionError, match=f"^recording, line {says}"):
+        replay(
+            view,
+            itertools.chain([TITLE, "0 MouseMove 1 1"], lines),
+            limits=ReplayLimits(**given),
+        )
     assert moved == []
 
 
@@ -207,13 +213,14 @@ def test_the_command_writes_only_to_the_given_folder(tmp_path, monkeypatch, caps
 def test_the_limits_are_in_the_help_and_the_messages_of_the_command(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)
-    # 100 million ticks take longer than a second on any machine.
     (tmp_path / "long.txt").write_text("\n".join([TITLE, *["0 Timer 100000"] * 1000]))
+    hours = itertools.count(step=3600)
+    monkeypatch.setattr(limits, "time", SimpleNamespace(monotonic=lambda: next(hours)))
     assert main(["replay", "long.txt", "ball.ply", "--film", "a.gif"]) == 1
     assert "long.txt, line 4: the limit of 200,000 events" in capsys.readouterr().err
-    more = ["--film", "a.gif", "--events", "1000000000", "--seconds", "1"]
+    more = ["--film", "a.gif", "--events", "1000000000", "--seconds", "7"]
     assert main(["replay", "long.txt", "ball.ply", *more]) == 1
-    assert "stopped at its limit of 1 seconds" in capsys.readouterr().err
+    assert "stopped at its limit of 7 seconds" in capsys.readouterr().err
     assert set(tree_of(tmp_path)) == {"ball.ply", "long.txt"}
     assert main(["replay", "--help"]) == 0
     output = " ".join(capsys.readouterr().out.split())
