@@ -25,6 +25,7 @@ class QtStand(Stand):
         aim(view)
         if not is_drawn:  # rendering would take nine tenths of the time
             view.render = lambda: None
+            self.widget.plotter.setUpdatesEnabled(False)
         timer = self.widget.plotter._Timer  # pyvistaqt's, of 10 ms whatever is asked for
         timer.start = lambda _: QtCore.QTimer.start(timer, 3)
         hand = QtHand(self.widget.plotter.interactor, self.widget.editor.view)

@@ -54,7 +54,7 @@ LEAVES = {
 WHOLE = {"bend_the_cactus"}  # the README's runs as it is; the others do so in the campaign
 FEW = {"cactus": 600, "dinosaur": 1000}  # vertices
 DRAW = {"carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
-ELSEWHERE = {"qt_application"}  # in test_qt_widget, which has a screen
+ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
 
 
 def test_every_example_has_a_number_to_hold():

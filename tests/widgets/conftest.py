@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from vtk_segdeform.widgets.editor import preparing
 
 
-@pytest.fixture
-def unprepared(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module")
+def unprepared() -> Iterator[None]:
     """Do not prepare sessions for pulls in the background: for tests of the other modes."""
-    monkeypatch.setattr(preparing, "lacking", lambda _: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(preparing, "lacking", lambda _: None)
+        yield

@@ -29,6 +29,7 @@ from qtpy import QtCore, QtWidgets
 import vtk_segdeform as sd
 from vtk_segdeform.widgets.qt import DeformWidget
 
+pv.global_theme.multi_samples = 1  # many take five times as long in software
 mesh = sd.models.sphere(300)
 mesh = mesh.with_vertices(mesh.vertices * [0.5, 0.5, 1.0])
 tip = int(np.argmax(mesh.vertices[:, 2]))
@@ -59,7 +60,7 @@ def follow(editor, close, is_shown, corner):
     session.on_change(lambda change: volumes.append(session.volume_change))
     view.every(20, tick)
 
-plotter = pv.Plotter(window_size=(500, 500))
+plotter = pv.Plotter(window_size=(300, 300))
 editor = plotter.segdeform.edit(mesh)
 plotter.show(interactive_update=True)
 done = []
@@ -70,7 +71,7 @@ plotter.close()
 
 application = QtWidgets.QApplication([])
 widget = DeformWidget(mesh)
-widget.resize(900, 600)
+widget.resize(600, 400)
 widget.show()
 view = widget.plotter
 

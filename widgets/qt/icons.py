@@ -30,11 +30,21 @@ def icon(name: str, palette: Any) -> Any:
         (palette.color(groups.Disabled, roles.ButtonText), modes.Disabled, states.On),
     ):
         for ratio in _RATIOS:
-            made.addPixmap(_picture(_DRAWINGS[name], colour, ratio), mode, state)
+            made.addPixmap(_picture(name, colour, ratio), mode, state)
     return made
 
 
-def _picture(draw: Callable[[Any], None], colour: Any, ratio: float) -> Any:
+def _picture(name: str, colour: Any, ratio: float) -> Any:
+    """Return a picture from Qt's cache, or else draw it: windows have the same icons."""
+    key = f"segdeform {name} {colour.name(QtGui.QColor.NameFormat.HexArgb)} {ratio}"
+    picture = QtGui.QPixmapCache.find(key)
+    if picture is None or picture.isNull():
+        picture = _drawn(_DRAWINGS[name], colour, ratio)
+        QtGui.QPixmapCache.insert(key, picture)
+    return picture
+
+
+def _drawn(draw: Callable[[Any], None], colour: Any, ratio: float) -> Any:
     picture = QtGui.QPixmap(round(SIZE * ratio), round(SIZE * ratio))
     picture.setDevicePixelRatio(ratio)
     picture.fill(Qt.GlobalColor.transparent)

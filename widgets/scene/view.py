@@ -134,12 +134,25 @@ class View(Projection):
     def request_render(self) -> None:
         """Draw the window once, at the end of the current event; outside an event, draw it now.
 
-        Do nothing before the first picture of the window.
+        In a widget of pyvistaqt, Qt draws it when it next paints.  Do nothing before the first
+        picture of the window.
         """
         if self.window is None or self.window.GetNeverRendered():
             return
         if self._depth:
             self._render_requested = True
+        else:
+            self._draw_soon()
+
+    def _draw_soon(self) -> None:
+        """Draw the window once the host paints its widget, or else now.
+
+        A widget of pyvistaqt draws the scene whenever Qt paints it, and asks to be painted after
+        every other picture too: drawn here, each scene would be drawn twice.
+        """
+        paints = hasattr(self._widget, "paintGL")
+        if paints and self.host is None and not self.is_sparing:  # which measures `draw`
+            self._widget.update()
         else:
             self.render()
 
@@ -324,7 +337,7 @@ class View(Projection):
 
     @contextmanager
     def drawing_once(self) -> Iterator[None]:
-        """Draw once, if at all, at the end of the outermost ``with`` block or event."""
+        """Request a picture, if any, at the end of the outermost ``with`` block or event."""
         self._depth += 1
         try:
             yield
@@ -332,7 +345,7 @@ class View(Projection):
             self._depth -= 1
             if self._render_requested and not self._depth and self._is_due():
                 self._render_requested = False
-                self.render()
+                self._draw_soon()
 
     def _is_due(self) -> bool:
         """Return whether a picture may be drawn now; see `spare`."""

@@ -106,11 +106,14 @@ def soup():
     ("given", "name", "text"),
     [
         (bottle, "bottle.ply", "12 holes: volume kept under lids"),
-        (lambda: sheet(6), "sheet.obj", "Open sheet: no volume to preserve"),
         (split_at_seam, "seam.ply", "Welded 64 seam points"),
-        (soup, "soup.stl", ""),
+        pytest.param(
+            lambda: sheet(6), "sheet.obj", "Open sheet: no volume to preserve",
+            marks=pytest.mark.campaign,
+        ),
+        pytest.param(soup, "soup.stl", "", marks=pytest.mark.campaign),
     ],
-)
+)  # fmt: skip
 def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name, text, tmp_path):
     given().save(tmp_path / name)
     assert drop(hand, tmp_path / name)

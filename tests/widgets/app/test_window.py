@@ -698,12 +698,13 @@ def test_closed_windows_leave_nothing_in_memory(ball_file, tmp_path, boxes, time
         return [ref() for ref in gone]
 
     open_and_close()
+    windows = application().topLevelWidgets()  # of earlier tests
     files, threads = len(os.listdir("/proc/self/fd")), threading.active_count()
     for _ in range(times):
         assert open_and_close() == [None] * 3
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # one of an earlier test may end meanwhile
     assert len(os.listdir("/proc/self/fd")) <= files + 2
-    assert application().topLevelWidgets() == []
+    assert [each for each in application().topLevelWidgets() if each not in windows] == []
 
 
 def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxes):

@@ -219,15 +219,16 @@ def watch_cycles(kind, times):
 
     for number in range(WARM):
         cycle(number)
+    windows = application().topLevelWidgets()  # of earlier tests
     threads, files = threading.active_count(), len(os.listdir("/proc/self/fd"))
     tasks, ticking = len(os.listdir("/proc/self/task")), timers()
     for number in range(times):
         cycle(number)
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads  # one of an earlier test may end meanwhile
     assert len(os.listdir("/proc/self/task")) <= tasks
     assert len(os.listdir("/proc/self/fd")) <= files
     assert all(np.less_equal(timers(), ticking))  # timers of an earlier test may end meanwhile
-    assert application().topLevelWidgets() == []
+    assert [each for each in application().topLevelWidgets() if each not in windows] == []
     if times > SETTLED:
         grown = min(memory[-3:]) - min(memory[SETTLED - 3 : SETTLED])
         each = MORE + OF_PLAIN_VTK * issubclass(kind, PlainDock)

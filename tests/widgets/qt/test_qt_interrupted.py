@@ -13,6 +13,7 @@ from qt_moments import QtStand, delete_now
 
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.handle_dragger import live_solve
 from vtk_segdeform.widgets.scene.view import View
 
 MOMENTS = pytest.mark.parametrize("during", [True, False], ids=["in mid-drag", "converging"])
@@ -56,7 +57,10 @@ def is_kept(stand: Stand, place) -> Story:
     """Release, and check that the drag is the first step of the history; return the story."""
     stand.hand.release(place)
     stand.hand.failures.clear()  # refusals are reported
-    stand.settle()
+    with pytest.MonkeyPatch.context() as patch:  # nothing interrupts any more
+        for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
+            patch.setattr(live_solve, name, 20)
+        stand.settle()
     story = Story.of(stand.session)
     assert story.labels[0] == DRAG
     assert not story.states[0].changes(stand.start)

@@ -5,26 +5,21 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qt_hands import Qt, QtTest, QtWidgets, application, small, until
+from qtpy import QtGui
 
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.editor import preparing
 from vtk_segdeform.widgets.panel.fields import Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, press, sections
 from vtk_segdeform.widgets.panel.toolbar import toolbar
+from vtk_segdeform.widgets.qt import icons
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _unprepared():
-    """Do not prepare sessions for pulls in the background."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "lacking", lambda _: None)
-        yield
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 
 @pytest.fixture(scope="module")
-def widget():
+def widget(unprepared):
     """Return a widget over a session with regions, cages, a handle and a pin."""
     application()
     mesh, state = small()
@@ -177,3 +172,25 @@ def test_a_control_that_the_editor_refuses_shows_the_value_again(widget):
     assert not panel.controls["cages.shown"].isChecked()
     assert not panel.controls["cages.shown"].isEnabled()
     editor.session.undo()
+
+
+def test_icons_are_drawn_once_for_each_palette(monkeypatch):
+    application()
+    drawn, draw = [], icons._drawn
+    monkeypatch.setattr(icons, "_drawn", lambda *given: drawn.append(given) or draw(*given))
+    light, dark = (
+        QtGui.QPalette(QtGui.QColor(window), QtGui.QColor(window)) for window in ("#eee", "#222")
+    )
+
+    def looks(name, palette):
+        return icons.icon(name, palette).pixmap(icons.SIZE, icons.SIZE).toImage()
+
+    QtGui.QPixmapCache.clear()
+    first = looks("undo", light)
+    count = len(drawn)
+    assert count > 0
+    assert looks("undo", light) == first
+    assert len(drawn) == count
+    assert looks("undo", dark) != first
+    assert looks("redo", light) != first
+    assert len(drawn) > count

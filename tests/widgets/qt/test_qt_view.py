@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
+import runpy
 import subprocess
 import sys
 import time
 import weakref
+from pathlib import Path
 
 import numpy as np
 import pytest
-from qt_hands import Qt, QtHand, QtWidgets, application, until
+from PIL import Image
+from qt_hands import Qt, QtCore, QtHand, QtWidgets, application, new_screen, until
+from qt_moments import delete_now
 
 import pyvistaqt  # isort: skip
 import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt ignores pyvista's entry points
@@ -21,6 +26,7 @@ from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.scene.view import View
 
 MESH = models.cactus(700)
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "qt_application.py"
 
 
 def in_a_window():
@@ -42,7 +48,17 @@ def in_the_background():
     return plotter, plotter.app_window
 
 
-@pytest.fixture(params=[in_a_window, in_the_background], ids=["QtInteractor", "BackgroundPlotter"])
+# A BackgroundPlotter is a QtInteractor in a window of its own.
+HOSTS = [
+    pytest.param(in_a_window, id="QtInteractor"),
+    pytest.param(in_the_background, id="BackgroundPlotter", marks=pytest.mark.campaign),
+]
+IN_BOTH = pytest.mark.parametrize(
+    "qt", [in_a_window, in_the_background], ids=["QtInteractor", "BackgroundPlotter"], indirect=True
+)
+
+
+@pytest.fixture(params=HOSTS)
 def qt(request):
     """Yield a plotter with the editor in it, the editor, a hand and the window."""
     app = application()
@@ -59,7 +75,8 @@ def qt(request):
     if not plotter._closed:
         plotter.close()
     window.close()
-    app.processEvents()
+    window.deleteLater()
+    delete_now()
 
 
 def around(editor, mask):
@@ -68,12 +85,6 @@ def around(editor, mask):
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
 
-@pytest.mark.parametrize(
-    "qt",
-    [pytest.param(in_a_window, id="QtInteractor"),
-     pytest.param(in_the_background, id="BackgroundPlotter", marks=pytest.mark.campaign)],
-    indirect=True,
-)  # fmt: skip
 def test_the_whole_story_in_qt(qt):
     _, editor, hand, _ = qt
     session, height = editor.session, MESH.vertices[:, 2]
@@ -139,6 +150,7 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
     assert "Cancelled" in editor.status
 
 
+@IN_BOTH
 def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(qt):
     _, editor, hand, _ = qt
     before = editor.view.camera.GetPosition()
@@ -174,6 +186,7 @@ def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(qt):
     hand.release(middle, Qt.AltModifier)
 
 
+@IN_BOTH
 def test_closing_a_window_removes_the_editor(qt):
     plotter, editor, hand, window = qt
     hand.key("g")  # during a job
@@ -193,6 +206,68 @@ def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
     del editor
     gc.collect()
     assert gone() is None
+
+
+def test_each_change_is_drawn_once(unprepared, qt):
+    _, editor, _, _ = qt
+    editor.mode = Mode.HANDLES
+    drawn = []
+    editor.view.window.AddObserver("EndEvent", lambda *_: drawn.append(len(editor.session.fixed)))
+
+    def rest():
+        """Wait until nothing has been drawn for a tenth of a second."""
+        count, end = len(drawn), time.monotonic() + 0.1
+        while time.monotonic() < end:
+            application().processEvents()
+            if len(drawn) > count:
+                count, end = len(drawn), time.monotonic() + 0.1
+
+    rest()
+    drawn.clear()
+    for number in (3, 5):
+        editor.session.set_fixed(range(number))
+        until(lambda number=number: number in drawn, "a picture")
+        rest()
+    assert drawn == [3, 5]
+
+
+# The example of an application.
+
+
+def is_drawn(picture):
+    """Return whether a picture shows the cactus, and not only the status line, which is 0.04."""
+    grey = np.array(Image.open(picture).convert("L"))
+    return 0.1 < (grey < 215).mean() < 0.5
+
+
+def test_the_example_of_an_application_runs(unprepared, tmp_path, monkeypatch):
+    app, later = application(), QtCore.QTimer.singleShot
+    monkeypatch.setattr(models, "cactus", lambda _: MESH)
+    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
+    soon = functools.partial(later, 50)  # instead of a second
+    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: soon(do))
+    limit = QtCore.QTimer()
+    limit.setSingleShot(True)
+    limit.timeout.connect(app.quit)
+    limit.start(60_000)
+    window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
+    assert limit.isActive()  # it has ended by itself
+    assert is_drawn(tmp_path / "window.png")
+    assert not window.editor.editor.GetEnabled()
+    window.deleteLater()
+    delete_now()
+
+
+@pytest.mark.campaign
+def test_the_example_runs_in_its_own_process(tmp_path):
+    application()  # or skip
+    root = str(EXAMPLE.parents[1])
+    screen = {"DISPLAY": new_screen(), "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": root}
+    subprocess.run(
+        [sys.executable, EXAMPLE, "--picture", tmp_path / "window.png"],
+        env={**os.environ, **screen}, check=True, timeout=100,
+    )  # fmt: skip
+    assert is_drawn(tmp_path / "window.png")
 
 
 @pytest.mark.campaign
