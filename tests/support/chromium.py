@@ -6,7 +6,8 @@
         page.drag([(100, 100), (160, 120)])
         page.key("z")
 
-Pages do not share cookies or storage: each has a browser context of its own.
+Pages do not share cookies or storage: each has a browser context of its own.  A page opened with
+``beside=page`` shares those of *page*, and its cache.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ _FLAGS = (
     "--use-gl=angle",
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # SwiftShader takes five times as long for it as the processor
     "--no-first-run",
     "--disable-extensions",
     "--disable-background-networking",
@@ -109,14 +111,20 @@ class Chromium:
         scale: float = 1.0,
         dark: bool = False,
         touch: bool = False,
+        beside: Page | None = None,
     ) -> Page:
-        """Open *url* in a context of its own, with a viewport of *size* in CSS pixels."""
-        context = self.call("Target.createBrowserContext")["browserContextId"]
-        target = self.call("Target.createTarget", url="about:blank", browserContextId=context)
+        """Open *url* in a context of its own, or *beside* a page, with a viewport of *size*."""
+        if beside is None:
+            context = self.call("Target.createBrowserContext")["browserContextId"]
+        else:
+            context = beside.context
+        # In a window of its own, because a tab behind another one draws nothing.
+        target = self.call("Target.createTarget", url="about:blank", browserContextId=context,
+                           newWindow=True)  # fmt: skip
         session = self.call("Target.attachToTarget", targetId=target["targetId"], flatten=True)
-        page = Page(self, session["sessionId"], target["targetId"], context)
+        page = Page(self, session["sessionId"], target["targetId"], context, beside is None)
         width, height = size or self._size
-        for domain in ("Page", "Runtime", "Network", "Log"):
+        for domain in ("Page", "Runtime", "Log"):
             page.call(f"{domain}.enable")
         page.call("Emulation.setDeviceMetricsOverride", width=width, height=height,
                   deviceScaleFactor=scale, mobile=touch)  # fmt: skip
@@ -187,9 +195,11 @@ class Chromium:
 class Page:
     """One page; coordinates are CSS pixels from the upper left."""
 
-    def __init__(self, browser: Chromium, session: str, target: str, context: str) -> None:
+    def __init__(
+        self, browser: Chromium, session: str, target: str, context: str, is_first: bool
+    ) -> None:
         self.browser, self._session, self._target = browser, session, target
-        self._context = context
+        self.context, self._is_first = context, is_first
         self._held = "none"
 
     def call(self, method: str, **params: Any) -> Any:
@@ -318,7 +328,7 @@ class Page:
     def save_downloads(self, folder: Path) -> None:
         """Save downloads into *folder*, under their suggested names."""
         self.browser.call("Browser.setDownloadBehavior", behavior="allow",
-                          browserContextId=self._context, downloadPath=str(folder))  # fmt: skip
+                          browserContextId=self.context, downloadPath=str(folder))  # fmt: skip
 
     def picture(self, path: Path) -> None:
         """Save a PNG of the page."""
@@ -326,8 +336,13 @@ class Page:
         Path(path).write_bytes(base64.b64decode(data))
 
     def close(self) -> None:
-        """Close the page and its context."""
-        self.browser.call("Target.disposeBrowserContext", browserContextId=self._context)
+        """Close the page, and all that are beside it; forget what it wrote."""
+        if self._is_first:
+            self.browser.call("Target.disposeBrowserContext", browserContextId=self.context)
+        else:
+            self.browser.call("Target.closeTarget", targetId=self._target)
+        kept = [each for each in self.browser.events if each.get("sessionId") != self._session]
+        self.browser.events[:] = kept
 
     def _mouse(self, kind: str, point: tuple[float, float], button: str, modifiers: int) -> None:
         held = 0 if kind == "mouseReleased" else _BUTTONS[button]

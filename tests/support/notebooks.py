@@ -43,7 +43,7 @@ class Kernel:
         deadline = time.monotonic() + seconds
         while self.value(f"bool({condition})") != "True":
             assert time.monotonic() < deadline, condition
-            time.sleep(0.1)
+            time.sleep(0.05)
 
 
 @contextmanager

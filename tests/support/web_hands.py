@@ -11,7 +11,8 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Any, TypeVar
 
-from chromium import Chromium, Page, PageError
+import pytest
+from chromium import Chromium, Page
 
 T = TypeVar("T")
 _SHOWN = "Number(document.querySelector('canvas')?.dataset.number) > 0"
@@ -70,11 +71,7 @@ class Served:
     def page(self, browser: Chromium, **keywords: Any) -> Page:
         """Open the page, and wait for its first picture."""
         page = browser.page(self.url, **keywords)
-        try:
-            page.wait(_SHOWN, 10.0)
-        except PageError:  # seen once on a busy machine: no first picture
-            page.go(self.url)
-            page.wait(_SHOWN, 60.0)
+        page.wait(_SHOWN, 60.0)
         self.wait(lambda: self.is_at_rest)
         return page
 
@@ -103,9 +100,11 @@ class Served:
 
     @staticmethod
     def _web_editor(mesh: Any, keywords: dict[str, Any]) -> Any:
-        from vtk_segdeform.widgets.web import WebEditor
+        from vtk_segdeform.widgets.web import WebEditor, web_editor
 
-        return WebEditor(mesh, **keywords)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(web_editor, "_SAMPLES", 0)  # multisampling in software takes long
+            return WebEditor(mesh, **keywords)
 
 
 def line(start: tuple[float, float], end: tuple[float, float], n: int) -> list[tuple[float, float]]:

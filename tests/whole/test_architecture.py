@@ -69,7 +69,7 @@ GRANTED = {
     "widgets.web.protocol": {"wslink"},
     "widgets.web.transfer": {"aiohttp"},
     "widgets.web.notebook": {"IPython", "pyvista"},
-    "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server"},
+    "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server", "wslink"},
     "widgets.web.serving": {"aiohttp", "yarl"},
     "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},

@@ -52,9 +52,14 @@ def all_sections(editor: DeformEditor) -> tuple[Section, ...]:
 
     Not during a job, which owns the session.
     """
-    mode = editor.mode
-    built = ((build(editor), mode in modes) for build, modes in _SECTIONS)
-    return tuple(replace(each, visible=each.visible and has_mode) for each, has_mode in built)
+    return tuple(_one_by_one(editor))
+
+
+def _one_by_one(editor: DeformEditor) -> Iterator[Section]:
+    """Yield the sections of all modes, each built when it is asked for."""
+    for build, modes in _SECTIONS:
+        section = build(editor)
+        yield replace(section, visible=section.visible and editor.mode in modes)
 
 
 def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | None:
@@ -93,7 +98,7 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
     if editor.is_busy:  # the job owns the session
         return None
     table_name, _, verb = name.rpartition(".")
-    for section in all_sections(editor):
+    for section in _one_by_one(editor):
         for field in section.fields:
             if field.name == name:
                 return _use(editor, field, value, is_shown=section.visible)

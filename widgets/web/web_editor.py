@@ -26,6 +26,8 @@ import trame.app  # noqa: F401 - which registers the types of a page's files
 from trame.ui.vuetify3 import VAppLayout
 from trame_client.widgets.core import VirtualNode
 from trame_server import Server
+from trame_server.protocol import CoreServer
+from wslink import server as wslink_server
 
 from vtk_segdeform.checks import as_text
 from vtk_segdeform.pictures import require_offscreen
@@ -180,6 +182,7 @@ class WebEditor:
         finally:
             await self.stream.stop()
             self.close()
+            self._forget()
 
     async def serve_until(
         self,
@@ -215,6 +218,11 @@ class WebEditor:
             self.editor.remove()
         self._remove_own()
 
+    def _forget(self) -> None:
+        """Let go of the server, which trame and wslink keep until the next one is started."""
+        if CoreServer.server is self.server:
+            CoreServer.server = wslink_server.ws_server = None
+
     def _sized(self) -> None:
         """Frame the model once the size of the page is known, unless the camera was moved."""
         if self._aim == tuple(self.plotter.camera.position):
@@ -247,6 +255,8 @@ class WebEditor:
         theme = ("dark ? 'dark' : 'light'",)
         with VAppLayout(server, vuetify_config=config, theme=theme) as layout:
             layout.root.add_child((_PAGE / "page.html").read_text(encoding="utf-8"))
+        with VirtualNode():  # without a server: trame keeps that of the last node, and its editor
+            pass
         # When the connection is lost, the page itself says so; trame would replace it.
         state.trame__template_error = state.trame__template_main
 

@@ -1,10 +1,19 @@
-"""An event loop for the tests of a module; the server runs while a test waits for it."""
+"""One browser for all tests of a process; an event loop for the tests of a module."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterator
 
 import pytest
+from chromium import Chromium
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Chromium]:
+    """Yield a browser; whoever opens a page in it closes it."""
+    with Chromium() as browser:
+        yield browser
 
 
 class Loop(asyncio.SelectorEventLoop):
@@ -23,7 +32,7 @@ class Loop(asyncio.SelectorEventLoop):
 
 @pytest.fixture(scope="module")
 def do():
-    """Run a coroutine, and the server with it."""
+    """Run a coroutine, and the server with it; the server runs only then."""
     loop = Loop()
     yield loop.run_until_complete
     if rest := asyncio.all_tasks(loop):  # connections that a visitor broke off

@@ -23,19 +23,28 @@ SMALL = "sd.models.cactus(700)"
 def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
     folder = tmp_path_factory.mktemp("kernel")
     with kernel(folder) as running:
-        running.run("import asyncio, gc, sys\nimport pyvista as pv\nimport vtk_segdeform as sd")
+        running.run(
+            "import asyncio, gc, sys, weakref\nimport pyvista as pv\nimport vtk_segdeform as sd"
+        )
         running.run(f"mesh = {SMALL}")
-        yield running
-        running.run("kept = sd.edit(mesh)")  # runs when the kernel ends
+        running.run("kept = sd.edit(mesh)")  # runs until the kernel ends
         running.wait("kept.web.server.running")
         address = running.value("kept.address").strip("'")
+        yield running
         assert status(address) == 200
     assert status(address) is None
     assert [*folder.glob("segdeform-*")] == []
 
 
 @pytest.fixture
+def kept(cells: Kernel) -> str:
+    """Return the address of the editor that runs all the time."""
+    return cells.value("kept.address").strip("'")
+
+
+@pytest.fixture
 def address(cells: Kernel) -> Iterator[str]:
+    """Yield the address of another editor."""
     cells.run("editor = sd.edit(mesh)")
     cells.wait("editor.web.server.running")
     yield cells.value("editor.address").strip("'")
@@ -61,52 +70,60 @@ def test_the_example_keeps_the_volume_and_shows_the_page(cells: Kernel) -> None:
 
 
 @needs_chromium
-def test_a_pull_in_the_page_is_there_in_the_next_cell(cells: Kernel, address: str) -> None:
-    before = cells.value("editor.session.position")
-    with Chromium(1000, 660) as browser:
-        page = browser.page(address)
-        page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
-        cells.wait("not (editor.web.editor.is_busy or editor.web.editor.is_preparing)")
-        left, top, width, height = page.box(".sd-canvas")
-        start = left + 0.5 * width, top + 0.5 * height
-        page.drag(line(start, (start[0] + 90, start[1] - 30), 8), pause=0.02)
-        cells.wait(f"editor.session.position > {before}")
-        assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
-    assert abs(float(cells.value("editor.session.volume_change"))) < 1e-12
-    cells.wait("abs(editor.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
-    assert cells.value("type(editor.mesh) is sd.Mesh") == "True"
+def test_a_pull_in_the_page_is_there_in_the_next_cell(
+    cells: Kernel, kept: str, browser: Chromium
+) -> None:
+    before = cells.value("kept.session.position")
+    page = browser.page(kept, size=(700, 480))
+    page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
+    cells.wait("not (kept.web.editor.is_busy or kept.web.editor.is_preparing)")
+    left, top, width, height = page.box(".sd-canvas")
+    start = left + 0.5 * width, top + 0.5 * height
+    page.drag(line(start, (start[0] + 90, start[1] - 30), 8), pause=0.02)
+    cells.wait(f"kept.session.position > {before}")
+    assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
+    page.close()
+    assert abs(float(cells.value("kept.session.volume_change"))) < 1e-12
+    cells.wait("abs(kept.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
+    assert cells.value("type(kept.mesh) is sd.Mesh") == "True"
 
 
-def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, address: str) -> None:
-    root, secret = re.fullmatch(
-        r"(http://127\.0\.0\.1:\d+/)([\w-]{43})/index\.html", address
-    ).groups()
-    assert status(address) == 200
+def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, kept: str) -> None:
+    root, secret = re.fullmatch(r"(http://127\.0\.0\.1:\d+/)([\w-]{43})/index\.html", kept).groups()
+    assert status(kept) == 200
     assert status(f"{root}{secret}/ws", upgrade=True) == 101
     for place in ("", "index.html", "ws", f"{secret[:-1]}/ws", "x/index.html", f"%2F{secret}/ws"):
         assert status(root + place) == 403
         assert status(root + place, upgrade=True) == 403
     for place in ("nothing", "../../etc/passwd", "%2e%2e/%2e%2e/setup.cfg"):
         assert status(f"{root}{secret}/{place}") == 404
-    assert status(address.replace("127.0.0.1", "127.0.0.2")) is None  # bound to one address
+    assert status(kept.replace("127.0.0.1", "127.0.0.2")) is None  # bound to one address
 
 
-def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, address: str) -> None:
-    cells.run("former, editor = editor, sd.edit(mesh)")
-    cells.wait("editor.web.server.running")
-    second = cells.value("editor.address").strip("'")
-    assert status(address) == status(second) == 200
+def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, kept: str) -> None:
+    cells.run("former = sd.edit(mesh)")
+    cells.wait("former.web.server.running")
+    address = cells.value("former.address").strip("'")
+    assert status(address) == status(kept) == 200
     cells.run("server = former.web.server; former = None; gc.collect();")
     cells.wait("not server.running")
+    cells.run("del server")
     assert status(address) is None
-    assert status(second) == 200
+    assert status(kept) == 200
+
+
+def test_the_last_editor_is_freed_when_it_has_ended(cells: Kernel) -> None:
+    cells.run("last = sd.edit(mesh)")
+    cells.wait("last.web.server.running")
+    cells.run("session = weakref.ref(last.session); last = None")
+    cells.wait("[gc.collect(), session() is None][1]")
 
 
 def test_a_page_cannot_end_its_server_and_the_end_of_that_does_not_end_the_kernel(
     cells: Kernel, address: str
 ) -> None:
     assert cells.value("editor.web.server.protocol.exit is None") == "True"  # application.exit
-    cells.run("await editor.web.server.stop(); await asyncio.sleep(0.3)")
+    cells.run("await editor.web.server.stop()")
     cells.wait("not editor.is_live")
     assert status(address) is None
     assert cells.value("editor.session.position") == "0"
@@ -135,7 +152,8 @@ def test_a_plotter_shows_the_page_or_a_picture_that_says_what_would_be_live(cell
     still = cells.run("p.show(jupyter_backend='static')")
     assert "image/png" in still[0]["data"]
     assert "set_jupyter_backend(&#x27;trame&#x27;)" in still[1]["data"]["text/html"]
-    cells.run("p.close(); await asyncio.sleep(0.3)")
+    cells.run("server = p.segdeform.added[-1].web.server; p.close()")
+    cells.wait("not server.running")
     assert status(f"http://127.0.0.1:{place}") is None
 
 
@@ -143,13 +161,13 @@ def test_without_trame_one_sentence_says_what_to_install(cells: Kernel) -> None:
     cells.run(
         "import vtk_segdeform.widgets.web as web\n"
         "vars(web).pop('WebEditor', None)\n"
-        "hidden = {n: m for n, m in sys.modules.items() if n.endswith('.web_editor')}\n"
-        "trame = sys.modules['trame']\n"
+        "hidden = {n: m for n, m in sys.modules.items()"
+        " if n == 'trame' or n.endswith('.web_editor')}\n"
         "for n in hidden: del sys.modules[n]\n"
         "sys.modules['trame'] = None"
     )
     html = cells.html("e = sd.edit(mesh)\ne")
-    cells.run("sys.modules.update(hidden); sys.modules['trame'] = trame")
+    cells.run("del sys.modules['trame']; sys.modules.update(hidden)")
     assert "pip install &#x27;vtk-segdeform[jupyter]&#x27;" in html
     assert html.count("<p>") == 1
     assert "<img" in html

@@ -25,6 +25,7 @@ LIVE = "document.querySelector('.sd-live').classList.contains('on')"
 WORDS = """(() => { const all = document.querySelectorAll('.sd-live canvas')[2];
   const pixels = all.getContext('2d').getImageData(0, 0, all.width, all.height).data;
   return pixels.some((value) => value > 0); })()"""
+SIZE = 700, 480
 HALF = 40  # of 255, from the background: a pixel at the edge that is about half covered
 BODY = "document.querySelectorAll('.sd-live canvas')[1]"
 
@@ -36,7 +37,7 @@ class Drawn:
         self.served, self.browser, self.web, self.renders = served, browser, served.web, 0
         self.stream, self.drawing = self.web.stream, self.web.stream._drawing
         self.web.editor.controller.finishing.is_wanted = False  # which moves the pose at rest
-        self.page: Page = served.page(browser)
+        self.page: Page = served.page(browser, size=SIZE)
         self.page.evaluate("document.querySelector('.sd-cards').click()")
         self.await_surface()
         window = self.web.plotter.render_window
@@ -105,10 +106,11 @@ class Drawn:
 
 
 @pytest.fixture(scope="module")
-def drawn() -> Iterator[Drawn]:
-    mesh = models.cactus(700)
-    with Served(mesh, name="cactus.ply") as served, Chromium(900, 600) as browser:
-        yield Drawn(served, browser)
+def drawn(browser: Chromium) -> Iterator[Drawn]:
+    with Served(models.cactus(700), name="cactus.ply") as served:
+        drawn = Drawn(served, browser)
+        yield drawn
+        drawn.page.close()
 
 
 def overlap(a: np.ndarray, b: np.ndarray) -> float:
@@ -235,12 +237,14 @@ def test_the_view_menu_decides_who_draws_and_the_browser_remembers(drawn: Drawn)
 
 
 def test_of_two_pages_none_draws(drawn: Drawn) -> None:
-    other = drawn.served.page(drawn.browser)
+    other = drawn.served.page(drawn.browser, size=SIZE, beside=drawn.page)
     assert not drawn.served.call(lambda: drawn.drawing.is_possible)
     end = drawn.drag((50.0, 0.0))
     drawn.hold(end)
     assert not drawn.page.evaluate(LIVE)
     drawn.page.release(end)
+    drawn.rest()
+    drawn.page.key("z")
     drawn.rest()
     other.close()
     drawn.await_surface()

@@ -22,34 +22,52 @@ from vtk_segdeform.session import Change, load_session
 from vtk_segdeform.widgets.editor import Mode, opening
 from vtk_segdeform.widgets.editor.actions import to_mode
 
-pytestmark = [needs_chromium, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
+pytestmark = [
+    needs_chromium,
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.usefixtures("bound_once"),
+]
+SIZE = 1010, 480  # the side panel is beside the view from 1001 on
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Chromium]:
-    with Chromium(1100, 640) as browser:
-        yield browser
+def cactus() -> Mesh:
+    return models.cactus(700)
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def server(tmp_path_factory: pytest.TempPathFactory, cactus: Mesh) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("server")
-    mesh = models.cactus(700)
-    with Served(mesh, name="cactus.ply", folder=folder, upload_limit=10**6) as served:
+    with Served(cactus, name="cactus.ply", folder=folder, upload_limit=10**6) as served:
         yield served
 
 
+@pytest.fixture(scope="module")
+def loaded(server: Served, browser: Chromium) -> Iterator[Page]:
+    page = server.page(browser, size=SIZE)
+    yield page
+    page.close()
+
+
 @pytest.fixture
-def served(server: Served, tmp_path: Path) -> Served:
+def served(server: Served, tmp_path: Path, cactus: Mesh) -> Served:
     """Return the shared editor with a new session."""
     web, place = server.web, tmp_path / "cactus.ply"
-    write_mesh(place, models.cactus(700))
+    write_mesh(place, cactus)
     server.wait(lambda: server.is_at_rest)
     before = web.session
     server.call(lambda: web.editor.do(to_mode(Mode.PULL)))
     server.call(lambda: web.editor.do(opening(place)))
     server.wait(lambda: web.session is not before and server.is_at_rest)
     return server
+
+
+@pytest.fixture
+def page(served: Served, loaded: Page) -> Page:
+    """Return the shared page, which shows the new session, without focus."""
+    loaded.evaluate("document.activeElement.blur()")
+    loaded.wait("document.querySelectorAll('.sd-history .sd-row').length == 1")
+    return loaded
 
 
 def _top(served: Served) -> Any:
@@ -155,12 +173,10 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
 
 
 def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(
-    served: Served, browser: Chromium, tmp_path: Path
+    served: Served, page: Page, tmp_path: Path
 ) -> None:
-    page = served.page(browser)
     (tmp_path / "down").mkdir()
     tell_a_story(served, page, tmp_path / "cactus.ply", tmp_path / "down")
-    page.close()
 
 
 def _bumpy(n: int) -> Mesh:
@@ -182,19 +198,17 @@ def _bumpy(n: int) -> Mesh:
     ids=["cactus", "dinosaur", "bumpy", "fine bumpy"],
 )
 def test_stories_of_other_meshes(
-    served: Served, browser: Chromium, tmp_path: Path, make: Callable[[], Mesh]
+    served: Served, page: Page, tmp_path: Path, make: Callable[[], Mesh]
 ) -> None:
     write_mesh(tmp_path / "other.ply", make())
-    page = served.page(browser)
     (tmp_path / "down").mkdir()
     tell_a_story(served, page, tmp_path / "other.ply", tmp_path / "down")
-    page.close()
 
 
 def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
-    served: Served, browser: Chromium
+    served: Served, page: Page
 ) -> None:
-    page, web = served.page(browser), served.web
+    web = served.web
     surface = web.editor.widgets.surface
     start = served.seen(page, _top(served))
     page.drag(line(start, (start[0] + 60, start[1]), 5), pause=0.02)
@@ -221,7 +235,6 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     page.key("Tab")
     page.wait("document.activeElement != document.body")
     assert surface is not None
-    page.close()
 
 
 def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> None:
@@ -247,10 +260,10 @@ def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> Non
 
 
 def test_the_page_reads_and_writes_no_file_of_the_server(
-    served: Served, browser: Chromium, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    served: Served, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    page, web, folder = served.page(browser), served.web, served.folder
+    web, folder = served.web, served.folder
     before = [*tmp_path.iterdir()], [*folder.rglob("*")]
     event = {"x": 0.5, "y": 0.5, "control": True}
     for key in "srom":

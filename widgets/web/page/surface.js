@@ -277,7 +277,8 @@ void main() { pixel = tint; }`;
       probe.getExtension("WEBGL_lose_context")?.loseContext();
       const gl = canvas.getContext("webgl2", { ...options, antialias: antialias ?? !isSoftware });
       if (!gl || !gl.getExtension("EXT_color_buffer_float")) return null;
-      return new SegdeformSurface(canvas, gl, isSoftware);
+      const surface = new SegdeformSurface(canvas, gl, isSoftware);
+      return surface._isLost ? null : surface;
     }
 
     constructor(canvas, gl, isSoftware) {
@@ -300,9 +301,8 @@ void main() { pixel = tint; }`;
         this._isLost = true;
       });
       canvas.addEventListener("webglcontextrestored", () => {
-        this._isLost = false;
         this._begin();
-        this.onlost?.();
+        if (!this._isLost) this.onlost?.();
       });
     }
 
@@ -584,7 +584,19 @@ void main() { pixel = tint; }`;
 
     // Drawing.
 
+    // Create what every surface needs.  This fails with a driver that compiles none of it, and when
+    // the browser loses the graphics memory meanwhile, which `isContextLost` says only later.
     _begin() {
+      try {
+        this._create();
+        this._isLost = false;
+      } catch (fault) {
+        this._isLost = true;
+        console.warn(`The page cannot draw the surface: ${fault.message}`);
+      }
+    }
+
+    _create() {
       const gl = this.gl;
       gl.getExtension("EXT_color_buffer_float"); // positions are drawn into a texture
       this._posed = this._program(WHOLE, POSITIONS);
