@@ -11,6 +11,8 @@ widgets.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import pyvista
@@ -63,11 +65,13 @@ class DeformWidget(QtWidgets.QWidget):
         session = session_of(mesh)
         super().__init__(_checked(parent))
         self._is_closed = False
-        self.plotter = pyvistaqt.QtInteractor(self, auto_update=False, off_screen=False)
+        # Without a parent: pyvistaqt would close it once its parent is destroyed, which crashes.
+        self.plotter = pyvistaqt.QtInteractor(auto_update=False, off_screen=False)
         self.plotter.setAcceptDrops(False)  # it would add a second mesh to the view
         set_lights(self.plotter.renderer)
         self._set_background()
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
+        self.destroyed.connect(_switch_off(self.editor))
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
@@ -128,6 +132,19 @@ class DeformWidget(QtWidgets.QWidget):
             self.panel.stop()
             self.plotter.close()  # which removes the editor first
         super().closeEvent(event)
+
+
+def _switch_off(editor: DeformEditor) -> Callable[[], None]:
+    """Return a function that switches *editor* off after Qt has deleted its widget.
+
+    Its actors stay: OpenGL would release them in the context of another window.
+    """
+
+    def switch_off() -> None:
+        with suppress(RuntimeError):  # from objects that Qt has deleted
+            editor.Off()
+
+    return switch_off
 
 
 class DeformDock(QtWidgets.QDockWidget):

@@ -21,7 +21,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 from weakref import WeakValueDictionary
 
@@ -152,7 +152,8 @@ class View(Projection):
         """
         paints = hasattr(self._widget, "paintGL")
         if paints and self.host is None and not self.is_sparing:  # which measures `draw`
-            self._widget.update()
+            with suppress(RuntimeError):  # Qt has deleted it
+                self._widget.update()
         else:
             self.render()
 
