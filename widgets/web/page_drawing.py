@@ -45,6 +45,8 @@ class Update:
     height: int
     is_first: bool
     """Whether it shows what the last picture of the server shows."""
+    time: float = 0.0
+    """As of `Picture`."""
 
 
 class PageDrawing:

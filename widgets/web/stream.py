@@ -16,6 +16,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 from ..scene import View
 from .inputs import Inputs
@@ -185,7 +186,7 @@ class Stream:
 
     def _update(self, update: Update) -> None:
         self._sent += 1
-        self._send(update, self._sent)
+        self._send(replace(update, time=self.inputs.time), self._sent)
 
     def _announce(self) -> None:
         """Let the page fetch the surface, if it lacks it."""
@@ -233,10 +234,10 @@ class Stream:
         self._encoding = asyncio.get_running_loop().create_task(self._encode(encode, self._sent))
 
     async def _encode(self, encode: Encode, number: int) -> None:
-        loop = asyncio.get_running_loop()
+        loop, time = asyncio.get_running_loop(), self.inputs.time
         picture = await loop.run_in_executor(None, encode)
         if self._is_open:
-            self._send(picture, number)
+            self._send(replace(picture, time=time), number)
         self._cancel_rest()
         if not picture.is_still:
             self._rest = loop.call_later(_REST, self._rested)

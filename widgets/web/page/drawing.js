@@ -48,16 +48,19 @@ export default class Drawing {
     for (let at = 0; at < size; at += numbers.getUint32(at + 8, true)) {
       messages.push(whole.subarray(at, at + numbers.getUint32(at + 8, true)));
     }
-    if (this.receive(messages)) this.call('holds', version);
+    if (!this.receive(messages)) return;
+    this.layer.dataset.surface = version;
+    this.call('holds', version);
   }
 
   // Draw an update; the first one of a drag shows what the picture shows.
-  show({ number, messages, labels, width, height, is_first: isFirst }) {
+  show({ number, messages, labels, width, height, is_first: isFirst, time }) {
     if (!this.surface || !this.receive(messages)) return;
     for (const canvas of [this.backdrop, this.body, this.words]) {
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     }
     this.number = number;
+    this.time = time;
     this.write(labels);
     if (isFirst) {
       this.surface.draw();
@@ -82,6 +85,7 @@ export default class Drawing {
 
   drawn() {
     if (!this.number) return;
+    this.layer.dataset.time = this.time;
     this.layer.dataset.number = this.number;
     this.call('shown', this.number);
     this.number = 0;

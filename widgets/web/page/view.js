@@ -189,6 +189,7 @@ const View = {
         canvas.height = height;
       }
       canvas.getContext('bitmaprenderer').transferFromImageBitmap(bitmap);
+      canvas.dataset.time = event.time;
       canvas.dataset.number = number;
       this.drawing.hide();
       this.call('shown', number);
@@ -209,7 +210,8 @@ const View = {
       const x = (place.clientX - box.left) / box.width;
       const y = (place.clientY - box.top) / box.height;
       this.place = place;
-      this.outbox.put({ name, x, y, ...flags, ...more });
+      const time = place.timeStamp || performance.now();
+      this.outbox.put({ name, x, y, time, ...flags, ...more });
     },
 
     flags(event) {
