@@ -135,6 +135,7 @@ class Stream:
             if self.inputs:
                 for _ in range(len(self.inputs)):
                     await self._handle_input()
+                self._timers.postpone()
                 self._handled()
             self._end_live()
             if self._is_wanted and self._is_open:
@@ -161,10 +162,8 @@ class Stream:
             if self._encoding is not None:
                 await asyncio.wait([self._encoding])
             self._cancel_rest()
-            update = drawing.first_update()
-            if update is not None:
-                self._is_live = True
-                self._update(update)
+            self._is_live = True
+            self._update(drawing.first_update())
 
     def _end_live(self) -> None:
         """Let the server draw again, once the view rests or the page cannot draw any more."""

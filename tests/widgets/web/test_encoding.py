@@ -27,7 +27,7 @@ ROUNDING = 1e-6  # diagonals, of single precision
 def split(data: bytes, *types: tuple[str, int]) -> list[np.ndarray]:
     """Return the arrays of a message, each given by its type and length."""
     magic, version, _, length, _ = struct.unpack_from("<4sHHII", data)
-    assert (magic, version, length) == (b"SDFM", 1, len(data))
+    assert (magic, version, length) == (b"SDFM", 2, len(data))
     arrays, at = [], 16
     for kind, count in types:
         arrays.append(np.frombuffer(data, kind, count, at))
