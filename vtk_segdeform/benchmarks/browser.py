@@ -15,24 +15,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
-from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
 from ..errors import MissingDependencyError
-from ..pictures import require_offscreen
 from ..progress import Progress, tell
 from ..session import Session
-from ..widgets import DeformEditor
-from ..widgets.scene import View, set_background, set_lights
 from .chromium import Chromium, ticks
 from .measuring import in_own_process
 from .scale import Scale
@@ -45,7 +40,6 @@ _WARM_UP, _MOVES = 60, 240  # moves; the first ones are not measured
 _SWING = 0.12, 0.04  # heights of the view, across and upwards
 _PERIODS = 1.5, 1.0  # seconds
 _TICK = 0.04  # seconds between two timer events in process
-_SAMPLES = 8  # per pixel
 _REMOTE = 0.7  # frames of the server's drawing, at least, in those of the process
 _DRAWN = {5430: 25.0, 50_000: 15.0}  # vertices: frames per second of the page, at least
 _HEAD = (
@@ -82,6 +76,7 @@ class Drag:
     latencies: tuple[float, float]  # milliseconds: median and 95 %
     size: float = math.nan  # bytes of a frame
     processors: tuple[float, ...] = ()  # milliseconds of a frame: see the table
+    view: tuple[int, int] = _SIZE  # pixels
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
@@ -94,7 +89,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         works: dict[str, Callable[[], Drag]] = {
             "by the server": lambda: _in_browser(size, scale, draws=False),  # noqa: B023
             "by the page": lambda: _in_browser(size, scale, draws=True),  # noqa: B023
-            "in process": lambda: in_own_process(in_process, size, scale),  # noqa: B023
+            "in process": lambda: in_own_process(in_process, size, scale, _view_of(found)),  # noqa: B023
         }
         for n, (name, work) in enumerate(works.items()):
             tell(progress, (k + n / len(works)) / len(sizes), f"drag {name}, {size} vertices")
@@ -125,6 +120,11 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         ratios=ratios,
         skipped=skipped,
     )
+
+
+def _view_of(found: dict[str, Drag]) -> tuple[int, int]:
+    """Return the size of the view in the page, if it was drawn in there."""
+    return next((drag.view for drag in found.values()), _SIZE)
 
 
 def _row(size: int, name: str, drag: Drag) -> tuple[Any, ...]:
@@ -165,42 +165,35 @@ def _drag_of(frames: list[tuple[float, float]], seconds: float, **more: Any) -> 
 
 def in_process(size: int, scale: Scale, view_size: tuple[int, int] = _SIZE) -> Drag:
     """Return the drag in an off-screen window of *view_size*."""
-    require_offscreen()
+    _require_trame()
+    from ..widgets.web import WebEditor
+
     session, top = ready_session(size, scale)
-    window, renderer = vtkRenderWindow(), vtkRenderer()
-    window.SetOffScreenRendering(True)
-    window.SetMultiSamples(_SAMPLES)
-    window.SetSize(*view_size)
-    window.AddRenderer(renderer)
-    interactor = vtkGenericRenderWindowInteractor()
-    interactor.SetRenderWindow(window)
-    set_lights(renderer)
-    set_background(renderer)
-    editor = DeformEditor((renderer, interactor), session)
+    web = WebEditor(session)  # for its view, which nobody serves
+    editor, view = web.editor, web.editor.view
     editor.controller.finishing.is_wanted = False
-    editor.controller.camera.begin(is_aimed=False)
-    editor.On()
-    window.Render()
-    start = _seen(editor.view, session.vertices[top])
-    frames, used = _moves(editor.view, start, view_size[1])
+    view.host = None
+    view.window.SetSize(*view_size)
+    view.interactor.UpdateSize(*view_size)
+    editor.controller.camera.viewpoint.frame(animate=False)
+    view.draw()
+    frames, used = _moves(view, _seen(view, session.vertices[top]))
     measured = [frame for frame in frames if frame[1] >= _WARM_UP / _RATE]
-    drag = _drag_of(measured, _MOVES / _RATE, processors=(1e3 * used / max(len(measured), 1),))
-    editor.remove()
-    window.Finalize()
-    return drag
+    web.close()
+    each = 1e3 * used / max(len(measured), 1)
+    return _drag_of(measured, _MOVES / _RATE, processors=(each,))
 
 
-def _seen(view: View, point: Any) -> tuple[float, float]:
+def _seen(view: Any, point: Any) -> tuple[float, float]:
     """Return where *view* shows a *point* (3,), in pixels from the upper left."""
     x, y = view.to_display(point[None])[0][:2]
     return float(x), view.window.GetSize()[1] - 1 - float(y)
 
 
-def _moves(
-    view: View, start: tuple[float, float], height: int
-) -> tuple[list[tuple[float, float]], float]:
+def _moves(view: Any, start: tuple[float, float]) -> tuple[list[tuple[float, float]], float]:
     """Return when frames were shown, and the events they show; and the processor time."""
-    interactor, places, frames = view.interactor, [*_places(start, height)], []
+    interactor, height = view.interactor, view.window.GetSize()[1]
+    places, frames = [*_places(start, height)], []
 
     def send(event: str, place: tuple[float, float]) -> None:
         x, y = round(place[0]), height - 1 - round(place[1])
@@ -212,12 +205,13 @@ def _moves(
     began, last, ticked, used = time.perf_counter(), -1, 0.0, 0.0
     while last + 1 < len(places):
         now = time.perf_counter() - began
-        if now - ticked > _TICK:
-            ticked = now
-            interactor.InvokeEvent("TimerEvent")
         due = min(int(now * _RATE), len(places) - 1)
         if due == last:
-            time.sleep(max(0.0, (last + 1) / _RATE - now))
+            if now - ticked > _TICK:
+                ticked = now
+                interactor.InvokeEvent("TimerEvent")
+            else:
+                time.sleep(max(0.0, (last + 1) / _RATE - now))
             continue
         if last < _WARM_UP <= due:
             used = time.process_time()
@@ -243,6 +237,7 @@ def _in_browser(size: int, scale: Scale, *, draws: bool) -> Drag:
         browser = stack.enter_context(Chromium(_SIZE))
         server.start()
         theirs.close()
+        stack.callback(server.kill)
         stack.callback(server.join, 20.0)
         stack.callback(ours.close)  # which ends the server
         port = ours.recv()
@@ -261,12 +256,8 @@ def _word(draws: bool) -> str:
 
 
 def _require_trame() -> None:
-    try:
-        import trame.app  # noqa: F401
-    except ImportError:
-        raise MissingDependencyError(
-            "the server needs trame; pip install 'vtk-segdeform[web]'"
-        ) from None
+    if find_spec("trame") is None:
+        raise MissingDependencyError("the server needs trame; pip install 'vtk-segdeform[web]'")
 
 
 def _dragged(browser: Chromium, top: tuple[float, float], server: int | None) -> Drag:
@@ -287,13 +278,14 @@ def _dragged(browser: Chromium, top: tuple[float, float], server: int | None) ->
         browser.mouse("mouseMoved", place, held=True)
     last = browser.evaluate("({ ...bench, now: performance.now() })")
     after = _used(browser, server)
-    browser.mouse("mouseReleased", place, held=True)
+    browser.mouse("mouseReleased", place, held=False)
     shown = [(1e-3 * a, 1e-3 * b) for a, b in last["frames"] if first["now"] < a <= last["now"]]
     frames = max(len(shown), 1)
     return _drag_of(
         shown,
         1e-3 * (last["now"] - first["now"]),
         size=(last["bytes"] - first["bytes"]) / frames,
+        view=(round(width), round(height)),
         processors=tuple(1e3 * (b - a) / frames for a, b in zip(before, after, strict=True)),
     )
 
@@ -335,4 +327,3 @@ def _serve(size: int, scale: Scale, pipe: Any) -> None:
         await web.serve_until(ended, ready=pipe.send)
 
     asyncio.run(served())
-    os._exit(0)  # threads of the solver must not hold the measurement up

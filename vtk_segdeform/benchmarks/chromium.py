@@ -53,7 +53,7 @@ class Chromium:
         commands, self._out = os.pipe()
         self._in, answers = os.pipe()
         # Chromium reads commands from descriptor 3 and writes answers to 4.
-        pipes = f"exec 3<&{commands} 4>&{answers}; exec \"$0\" \"$@\""
+        pipes = f'exec 3<&{commands} 4>&{answers}; exec "$0" "$@"'
         self._process = subprocess.Popen(
             ["bash", "-c", pipes, path, *_FLAGS, f"--user-data-dir={self._profile}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
@@ -126,8 +126,9 @@ class Chromium:
         """Send an event of the mouse, without waiting; *held* is whether the left button is."""
         button, buttons = ("left", 1) if held else ("none", 0)
         self.send(
-            "Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], buttons=buttons,
-            button="left" if kind == "mouseReleased" else button, clickCount=int(kind != "mouseMoved"),
+            "Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1],
+            button="left" if kind == "mouseReleased" else button, buttons=buttons,
+            clickCount=int(kind != "mouseMoved"),
         )  # fmt: skip
         while self._read(0.0):
             pass

@@ -101,6 +101,7 @@ class Stream:
 
     def put(self, messages: list[object]) -> None:
         """Queue the events of a page; see `Inputs.put`."""
+        self._timers.postpone()
         try:
             for message in messages:
                 self.inputs.put(message)
@@ -230,10 +231,11 @@ class Stream:
         if self._encoding is not None:
             await asyncio.wait([self._encoding])
         self._sent += 1
-        self._encoding = asyncio.get_running_loop().create_task(self._encode(encode, self._sent))
+        task = self._encode(encode, self._sent, self.inputs.time)
+        self._encoding = asyncio.get_running_loop().create_task(task)
 
-    async def _encode(self, encode: Encode, number: int) -> None:
-        loop, time = asyncio.get_running_loop(), self.inputs.time
+    async def _encode(self, encode: Encode, number: int, time: float) -> None:
+        loop = asyncio.get_running_loop()
         picture = await loop.run_in_executor(None, encode)
         if self._is_open:
             self._send(replace(picture, time=time), number)
@@ -249,5 +251,5 @@ class Stream:
     def _rested(self) -> None:
         still = self._pictures.still()
         if still is not None and not (self._is_wanted or self._is_live) and self._is_open:
-            task = self._encode(still, self._sent)
+            task = self._encode(still, self._sent, self.inputs.time)
             self._encoding = asyncio.get_running_loop().create_task(task)

@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 _ONE_SHOT = 1  # type of a timer, as vtkRenderWindowInteractor numbers them
-_LONGEST = 0.2  # seconds between two ticks of a timer that waits for input, if its period is less
+_LONGEST = 0.5  # seconds between two ticks of a timer that waits for input, if its period is less
 
 
 class Timers:
@@ -49,7 +49,7 @@ class Timers:
             self._schedule(timer)
 
     def postpone(self) -> None:
-        """Begin the periods of repeating timers anew, because input was handled."""
+        """Begin the periods of repeating timers anew, because of input."""
         for timer, handle in self._handles.items():
             seconds, is_repeating = self._periods[timer]
             if self._loop is not None and is_repeating:
@@ -90,8 +90,8 @@ class Timers:
             if timer in self._handles:
                 self._handles[timer].cancel()
             seconds, _ = self._periods[timer]
-            self._begun[timer] = self._loop.time()
-            self._handles[timer] = self._loop.call_later(seconds, partial(self._fire, timer))
+            self._begun[timer] = now = self._loop.time()
+            self._handles[timer] = self._loop.call_at(now + seconds, partial(self._fire, timer))
 
     def _fire(self, timer: int) -> None:
         _, is_repeating = self._periods[timer]

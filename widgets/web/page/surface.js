@@ -27,7 +27,7 @@
   const MARK_NUMBERS = 30;
   const LIGHTS = 4;
   const SLOW = 60; // milliseconds for a picture, beyond which software draws fewer triangles
-  const MEASURED = 8; // one of so many pictures is timed
+  const MEASURED = 8; // one of so many pictures is timed, the third one first
   const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
   const HEAD = `#version 300 es
@@ -726,7 +726,7 @@ void main() {
     // pictures take too long without a graphics processor.
     _spareSoftware(began) {
       const gl = this.gl;
-      if (!this._coarse.length || this.pictures % MEASURED !== MEASURED - 1) return;
+      if (!this._coarse.length || this.pictures % MEASURED !== 2) return;
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
       if (performance.now() - began < SLOW) return;
       const n = largest(this._coarse) + 1;
