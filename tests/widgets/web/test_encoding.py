@@ -129,6 +129,13 @@ def test_a_large_mesh_has_fewer_faces_for_software_close_to_it(session, monkeypa
     assert 0 < len(coarse) < 0.6 * mesh.n_faces
     volume = signed_volume(mesh.vertices, mesh.faces)
     assert signed_volume(mesh.vertices, coarse) == pytest.approx(volume, rel=0.03)
+    received, p = read_surface(surface.message(1)), random_cages(session, 1)
+    assert received.coarse.max() + 1 == len(np.unique(coarse))  # their vertices come first
+    moves = np.frombuffer(surface.cage_message(1, 5, p), "<f4", offset=20).reshape(-1, 3)
+    x, bound = posed(received, moves.astype(float))
+    exact = (session.deformer.surface(p) - surface.centre) / surface.scale
+    error = np.linalg.norm(x - exact[surface.order], axis=1)
+    assert (error <= bound + ROUNDING).all()
 
 
 def test_far_from_the_origin_no_digits_are_lost():
