@@ -269,7 +269,9 @@ def _dragged(browser: Chromium, top: tuple[float, float], server: int | None) ->
     start = left + top[0] * width, high + top[1] * height
     browser.mouse("mouseMoved", start, held=False)
     browser.mouse("mousePressed", start, held=True)
-    began, before, first = time.perf_counter(), {}, {}
+    first: dict[str, float] = {}
+    before: tuple[float, ...] = ()
+    began = time.perf_counter()
     for k, place in enumerate(_places(start, height)):
         time.sleep(max(0.0, k / _RATE - (time.perf_counter() - began)))
         if k == _WARM_UP:

@@ -72,7 +72,7 @@ class Inputs:
         event = self._event_of(message)
         if event is None:
             return
-        time = message.get("time", 0.0)
+        time: Any = message.get("time", 0.0) if isinstance(message, Mapping) else 0.0
         if not is_number(time):
             raise ArgumentError(f"time must be a number; got {shown(time)}")
         last = self._waiting[-1][0] if self._waiting else None

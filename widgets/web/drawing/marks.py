@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform.arrays import FloatArray, IntArray
@@ -84,13 +84,13 @@ class Mark:
             to_message[:3, 3] -= surface.centre / surface.scale
         to_scene[:3] *= surface.scale
         to_scene[:3, 3] = surface.centre
-        numbers = [
+        numbers: list[ArrayLike] = [
             [self.shape, self.is_above, *self.colour, self.size, len(self.points), number],
             [self.shows_backs],
             to_message.T.ravel(),
             self.plane @ to_scene,
         ]
-        return np.concatenate(numbers).astype(np.float32)
+        return np.concatenate([np.asarray(each) for each in numbers]).astype(np.float32)
 
 
 class MarkStream:
@@ -110,7 +110,9 @@ class MarkStream:
 
     def due(self, serial: int, surface: EncodedSurface, marks: Collection[Mark]) -> list[bytes]:
         """Return the message that replaces all marks over *surface* by *marks*, if it does."""
-        arrays, heads, kept = [], [], {}
+        arrays: list[NDArray[np.float32]] = []
+        heads: list[NDArray[np.float32]] = []
+        kept: dict[int, NDArray[np.float32]] = {}
         for mark in marks:
             points = mark.sent_points(surface)
             known = {**self._points, **kept}
@@ -151,9 +153,8 @@ def _marks(actor: Any, *, is_above: bool) -> Iterator[Mark]:
     if data is None or not data.GetNumberOfPoints():
         return
     points = vtk_to_numpy(data.GetPoints().GetData())
-    matrix: FloatArray | None = matrix_of(actor.GetMatrix())
-    if np.array_equal(matrix, np.eye(4)):
-        matrix = None
+    placed = matrix_of(actor.GetMatrix())
+    matrix = None if np.array_equal(placed, np.eye(4)) else placed
     colour = np.array([*style.GetDiffuseColor(), style.GetOpacity()])
     plane, shows_backs = _EVERYWHERE, bool(style.GetFrontfaceCulling())
     for clipping in mapper.GetClippingPlanes() or ():  # one at most
