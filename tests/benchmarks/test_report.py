@@ -254,7 +254,7 @@ def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
 def test_a_drag_is_followed_in_process_and_in_chromium(monkeypatch):
     pytest.importorskip("trame")
     monkeypatch.setattr(browser, "_WARM_UP", 6)
-    monkeypatch.setattr(browser, "_MOVES", 60)
+    monkeypatch.setattr(browser, "_MOVES", 120)
     drags = [browser.in_process(700, TINY, (300, 200))]
     try:
         drags.append(browser._in_browser(700, TINY, draws=True))
@@ -263,7 +263,7 @@ def test_a_drag_is_followed_in_process_and_in_chromium(monkeypatch):
     for drag in drags:
         assert drag.frames > 0.0
         assert 0.0 < drag.latencies[0] <= drag.latencies[1]
-    assert 500.0 < drags[1].size < 20_000.0
+    assert drags[1].size > 500.0
     assert drags[1].view[0] < 1400
 
 
