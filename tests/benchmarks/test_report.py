@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from vtk_segdeform.benchmarks import (
+    browser,
     cage_making,
     charts,
     drag_profile,
@@ -227,6 +228,43 @@ def test_the_report_says_what_breaks_a_limit_and_what_could_not_be_drawn(tmp_pat
     assert "| fast | 2 | ≤ 1 | **not met** |" in text
     assert "lost.png was not drawn: no plots here" in text
     assert "![" not in text
+
+
+def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
+    drags = {True: browser.Drag(30.0, (20.0, 40.0)), False: browser.Drag(12.0, (50.0, 90.0))}
+    monkeypatch.setattr(browser, "_in_browser", lambda *_, draws: drags[draws])
+    monkeypatch.setattr(
+        browser, "in_own_process", lambda *_: browser.Drag(20.0, (30.0, 45.0), processors=(9.0,))
+    )
+    section = browser.run(replace(TINY, drag_sizes=(5430, 500_000)))
+    (table,) = section.tables
+    assert table.column("frames / s") == [12.0, 30.0, 20.0]
+    assert [(r.value, r.verdict) for r in section.ratios] == [(0.6, "**not met**"), (30.0, "met")]
+
+    def absent(*_, **__):
+        raise MissingDependencyError("no browser here")
+
+    monkeypatch.setattr(browser, "_in_browser", absent)
+    section = browser.run(replace(TINY, drag_sizes=(5430,)))
+    assert section.tables[0].column("drawn") == ["in process"]
+    assert [line.rpartition(": ")[2] for line in section.skipped] == 2 * ["no browser here"]
+    assert not section.ratios
+
+
+def test_a_drag_is_followed_in_process_and_in_chromium(monkeypatch):
+    pytest.importorskip("trame")
+    monkeypatch.setattr(browser, "_WARM_UP", 6)
+    monkeypatch.setattr(browser, "_MOVES", 120)
+    drags = [browser.in_process(700, TINY, (300, 200))]
+    try:
+        drags.append(browser._in_browser(700, TINY, draws=True))
+    except MissingDependencyError as missing:
+        pytest.skip(str(missing))
+    for drag in drags:
+        assert drag.frames > 0.0
+        assert 0.0 < drag.latencies[0] <= drag.latencies[1]
+    assert drags[1].size > 500.0
+    assert drags[1].view[0] < 1400
 
 
 def test_numbers_of_a_column_have_one_notation_unless_the_table_is_mixed():

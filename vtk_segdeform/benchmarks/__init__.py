@@ -18,6 +18,8 @@ The files, in reading order:
     full_space            the same energy without cages
     cage_making           cages and coordinates of other programs
     peers programs        deformation by other programs
+    browser               drags in the browser and in process
+    chromium              the browser
     charts                plots
 """
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from ..errors import Cancelled, MissingDependencyError, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import cage_making, drag_profile, experiments, peers, segmentation_study, table_one
+from . import browser, cage_making, drag_profile, experiments, peers, segmentation_study, table_one
 from .measuring import conditions, timed
 from .scale import Scale
 from .sections import Figure, Section, Table
@@ -28,6 +28,7 @@ EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "figures": experiments.run,
     "peers": peers.run,
     "cages": cage_making.run,
+    "browser": browser.run,
 }
 NAME = "report.md"
 

@@ -46,7 +46,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "table1", "segmentation", "figures", "peers", "cages")
+EXPERIMENTS = ("drag", "table1", "segmentation", "figures", "peers", "cages", "browser")
 
 _SELECTION = """\
 selections (SEL):

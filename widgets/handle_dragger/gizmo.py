@@ -204,10 +204,12 @@ class Gizmo:
         if self._centre is not None:
             self._front_half.SetOrigin(*self._centre)
             self._front_half.SetNormal(*self._to_viewer())
+        radius = self.radius
         for part, solid in self._solids.items():
-            solid.show(self._is_visible(part))
-            if self._centre is not None:
-                solid.place(self._centre, self.radius * self._frame(part))
+            is_visible = self._is_visible(part)
+            solid.show(is_visible)
+            if is_visible and self._centre is not None:
+                solid.place(self._centre, radius * self._frame(part))
         self._lay_out_labels()
 
     def _lay_out_labels(self) -> None:

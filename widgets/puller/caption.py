@@ -87,7 +87,7 @@ class Caption:
         box = np.array([self._words.width() + size, 1.5 * size])
         body, origin = self._body(), self._view.renderer.GetOrigin()
         some = np.concatenate([body[:: 1 + len(body) // _SAMPLES], self._lines])
-        seen = self._view.to_display(some)[:, :2] - origin
+        across, up = (self._view.to_display(some)[:, :2] - origin).T.copy()
         at = self._view.to_display(self._point[None])[0, :2] - origin
         low, high = np.full(2, _MARGIN), np.array([width, height]) - _MARGIN - box
         low[1] += scale * _FOOT
@@ -95,7 +95,8 @@ class Caption:
         for k, (distance, direction) in enumerate(_PLACES):
             centre = at + (scale * distance + 0.5 * box) * direction
             corner = np.clip(centre - 0.5 * box, low, np.maximum(low, high))
-            inside = (np.abs(seen - corner - 0.5 * box) < 0.5 * box + size / 4).all(axis=1)
+            middle, reach = corner + 0.5 * box, 0.5 * box + size / 4
+            inside = (np.abs(across - middle[0]) < reach[0]) & (np.abs(up - middle[1]) < reach[1])
             hides_point = (np.abs(at - corner - 0.5 * box) < 0.5 * box + 0.5 * size).all()
             cost = _POINT * np.count_nonzero(inside) + _FARTHER * (distance == _FAR)
             cost += _CORNER * (corner + box > [width - _CUBE, height - _CUBE]).all()

@@ -39,11 +39,17 @@ class Inputs:
     ----------
     view : View
         Receives them.
+
+    Attributes
+    ----------
+    time : float
+        The time of the last event that was sent to the view; see `put`.
     """
 
     def __init__(self, view: View) -> None:
         self._view = view
-        self._waiting: deque[Input] = deque()
+        self._waiting: deque[tuple[Input, float]] = deque()
+        self.time = 0.0
 
     def __len__(self) -> int:
         return len(self._waiting)
@@ -55,7 +61,8 @@ class Inputs:
         ----------
         message : mapping
             ``name``, such as "MouseMove" or "KeyPress"; ``x`` and ``y``, fractions of the view;
-            ``shift``, ``control``, ``alt``; ``key`` and ``code`` of a key as in KeyboardEvent.
+            ``shift``, ``control``, ``alt``; ``key`` and ``code`` of a key as in KeyboardEvent;
+            ``time``, if given, in milliseconds of the page's clock.
 
         Raises
         ------
@@ -65,17 +72,21 @@ class Inputs:
         event = self._event_of(message)
         if event is None:
             return
-        last = self._waiting[-1] if self._waiting else None
+        time: Any = message.get("time", 0.0) if isinstance(message, Mapping) else 0.0
+        if not is_number(time):
+            raise ArgumentError(f"time must be a number; got {shown(time)}")
+        last = self._waiting[-1][0] if self._waiting else None
         if last is not None and event.name == _MOVE and replace(event, x=last.x, y=last.y) == last:
-            self._waiting[-1] = event
+            self._waiting[-1] = event, float(time)
         elif len(self._waiting) < _MOST:
-            self._waiting.append(event)
+            self._waiting.append((event, float(time)))
         else:
             raise ArgumentError(f"More than {_MOST} events wait for the editor; send them slower")
 
     def send_next(self) -> None:
         """Send the oldest event that waits."""
-        self._waiting.popleft().send(self._view)
+        event, self.time = self._waiting.popleft()
+        event.send(self._view)
 
     def release_all(self) -> None:
         """Forget what waits, and release the buttons: the page has gone in the middle of a drag."""

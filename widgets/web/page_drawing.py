@@ -21,7 +21,6 @@ from ..scene import Draft, SurfaceStyle
 from .drawing import Mark, SurfaceStream, label_actors, labels_of, look_of, marks_of
 
 _PIECE = 1 << 18  # bytes; pictures are sent between two pieces
-_MOST_POINTS = 5_000  # of marks that follow the camera: 60 kilobytes an update
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,8 @@ class Update:
     height: int
     is_first: bool
     """Whether it shows what the last picture of the server shows."""
+    time: float = 0.0
+    """As of `Picture`."""
 
 
 class PageDrawing:
@@ -143,15 +144,8 @@ class PageDrawing:
         vertices, camera = self._drawn
         return vertices is self._editor.session.vertices and camera == self._camera
 
-    def first_update(self) -> Update | None:
-        """Return the update for the state that the page shows, as drawn by the server.
-
-        None if pictures are smaller than updates: marks of constant size, such as a gizmo, change
-        whenever the camera moves.
-        """
-        turns = self._editor.controller.camera.navigation.is_dragging
-        if turns and sum(len(mark.points) for mark in self._marks) > _MOST_POINTS:
-            return None
+    def first_update(self) -> Update:
+        """Return the update for the state that the page shows, as drawn by the server."""
         self._labels = label_actors(self._editor.view)
         return self._update(is_first=True)
 

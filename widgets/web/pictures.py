@@ -29,6 +29,8 @@ class Picture:
     """Pixels of the encoded picture, which may be fewer than those of the view."""
     height: int
     is_still: bool
+    time: float = 0.0
+    """Of the last event that it shows, by the clock of the page; see `Inputs.put`."""
 
 
 Encode = Callable[[], Picture]

@@ -16,6 +16,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 from ..scene import View
 from .inputs import Inputs
@@ -100,6 +101,7 @@ class Stream:
 
     def put(self, messages: list[object]) -> None:
         """Queue the events of a page; see `Inputs.put`."""
+        self._timers.postpone()
         try:
             for message in messages:
                 self.inputs.put(message)
@@ -134,6 +136,7 @@ class Stream:
             if self.inputs:
                 for _ in range(len(self.inputs)):
                     await self._handle_input()
+                self._timers.postpone()
                 self._handled()
             self._end_live()
             if self._is_wanted and self._is_open:
@@ -160,10 +163,8 @@ class Stream:
             if self._encoding is not None:
                 await asyncio.wait([self._encoding])
             self._cancel_rest()
-            update = drawing.first_update()
-            if update is not None:
-                self._is_live = True
-                self._update(update)
+            self._is_live = True
+            self._update(drawing.first_update())
 
     def _end_live(self) -> None:
         """Let the server draw again, once the view rests or the page cannot draw any more."""
@@ -185,7 +186,7 @@ class Stream:
 
     def _update(self, update: Update) -> None:
         self._sent += 1
-        self._send(update, self._sent)
+        self._send(replace(update, time=self.inputs.time), self._sent)
 
     def _announce(self) -> None:
         """Let the page fetch the surface, if it lacks it."""
@@ -230,13 +231,14 @@ class Stream:
         if self._encoding is not None:
             await asyncio.wait([self._encoding])
         self._sent += 1
-        self._encoding = asyncio.get_running_loop().create_task(self._encode(encode, self._sent))
+        task = self._encode(encode, self._sent, self.inputs.time)
+        self._encoding = asyncio.get_running_loop().create_task(task)
 
-    async def _encode(self, encode: Encode, number: int) -> None:
+    async def _encode(self, encode: Encode, number: int, time: float) -> None:
         loop = asyncio.get_running_loop()
         picture = await loop.run_in_executor(None, encode)
         if self._is_open:
-            self._send(picture, number)
+            self._send(replace(picture, time=time), number)
         self._cancel_rest()
         if not picture.is_still:
             self._rest = loop.call_later(_REST, self._rested)
@@ -249,5 +251,5 @@ class Stream:
     def _rested(self) -> None:
         still = self._pictures.still()
         if still is not None and not (self._is_wanted or self._is_live) and self._is_open:
-            task = self._encode(still, self._sent)
+            task = self._encode(still, self._sent, self.inputs.time)
             self._encoding = asyncio.get_running_loop().create_task(task)

@@ -2,6 +2,9 @@
 
 A vtkGenericRenderWindowInteractor announces each timer by ``CreateTimerEvent`` and
 ``DestroyTimerEvent``, and expects its host to fire it.  Nothing is scheduled while no timer runs.
+
+Input comes first: while it arrives, repeating timers wait, though not for long.  A timer that
+refines a pose would otherwise take as much time as solving for the moves of a drag.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ from functools import partial
 from typing import Any
 
 _ONE_SHOT = 1  # type of a timer, as vtkRenderWindowInteractor numbers them
+_LONGEST = 0.5  # seconds between two ticks of a timer that waits for input, if its period is less
 
 
 class Timers:
@@ -27,6 +31,7 @@ class Timers:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._periods: dict[int, tuple[float, bool]] = {}  # seconds, and whether it repeats
         self._handles: dict[int, asyncio.TimerHandle] = {}
+        self._begun: dict[int, float] = {}  # when the period of each began, in the loop's time
         self._tags = [
             interactor.AddObserver("CreateTimerEvent", self._created),
             interactor.AddObserver("DestroyTimerEvent", self._destroyed),
@@ -43,13 +48,24 @@ class Timers:
         for timer in self._periods:
             self._schedule(timer)
 
+    def postpone(self) -> None:
+        """Begin the periods of repeating timers anew, because of input."""
+        for timer, handle in self._handles.items():
+            seconds, is_repeating = self._periods[timer]
+            if self._loop is not None and is_repeating:
+                latest = self._begun[timer] + max(seconds, _LONGEST)
+                when = min(self._loop.time() + seconds, latest)
+                if when > handle.when():
+                    handle.cancel()
+                    self._handles[timer] = self._loop.call_at(when, partial(self._fire, timer))
+
     def stop(self) -> None:
         """Fire no timer any more."""
         for tag in self._tags:
             self._interactor.RemoveObserver(tag)
         for handle in self._handles.values():
             handle.cancel()
-        self._tags, self._handles, self._periods = [], {}, {}
+        self._tags, self._handles, self._periods, self._begun = [], {}, {}, {}
 
     def _created(self, *_: object) -> None:
         interactor = self._interactor
@@ -64,6 +80,7 @@ class Timers:
 
     def _forget(self, timer: int) -> None:
         self._periods.pop(timer, None)
+        self._begun.pop(timer, None)
         handle = self._handles.pop(timer, None)
         if handle is not None:
             handle.cancel()
@@ -73,7 +90,8 @@ class Timers:
             if timer in self._handles:
                 self._handles[timer].cancel()
             seconds, _ = self._periods[timer]
-            self._handles[timer] = self._loop.call_later(seconds, partial(self._fire, timer))
+            self._begun[timer] = now = self._loop.time()
+            self._handles[timer] = self._loop.call_at(now + seconds, partial(self._fire, timer))
 
     def _fire(self, timer: int) -> None:
         _, is_repeating = self._periods[timer]

@@ -27,7 +27,7 @@ ROUNDING = 1e-6  # diagonals, of single precision
 def split(data: bytes, *types: tuple[str, int]) -> list[np.ndarray]:
     """Return the arrays of a message, each given by its type and length."""
     magic, version, _, length, _ = struct.unpack_from("<4sHHII", data)
-    assert (magic, version, length) == (b"SDFM", 1, len(data))
+    assert (magic, version, length) == (b"SDFM", 2, len(data))
     arrays, at = [], 16
     for kind, count in types:
         arrays.append(np.frombuffer(data, kind, count, at))
@@ -129,6 +129,13 @@ def test_a_large_mesh_has_fewer_faces_for_software_close_to_it(session, monkeypa
     assert 0 < len(coarse) < 0.6 * mesh.n_faces
     volume = signed_volume(mesh.vertices, mesh.faces)
     assert signed_volume(mesh.vertices, coarse) == pytest.approx(volume, rel=0.03)
+    received, p = read_surface(surface.message(1)), random_cages(session, 1)
+    assert received.coarse.max() + 1 == len(np.unique(coarse))  # their vertices come first
+    moves = np.frombuffer(surface.cage_message(1, 5, p), "<f4", offset=20).reshape(-1, 3)
+    x, bound = posed(received, moves.astype(float))
+    exact = (session.deformer.surface(p) - surface.centre) / surface.scale
+    error = np.linalg.norm(x - exact[surface.order], axis=1)
+    assert (error <= bound + ROUNDING).all()
 
 
 def test_far_from_the_origin_no_digits_are_lost():

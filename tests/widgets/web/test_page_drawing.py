@@ -150,6 +150,43 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     assert overlap(before, drawn.body()) > 0.99
 
 
+def test_the_layer_of_a_drag_is_opaque_and_its_texts_take_little_room(drawn: Drawn) -> None:
+    end = drawn.drag((70.0, 20.0))
+    drawn.hold(end)
+    page = drawn.page
+    page.key("x")
+    page.wait(WORDS)
+    texts, backdrop = f"{BODY}.nextElementSibling", f"{BODY}.previousElementSibling"
+    width, height = page.evaluate(f"[{texts}.width, {texts}.height]")
+    whole = page.evaluate(f"[{BODY}.width, {BODY}.height]")
+    assert 1 < width < 0.5 * whole[0]
+    assert 1 < height < 0.2 * whole[1]
+    shown = page.evaluate(
+        f"(({{width, height}}) => [width, height])({texts}.getBoundingClientRect())"
+    )
+    assert shown == pytest.approx([width, height], abs=1.0)
+    assert page.evaluate(f"{backdrop}.getContext('2d').getContextAttributes().alpha") is False
+    page.key("Escape")
+    page.release(end)
+    drawn.rest()
+
+
+def test_messages_reach_the_page_as_array_buffers(drawn: Drawn) -> None:
+    page = drawn.page
+    page.evaluate("""(({ prototype }) => {
+        const { send } = prototype;
+        prototype.send = function (...data) {
+            prototype.send = send;
+            window.socket = this;
+            return send.apply(this, data);
+        };
+    })(WebSocket)""")
+    page.move((5.0, 300.0))
+    page.move((400.0, 300.0))
+    page.wait("Boolean(window.socket)")
+    assert page.evaluate("socket.binaryType") == "arraybuffer"
+
+
 def test_the_camera_turns_around_the_surface_that_the_page_draws(drawn: Drawn) -> None:
     drawn.rest()
     before = drawn.body()

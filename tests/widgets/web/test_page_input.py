@@ -37,12 +37,19 @@ class Loop:
     def __init__(self) -> None:
         self.now, self.due = 0.0, []  # type: ignore[var-annotated]
 
-    def call_later(self, seconds: float, call: Callable[[], None]) -> Any:
-        entry = [self.now + seconds, call]
+    def time(self) -> float:
+        return self.now
+
+    def call_at(self, when: float, call: Callable[[], None]) -> Any:
+        entry = [when, call]
         self.due.append(entry)
 
         class Handle:
             cancel = staticmethod(lambda: self.due.remove(entry) if entry in self.due else None)
+
+            @staticmethod
+            def when() -> float:
+                return when
 
         return Handle
 
@@ -114,6 +121,49 @@ def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
     loop.run(0.1)
     assert len(ticks) == 5
     timers.stop()
+
+
+def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
+    loop, ticks = Loop(), []
+    timers = Timers(view.interactor)
+    timers.start(loop)  # type: ignore[arg-type]
+    view.every(40, lambda: ticks.append(loop.now))
+    for _ in range(60):  # input every 0.03 seconds
+        loop.run(0.03)
+        timers.postpone()
+    assert ticks == pytest.approx([0.5, 1.0, 1.5])
+    loop.run(0.1)
+    assert ticks[3:] == pytest.approx([1.84, 1.88])
+    view.interactor.CreateOneShotTimer(30)
+    for _ in range(3):
+        loop.run(0.02)
+        timers.postpone()
+    assert len(loop.due) == 1  # a timer that fires once does not wait
+    timers.stop()
+
+
+def test_a_picture_names_the_last_event_that_it_shows(view: View) -> None:
+    sent: list[Any] = []
+
+    async def story() -> None:
+        stream = Stream(
+            view, Timers(view.interactor), lambda picture, _: sent.append(picture), lambda: None
+        )
+        stream.start(asyncio.get_running_loop())
+        stream.open(200, 100)
+        while len(sent) < 1:
+            await asyncio.sleep(0.01)
+        moves = [{"name": "MouseMove", **_MIDDLE, "time": time} for time in (7.5, 8.5)]
+        stream.put([*moves])
+        view.render()
+        while len(sent) < 2:
+            await asyncio.sleep(0.01)
+        await stream.stop()
+
+    asyncio.run(asyncio.wait_for(story(), 20.0))
+    assert [picture.time for picture in sent] == [0.0, 8.5]
+    with pytest.raises(ArgumentError, match="time must be a number"):
+        Inputs(view).put({"name": "MouseMove", **_MIDDLE, "time": "now"})
 
 
 @pytest.mark.parametrize("preset", ["pyvista", "Blender"])

@@ -15,7 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.session import Change
 from vtk_segdeform.widgets.web.drawing import Look, Mark, SurfaceStream, marks_of
-from vtk_segdeform.widgets.web.drawing.look import Shape
+from vtk_segdeform.widgets.web.drawing.marks import Shape
 from vtk_segdeform.widgets.web.drawing.messages import Kind
 
 LOOK = Look(
@@ -120,10 +120,9 @@ def test_after_new_cages_nothing_is_due_until_they_are_encoded(stream):
     assert struct.unpack_from("<12xI", messages[0]) == (2,)
 
 
-@pytest.mark.parametrize("strips", [False, True])
-def test_solids_are_marked_without_what_vtk_culls_or_clips(strips):
-    view, actor, mapper = plain_view((100, 100)), vtkActor(), vtkPolyDataMapper()
-    source = vtkSphereSource()
+def solid(*, strips: bool):
+    """Return a small ball as an actor, and its mapper."""
+    actor, mapper, source = vtkActor(), vtkPolyDataMapper(), vtkSphereSource()
     source.SetThetaResolution(24)
     source.SetPhiResolution(24)
     last = source
@@ -132,21 +131,47 @@ def test_solids_are_marked_without_what_vtk_culls_or_clips(strips):
         last.SetInputConnection(source.GetOutputPort())
     mapper.SetInputConnection(last.GetOutputPort())
     actor.SetMapper(mapper)
+    return actor, mapper
+
+
+@pytest.mark.parametrize("strips", [False, True])
+def test_a_solid_is_marked_with_what_vtk_culls_clips_and_moves(strips):
+    view = plain_view((100, 100))
+    actor, mapper = solid(strips=strips)
     view.renderer.AddActor(actor)
-    view.camera.SetPosition(0.0, 0.0, 10.0)
-    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
-    (whole,) = marks_of(view, [])
-    assert len(whole.points) == 3 * source.GetOutput().GetNumberOfPolys()
+    (mark,) = marks_of(view, [])
+    a, b, c = mark.points.reshape(-1, 3, 3).transpose(1, 0, 2)
+    assert len(a) == 2 * 24 * 21 + 2 * 24
+    assert (np.cross(b - a, c - a) * a).sum(axis=1).min() > 0.0  # no triangle is turned over
+    assert (mark.matrix, mark.shows_backs, mark.plane.tolist()) == (None, False, [0, 0, 0, 1])
     actor.GetProperty().SetFrontfaceCulling(True)
-    (back,) = marks_of(view, [])
-    a, b, c = back.points.reshape(-1, 3, 3).transpose(1, 0, 2)
-    outwards = np.cross(b - a, c - a)
-    assert (outwards * a).sum(axis=1).min() > 0.0  # no triangle is turned over
-    assert (outwards * (a - [0.0, 0.0, 10.0])).sum(axis=1).min() > 0.0
-    assert len(whole.points) / 3 < len(back.points) < len(whole.points)
+    actor.SetPosition(1.0, 2.0, 3.0)
     plane = vtkPlane()
-    plane.SetNormal(1.0, 0.0, 0.0)
+    plane.SetOrigin(1.0, 0.0, 0.0)
+    plane.SetNormal(0.6, 0.8, 0.0)
     mapper.AddClippingPlane(plane)
-    (half,) = marks_of(view, [])
-    assert half.points.reshape(-1, 3, 3).mean(axis=1)[:, 0].min() >= 0.0
-    assert abs(len(half.points) - len(back.points) / 2) < 0.2 * len(back.points)
+    (moved,) = marks_of(view, [])
+    np.testing.assert_array_equal(moved.points, mark.points)
+    np.testing.assert_allclose(moved.matrix[:3, 3], [1.0, 2.0, 3.0])
+    assert moved.shows_backs
+    np.testing.assert_allclose(moved.plane, [0.6, 0.8, 0.0, -0.6])
+
+
+def test_a_mark_that_moves_is_sent_without_its_points(stream):
+    view = plain_view((100, 100))
+    actor, _ = solid(strips=False)
+    view.renderer.AddActor(actor)
+    sizes = []
+    for place in (1.0, 2.0, 3.0):
+        actor.SetPosition(place, 0.0, 0.0)
+        (data,) = stream.due(LOOK, marks=marks_of(view, []))
+        sizes.append(len(data))
+    assert sizes == [16 + 120 + 12 * 3 * 1056, 16 + 120, 16 + 120]
+    assert not stream.due(LOOK, marks=marks_of(view, []))
+    (both,) = stream.due(LOOK, marks=2 * marks_of(view, []))
+    assert len(both) == 16 + 2 * 120
+    assert kinds(stream.due(LOOK)) == [Kind.MARKS]
+    (again,) = stream.due(LOOK, marks=marks_of(view, []))  # the page has forgotten it
+    assert len(again) == sizes[0]
+    stream.reset()
+    assert len(stream.due(LOOK, marks=marks_of(view, []))[-1]) == sizes[0]

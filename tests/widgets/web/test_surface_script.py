@@ -15,7 +15,9 @@ from PIL import Image
 from posed_scenes import random_cages, sausage_session
 from sheets import moebius
 from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkRenderingCore import vtkWindowToImageFilter
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkWindowToImageFilter
 
 from vtk_segdeform import Regions, fit_cages, sizes
 from vtk_segdeform.errors import MissingDependencyError
@@ -193,6 +195,48 @@ def test_marks_are_drawn_where_the_view_draws_them(page, scene):
     compare(page, here)
 
 
+def test_a_mark_that_moves_is_culled_and_clipped_as_in_the_view(page, scene):
+    here, session = scene.here, scene.session
+    here.stream.reset()
+    source, mapper, actor, plane = vtkSphereSource(), vtkPolyDataMapper(), vtkActor(), vtkPlane()
+    source.SetThetaResolution(24)
+    source.SetPhiResolution(24)
+    mapper.SetInputConnection(source.GetOutputPort())
+    mapper.AddClippingPlane(plane)
+    actor.SetMapper(mapper)
+    style = actor.GetProperty()
+    style.SetColor(1.0, 0.0, 0.0)
+    style.SetAmbient(1.0)
+    style.SetDiffuse(0.0)
+    actor.SetScale(0.3 * session.mesh.diagonal)
+    here.view.foreground.AddActor(actor)
+    low, high = session.vertices.min(axis=0), session.vertices.max(axis=0)
+    toward = -here.view.view_direction
+    counts = []
+    for share, normal, culls in (
+        (0.2, [1.0, 0.0, 0.0], False),
+        (0.7, [0.6, 0.0, 0.8], False),
+        (0.7, toward, True),  # of the half towards the viewer no back is visible
+        (0.7, -toward, True),
+    ):
+        place = low + share * (high - low)
+        actor.SetPosition(*place)
+        plane.SetOrigin(*place)
+        plane.SetNormal(*normal)
+        style.SetFrontfaceCulling(culls)
+        marks = marks_of(here.view, [here.surface.actor])
+        assert set(send(page, here.due(marks=marks))) == {""}
+        expected, got = here.picture(), drawn(page)
+        red = [(p[..., 0] > 200) & (p[..., 1] < 60) for p in (expected, got)]
+        assert (red[0] ^ red[1]).sum() <= 0.03 * (red[0] | red[1]).sum()
+        counts.append(int(red[0].sum()))
+    here.view.remove_foreground()
+    assert min(counts[0], counts[1], counts[3]) > 2000
+    assert counts[2] < 0.03 * counts[3]  # the rim
+    assert send(page, here.due()) == [""]
+    compare(page, here)
+
+
 def test_slow_software_draws_fewer_triangles(page, monkeypatch):
     monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
     monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
@@ -206,6 +250,12 @@ def test_slow_software_draws_fewer_triangles(page, monkeypatch):
         page.evaluate("surface.draw()")
     page.evaluate("delete performance.now")
     assert 0 < page.evaluate("surface._corners") < 0.6 * every
+    posed_rows = page.evaluate("[surface._posedRows, surface._height]")
+    assert posed_rows[0] < posed_rows[1]
+    first = here.session.cage_vertices[0]
+    here.session.move_cage(0, first + [0.0, 0.3 * np.ptp(first[:, 1]), 0.0])
+    assert set(send(page, here.due())) == {""}
+    expected = here.picture()
     few = drawn(page)
     mine, theirs = few[..., 3] > 0, (expected < 255).any(axis=2)
     assert (mine & theirs).sum() > 0.95 * (mine | theirs).sum()

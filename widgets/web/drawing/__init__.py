@@ -4,7 +4,8 @@ The files, in reading order:
 
     messages    binary messages to the page
     encoding    a mesh and its W~ as a message, and the messages of its poses
-    look        camera, light, material and marks of a VTK renderer
+    look        camera, light and material of a VTK renderer
+    marks       what it draws over the body
     labels      its texts
     stream      which messages a page still needs
 
@@ -15,7 +16,8 @@ from pathlib import Path
 
 from .encoding import EncodedSurface, encode_surface, is_drawable
 from .labels import label_actors, labels_of
-from .look import Look, Mark, look_of, marks_of
+from .look import Look, look_of
+from .marks import Mark, marks_of
 from .stream import SurfaceStream
 
 SCRIPT = Path(__file__).parents[1] / "page" / "surface.js"

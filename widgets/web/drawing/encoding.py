@@ -54,7 +54,8 @@ class EncodedSurface:
     centre, scale : (3,) float, float
         A point u of a message is ``centre + scale * u`` in the scene.
     order : (n,) int
-        The vertices of the mesh in the order of the message, set by set.
+        The vertices of the mesh in the order of the message: those of *coarse* first, and both
+        parts set by set.
     rest : (n, 3) float32
         The vertices at rest, in units of the message.
     steps : (n,) float32
@@ -68,7 +69,7 @@ class EncodedSurface:
     faces : (f, 3) uint32
         Triangles of the vertices, and from n on of *twice*.
     coarse : (c, 3) uint32
-        Fewer triangles between some of the vertices, for slow software; none for a small mesh.
+        Fewer triangles between the first vertices, for slow software; none for a small mesh.
     twice : (t,) uint32
         Vertices that are drawn a second time, with the opposite normal.
     cages : (m, 3) float
@@ -169,37 +170,41 @@ def encode_surface(
     low, high = bounds_of(mesh.vertices)
     centre, scale = 0.5 * (low + high), float(mesh.diagonal)
     near = _along_curve(mesh.vertices)
-    order, columns, steps, weights = [], [], [], []
-    for ids in subspace.sets_by_cages():
+    coarse, is_late = np.empty((0, 3), dtype=np.int64), np.ones(mesh.n_vertices, dtype=bool)
+    if mesh.n_vertices > sizes.PAGE_DRAFT:
+        kept, coarse = decimated_triangles(mesh)
+        coarse = kept[coarse]
+        is_late[coarse] = False
+    parts: list[tuple[int, IntArray]] = []  # numbers of sets, and vertices of them
+    columns: list[NDArray[np.uint16]] = []
+    for k, ids in enumerate(subspace.sets_by_cages()):
+        own = subspace.nonzeros(ids[:1])[0]
+        columns.append(np.pad(own, (0, -len(own) % _GROUP)).astype(np.uint16))
         members = ids[np.argsort(near[ids], kind="stable")]
-        own = subspace.nonzeros(members[:1])[0]
-        padding = -len(own) % _GROUP
-        order.append(members)
-        columns.append(np.pad(own, (0, padding)).astype(np.uint16))
+        parts += [(k, members[is_late[members] == late]) for late in (False, True)]
+    parts.sort(key=lambda part: bool(is_late[part[1]].any()))
+    steps, weights = [], []
+    for k, members in parts:
         for start in range(0, len(members), _ROWS):
             w = subspace.nonzeros(members[start : start + _ROWS])[1]
             step = (np.abs(w).max(axis=1) / _LARGEST).astype(np.float32)
             steps.append(step.copy())
             step[step == 0.0] = 1.0
             q = np.rint(w / step[:, None]).astype(np.int16)
-            weights.append(np.pad(q, ((0, 0), (0, padding))).ravel())
-    drawn = np.concatenate(order)
+            weights.append(np.pad(q, ((0, 0), (0, len(columns[k]) - w.shape[1]))).ravel())
+    drawn = np.concatenate([members for _, members in parts])
     place = np.empty(mesh.n_vertices, dtype=np.int64)
     place[drawn] = np.arange(mesh.n_vertices)
     twice, second = np.unique(place[mesh.faces.ravel()[turned]], return_inverse=True)
     faces = place[mesh.faces.ravel()]
     faces[turned] = mesh.n_vertices + second
-    coarse = np.empty((0, 3), dtype=np.int64)
-    if mesh.n_vertices > sizes.PAGE_DRAFT:
-        kept, coarse = decimated_triangles(mesh)
-        coarse = kept[coarse]
     return EncodedSurface(
         centre,
         scale,
         drawn,
         ((mesh.vertices[drawn] - centre) / scale).astype(np.float32),
         np.concatenate(steps),
-        np.repeat(np.arange(len(order)), [len(ids) for ids in order]).astype(np.uint16),
+        np.concatenate([np.full(len(ids), k, dtype=np.uint16) for k, ids in parts]),
         columns,
         np.concatenate(weights),
         _sorted(faces.reshape(-1, 3), mesh.faces, mesh.vertices),

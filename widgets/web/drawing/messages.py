@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 1
+VERSION = 2
 _MAGIC = b"SDFM"
 _HEADER = struct.Struct("<4sHHII")
 
@@ -38,7 +38,8 @@ class Kind(enum.IntEnum):
     LOOK = 5
     """Camera, light and material, float32; see `Look`."""
     MARKS = 6
-    """For each mark eight numbers and its points, float32; see `Mark`."""
+    """For each mark the numbers of `Mark.head`, and its points unless the last message of marks
+    had them, float32."""
 
 
 def message(kind: Kind, serial: int, *arrays: NDArray[Any]) -> bytes:

@@ -27,7 +27,8 @@ from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.session import Session
 
 from .encoding import EncodedSurface, encode_surface, is_drawable
-from .look import Look, Mark, marks_message
+from .look import Look
+from .marks import Mark, MarkStream
 
 _VISIBLE = 1e-4  # diagonals
 
@@ -47,6 +48,7 @@ class SurfaceStream:
         self._number = 0
         self._surface: EncodedSurface | None = None
         self._deformer: Deformer | None = None  # of `_surface`
+        self._marks = MarkStream()
         self.reset()
 
     @property
@@ -70,7 +72,8 @@ class SurfaceStream:
         """Send everything again: to a new page, or to one that lost its graphics memory."""
         self._sends_surface = True
         self._colours: NDArray[np.uint8] | None = None
-        self._look = self._marks = b""
+        self._look = b""
+        self._marks.reset()
         self._cages: tuple[FloatArray, ...] = ()
         self._offsets: FloatArray | None = None
 
@@ -132,11 +135,7 @@ class SurfaceStream:
             result += self._pose_messages(surface)
         elif self._is_finished or self._offsets is not None:
             result += self._offset_messages(surface)
-        drawn = marks_message(self._serial, surface, marks)
-        if drawn != self._marks and (marks or self._marks):
-            result.append(drawn)
-            self._marks = drawn
-        return result
+        return result + self._marks.due(self._serial, surface, marks)
 
     @property
     def _is_finished(self) -> bool:

@@ -1,18 +1,24 @@
 // The surface drawn by the page during a drag, in a layer over the server's picture.
 //
-// The layer shows, from below: the background; the server's last picture, cut out where the surface
-// was; the surface in its current pose; texts that have appeared since.  When the server sends a
-// picture again, which it does once the view rests, the layer fades.
+// The layer shows, from below: the server's last picture, with the background where the surface was;
+// the surface in its current pose; texts that have appeared since.  When the server sends a picture
+// again, which it does once the view rests, the layer fades.
+//
+// Without a graphics processor, putting the layer together takes as long as drawing the surface.
+// The lowest canvas is therefore opaque, which hides all below it from the browser's compositor, and
+// the canvas of the texts is no larger than they are.
 import './surface.js';
 
 const CUT = 3; // pixels around the surface in the server's picture that are cut out with it
 const SEVERAL = [[0, 0], [-CUT, -CUT], [CUT, -CUT], [-CUT, CUT], [CUT, CUT]];
+const COLOUR = /rgba?\([^)]*\)/g;
 
 export default class Drawing {
   // *layer* has three canvases: for the picture, the surface and the texts.
   constructor(layer, picture, call) {
     const [backdrop, body, words] = layer.querySelectorAll('canvas');
-    Object.assign(this, { layer, picture, backdrop, body, words, call, number: 0 });
+    Object.assign(this, { layer, picture, backdrop, body, words, call, number: 0, written: '' });
+    this.below = backdrop.getContext('2d', { alpha: false });
     this.surface = globalThis.SegdeformSurface.create(body);
     if (!this.surface) return;
     this.surface.ondraw = () => this.drawn();
@@ -48,17 +54,20 @@ export default class Drawing {
     for (let at = 0; at < size; at += numbers.getUint32(at + 8, true)) {
       messages.push(whole.subarray(at, at + numbers.getUint32(at + 8, true)));
     }
-    if (this.receive(messages)) this.call('holds', version);
+    if (!this.receive(messages)) return;
+    this.layer.dataset.surface = version;
+    this.call('holds', version);
   }
 
   // Draw an update; the first one of a drag shows what the picture shows.
-  show({ number, messages, labels, width, height, is_first: isFirst }) {
+  show({ number, messages, labels, width, height, is_first: isFirst, time }) {
     if (!this.surface || !this.receive(messages)) return;
-    for (const canvas of [this.backdrop, this.body, this.words]) {
+    for (const canvas of [this.backdrop, this.body]) {
       if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     }
     this.number = number;
-    this.write(labels);
+    this.time = time;
+    this.write(labels, width, height);
     if (isFirst) {
       this.surface.draw();
       this.cut();
@@ -82,6 +91,7 @@ export default class Drawing {
 
   drawn() {
     if (!this.number) return;
+    this.layer.dataset.time = this.time;
     this.layer.dataset.number = this.number;
     this.call('shown', this.number);
     this.number = 0;
@@ -89,24 +99,49 @@ export default class Drawing {
 
   // Copy the picture without the surface, which must have been drawn as the picture shows it.
   cut() {
-    const { width, height } = this.backdrop, context = this.backdrop.getContext('2d');
-    context.globalCompositeOperation = 'copy';
+    const { width, height } = this.backdrop;
+    const rest = Object.assign(document.createElement('canvas'), { width, height });
+    const context = rest.getContext('2d');
     context.drawImage(this.picture, 0, 0, width, height);
     context.globalCompositeOperation = 'destination-out';
     for (const [x, y] of SEVERAL) context.drawImage(this.body, x, y);
+    const colours = getComputedStyle(this.layer).backgroundImage.match(COLOUR) ?? ['white'];
+    const gradient = this.below.createLinearGradient(0, 0, 0, height);
+    colours.forEach((each, k) => gradient.addColorStop(k / Math.max(1, colours.length - 1), each));
+    this.below.fillStyle = gradient;
+    this.below.fillRect(0, 0, width, height);
+    this.below.drawImage(rest, 0, 0);
   }
 
-  write(labels) {
-    const context = this.words.getContext('2d');
-    context.clearRect(0, 0, this.words.width, this.words.height);
+  // Write texts and rectangles, given in pixels of a view of this size.
+  write(labels, width, height) {
+    const written = JSON.stringify([labels, width, height]);
+    if (written === this.written) return;
+    this.written = written;
+    const context = this.words.getContext('2d'), { style } = this.words;
+    const font = (size) => `bold ${size}px "DejaVu Sans", system-ui, sans-serif`;
+    let [left, top, right, bottom] = [Infinity, Infinity, -Infinity, -Infinity];
+    for (const { text, place, box, size } of labels) {
+      context.font = font(size);
+      const [x, y, w, h] = box
+        ?? [place[0], place[1] - size, context.measureText(text).width, 2 * size];
+      left = Math.max(0, Math.min(left, Math.floor(x)));
+      top = Math.max(0, Math.min(top, Math.floor(y)));
+      right = Math.min(width, Math.max(right, Math.ceil(x + w)));
+      bottom = Math.min(height, Math.max(bottom, Math.ceil(y + h)));
+    }
+    const wide = Math.max(1, right - left), high = Math.max(1, bottom - top);
+    Object.assign(this.words, { width: wide, height: high }); // which clears it
+    style.display = right > left && bottom > top ? '' : 'none';
+    const parts = { left: left / width, top: top / height, width: wide / width, height: high / height };
+    for (const [name, part] of Object.entries(parts)) style[name] = `${100 * part}%`;
     context.textBaseline = 'middle';
+    context.translate(-left, -top);
     for (const { text, place, box, size, colour } of labels) {
       context.fillStyle = colour;
+      context.font = font(size);
       if (box) context.fillRect(...box);
-      else {
-        context.font = `bold ${size}px "DejaVu Sans", system-ui, sans-serif`;
-        context.fillText(text, ...place);
-      }
+      else context.fillText(text, ...place);
     }
   }
 }

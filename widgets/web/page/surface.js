@@ -17,17 +17,17 @@
 
 (() => {
   const MAGIC = 0x4d464453; // "SDFM"
-  const VERSION = 1;
+  const VERSION = 2;
   const HEADER = 16;
   const SURFACE = 1, CAGES = 2, OFFSETS = 3, COLOURS = 4, LOOK = 5, MARKS = 6;
   const ROW = 1024; // texels in a row of a texture; a power of two
   const ROW_BITS = 10;
   const GROUP = 4; // weights in a texel
   const LOOK_NUMBERS = 44;
-  const MARK_NUMBERS = 8;
+  const MARK_NUMBERS = 30;
   const LIGHTS = 4;
   const SLOW = 60; // milliseconds for a picture, beyond which software draws fewer triangles
-  const MEASURED = 8; // one of so many pictures is timed
+  const MEASURED = 8; // one of so many pictures is timed, the third one first
   const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
   const HEAD = `#version 300 es
@@ -115,23 +115,26 @@ ${[...Array(count).keys()].map((k) =>
 
   // Lines and points of constant size: a quad for each, between start and end.
   const MARK = HEAD + `
-uniform mat4 view, projection;
+uniform mat4 model, view, projection;
+uniform vec4 plane;
 uniform vec2 pixels;
 uniform float size, lift;
 in vec3 start, end;
 out vec2 place;
-out float along;
+out float along, side;
 void main() {
-  vec4 a = projection * (view * vec4(start, 1.0)), b = projection * (view * vec4(end, 1.0));
+  vec4 first = model * vec4(start, 1.0), last = model * vec4(end, 1.0);
+  vec4 a = projection * (view * first), b = projection * (view * last);
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
   vec2 p = a.xy / a.w * pixels, q = b.xy / b.w * pixels;
   vec2 way = q - p;
   float far = length(way);
-  vec2 t = far > 0.0 ? way / far : vec2(1.0, 0.0), side = vec2(-t.y, t.x);
+  vec2 t = far > 0.0 ? way / far : vec2(1.0, 0.0), across = vec2(-t.y, t.x);
   vec4 at = corner.x < 0.5 ? a : b;
+  side = dot(plane, corner.x < 0.5 ? first : last);
   place = vec2(corner.x < 0.5 ? -size : far + size, (2.0 * corner.y - 1.0) * size);
   along = far;
-  vec2 shift = (2.0 * corner.x - 1.0) * size * t + place.y * side;
+  vec2 shift = (2.0 * corner.x - 1.0) * size * t + place.y * across;
   at.xy += shift / pixels * at.w;
   at.z -= lift * at.w;
   gl_Position = at;
@@ -141,9 +144,10 @@ void main() {
 uniform vec4 tint;
 uniform float size;
 in vec2 place;
-in float along;
+in float along, side;
 out vec4 pixel;
 void main() {
+  if (side < 0.0) discard;
   float away = length(vec2(place.x - clamp(place.x, 0.0, along), place.y));
   float inside = clamp(size - away, 0.0, 1.0);
   if (inside <= 0.0) discard;
@@ -151,14 +155,24 @@ void main() {
 }`;
 
   const PAINTED = HEAD + `
-uniform mat4 view, projection;
+uniform mat4 model, view, projection;
+uniform vec4 plane;
 in vec3 start;
-void main() { gl_Position = projection * (view * vec4(start, 1.0)); }`;
+out float side;
+void main() {
+  vec4 place = model * vec4(start, 1.0);
+  side = dot(plane, place);
+  gl_Position = projection * (view * place);
+}`;
 
   const PLAIN = HEAD + `
 uniform vec4 tint;
+in float side;
 out vec4 pixel;
-void main() { pixel = tint; }`;
+void main() {
+  if (side < 0.0) discard;
+  pixel = tint;
+}`;
 
   class Refused extends Error {}
 
@@ -293,7 +307,6 @@ void main() { pixel = tint; }`;
       this._look = null;
       this._held = null; // during a turn in the page: the last look from the server
       this._request = 0;
-      this._marks = [];
       this._begin();
       canvas.addEventListener("webglcontextlost", (event) => {
         event.preventDefault();
@@ -418,7 +431,7 @@ void main() { pixel = tint; }`;
       const coarse = reader.take(Uint32Array, 3 * nCoarse), twice = reader.take(Uint32Array, t);
       reader.end();
       require(areFinite(rest) && areFinite(steps), "a surface with coordinates that are no numbers");
-      require(Math.max(largest(faces), largest(coarse)) < n + t, "a face without its vertices");
+      require(largest(faces) < n + t && largest(coarse) < n, "a face without its vertices");
       require(t === 0 || largest(twice) < n, "a second copy of no vertex");
       require(largest(sets) < nSets, "a vertex in no set");
       require(nColumns === 0 || largest(columns) < m, "a weight of no cage vertex");
@@ -459,6 +472,7 @@ void main() { pixel = tint; }`;
       this._columns = columns.slice();
       this._rest = this._texture(gl.RGBA32F, places, height);
       this._rows = this._texture(gl.RGBA32UI, rows, height);
+      this._posedRows = height; // of texels, whose vertices are drawn
       this._weights = this._texture(gl.RGBA16I, weights);
       this._fans = this._texture(gl.RGBA32UI, fans);
       this._neighbours = this._texture(gl.RGBA32UI, neighbours);
@@ -570,15 +584,25 @@ void main() { pixel = tint; }`;
     }
 
     _readMarks(reader) {
-      const marks = [];
+      const marks = [], all = new Map(); // by number; known ones are kept
       while (reader.left > 0) {
         const numbers = reader.take(Float32Array, MARK_NUMBERS);
-        const [shape, isAbove, r, g, b, a, size, count] = numbers;
+        const [shape, isAbove, r, g, b, a, size, count, number, showsBacks] = numbers;
         require(areFinite(numbers) && [1, 2, 3].includes(shape), "a mark of unknown shape");
         require(Number.isInteger(count) && count >= 0 && count % shape === 0, "a mark cut short");
-        const points = reader.take(Float32Array, 3 * count);
-        marks.push({ shape, isAbove: isAbove > 0, tint: [r * a, g * a, b * a, a], size, points });
+        const points = all.get(number) ?? this._points.get(number)
+          ?? { numbers: reader.take(Float32Array, 3 * count).slice(), count, buffer: null };
+        require(points.count === count, "a mark with the points of another");
+        all.set(number, points);
+        marks.push({
+          shape, isAbove: isAbove > 0, tint: [r * a, g * a, b * a, a], size, points,
+          showsBacks: showsBacks > 0, model: numbers.slice(10, 26), plane: numbers.slice(26, 30),
+        });
       }
+      for (const [number, { buffer }] of this._points) {
+        if (!all.has(number)) this.gl.deleteBuffer(buffer);
+      }
+      this._points = all;
       this._marks = marks;
     }
 
@@ -607,7 +631,8 @@ void main() { pixel = tint; }`;
       this._body = gl.createVertexArray();
       this._none = gl.createVertexArray();
       this._lines = gl.createVertexArray();
-      this._line = gl.createBuffer();
+      this._marks = [];
+      this._points = new Map(); // of marks, by number
       this._target = gl.createFramebuffer();
       this._textures = this._buffers = [];
     }
@@ -686,14 +711,14 @@ void main() { pixel = tint; }`;
       gl.disable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
       gl.bindVertexArray(this._none);
-      gl.viewport(0, 0, ROW, this._height);
+      gl.viewport(0, 0, ROW, this._posedRows);
       gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
       const into = (texture, buffer) => {
         gl.framebufferTexture2D(
           gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
         gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
-        gl.readPixels(0, 0, ROW, this._height, gl.RGBA, gl.FLOAT, 0);
+        gl.readPixels(0, 0, ROW, this._posedRows, gl.RGBA, gl.FLOAT, 0);
         gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
       };
       const uniforms = this._use(this._posed, {
@@ -709,12 +734,18 @@ void main() { pixel = tint; }`;
       this._isMoved = false;
     }
 
-    // Draw fewer triangles from now on, if pictures take too long without a graphics processor.
+    // Draw fewer triangles, between the first vertices, and pose only these from now on, if
+    // pictures take too long without a graphics processor.
     _spareSoftware(began) {
       const gl = this.gl;
-      if (!this._coarse.length || this.pictures % MEASURED !== MEASURED - 1) return;
+      if (!this._coarse.length || this.pictures % MEASURED !== 2) return;
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
       if (performance.now() - began < SLOW) return;
+      const n = largest(this._coarse) + 1;
+      const { fans, neighbours } = fansOf(n, this._coarse, []);
+      this._fans = this._texture(gl.RGBA32UI, fans);
+      this._neighbours = this._texture(gl.RGBA32UI, neighbours);
+      this._posedRows = Math.ceil(n / ROW);
       gl.bindVertexArray(this._body);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this._coarse, gl.STATIC_DRAW);
       this._corners = this._coarse.length;
@@ -763,16 +794,23 @@ void main() { pixel = tint; }`;
 
     _drawMark(mark, projection) {
       const gl = this.gl, program = mark.shape === 3 ? this._painted : this._marked;
+      const { points } = mark;
       const uniforms = this._use(program, {}), { start, end } = program.attributes;
       gl.uniformMatrix4fv(uniforms.view, false, this._look.view);
       gl.uniformMatrix4fv(uniforms.projection, false, projection);
+      gl.uniformMatrix4fv(uniforms.model, false, mark.model);
+      gl.uniform4fv(uniforms.plane, mark.plane);
       gl.uniform4fv(uniforms.tint, mark.tint);
       gl.enable(gl.DEPTH_TEST);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       gl.bindVertexArray(this._lines);
-      gl.bindBuffer(gl.ARRAY_BUFFER, this._line);
-      gl.bufferData(gl.ARRAY_BUFFER, mark.points, gl.STREAM_DRAW);
+      if (!points.buffer) {
+        points.buffer = gl.createBuffer();
+        gl.bindBuffer(gl.ARRAY_BUFFER, points.buffer);
+        gl.bufferData(gl.ARRAY_BUFFER, points.numbers, gl.STATIC_DRAW);
+      }
+      gl.bindBuffer(gl.ARRAY_BUFFER, points.buffer);
       const each = mark.shape === 3 ? 0 : 1, stride = each ? 12 * mark.shape : 12;
       const ends = each ? [[start, 0], [end, 12 * (mark.shape - 1)]] : [[start, 0]];
       for (const [attribute, offset] of ends) {
@@ -780,14 +818,17 @@ void main() { pixel = tint; }`;
         gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, stride, offset);
         gl.vertexAttribDivisor(attribute, each);
       }
-      const count = mark.points.length / 3;
       if (each) {
         gl.uniform2f(uniforms.pixels, this.canvas.width / 2, this.canvas.height / 2);
         gl.uniform1f(uniforms.size, mark.size / 2 + 0.5);
         gl.uniform1f(uniforms.lift, 2e-3);
-        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, count / mark.shape);
+        gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, points.count / mark.shape);
       } else {
-        gl.drawArrays(gl.TRIANGLES, 0, count);
+        if (mark.showsBacks) gl.enable(gl.CULL_FACE);
+        gl.cullFace(gl.FRONT);
+        gl.drawArrays(gl.TRIANGLES, 0, points.count);
+        gl.cullFace(gl.BACK);
+        gl.disable(gl.CULL_FACE);
       }
       for (const [attribute] of ends) {
         gl.disableVertexAttribArray(attribute);

@@ -5,6 +5,7 @@
 // One finger is the left button; two fingers turn (Alt and the left button) and pinch (the wheel);
 // three fingers pan (the middle button).  During a drag the page may draw itself; see `Drawing`.
 import Drawing from './drawing.js';
+import receiveBuffers from './socket.js';
 
 const AHEAD = 3; // messages without an answer
 const WHEEL = 100, PINCHED_WHEEL = 12; // pixels of one click of the wheel
@@ -138,7 +139,8 @@ const View = {
   watch: { draws(draws) { this.drawing.want(draws); } },
 
   mounted() {
-    const session = this.trame.client.getConnection().getSession();
+    const connection = this.trame.client.getConnection(), session = connection.getSession();
+    receiveBuffers(connection);
     this.call = (method, ...args) => session.call(`segdeform.${method}`, args);
     this.outbox = new Outbox((events) => this.call('input', events));
     this.fingers = new Fingers(this);
@@ -189,6 +191,7 @@ const View = {
         canvas.height = height;
       }
       canvas.getContext('bitmaprenderer').transferFromImageBitmap(bitmap);
+      canvas.dataset.time = event.time;
       canvas.dataset.number = number;
       this.drawing.hide();
       this.call('shown', number);
@@ -209,7 +212,8 @@ const View = {
       const x = (place.clientX - box.left) / box.width;
       const y = (place.clientY - box.top) / box.height;
       this.place = place;
-      this.outbox.put({ name, x, y, ...flags, ...more });
+      const time = place.timeStamp || performance.now();
+      this.outbox.put({ name, x, y, time, ...flags, ...more });
     },
 
     flags(event) {
