@@ -251,20 +251,22 @@ def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
     assert not section.ratios
 
 
-def test_a_drag_is_followed_in_process_and_in_chromium(monkeypatch):
+@pytest.mark.parametrize("drawn", ["in process", pytest.param("page", marks=pytest.mark.campaign)])
+def test_a_drag_is_followed(monkeypatch, drawn):
     pytest.importorskip("trame")
     monkeypatch.setattr(browser, "_WARM_UP", 6)
-    monkeypatch.setattr(browser, "_MOVES", 120)
-    drags = [browser.in_process(700, TINY, (300, 200))]
-    try:
-        drags.append(browser._in_browser(700, TINY, draws=True))
-    except MissingDependencyError as missing:
-        pytest.skip(str(missing))
-    for drag in drags:
-        assert drag.frames > 0.0
-        assert 0.0 < drag.latencies[0] <= drag.latencies[1]
-    assert drags[1].size > 500.0
-    assert drags[1].view[0] < 1400
+    monkeypatch.setattr(browser, "_MOVES", 120 if drawn == "page" else 30)
+    if drawn == "in process":
+        drag = browser.in_process(700, TINY, (300, 200))
+    else:
+        try:
+            drag = browser._in_browser(700, TINY, draws=True)
+        except MissingDependencyError as missing:
+            pytest.skip(str(missing))
+        assert drag.size > 500.0
+        assert drag.view[0] < 1400
+    assert drag.frames > 0.0
+    assert 0.0 < drag.latencies[0] <= drag.latencies[1]
 
 
 def test_numbers_of_a_column_have_one_notation_unless_the_table_is_mixed():

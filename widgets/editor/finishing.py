@@ -6,7 +6,8 @@
     on the screen  ->  `Glide`, since the pose may move by some per cent of the diagonal
 
 The next press, every change of the session, and saving cancel it: a file contains what was shown,
-and stays up to date.  Large meshes are finished on request only.  A replay finishes where the recording did.
+and stays up to date.  Large meshes are finished on request only.  A replay finishes where the
+recording did.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("trame")
-aiohttp = pytest.importorskip("aiohttp")
-
+pytest.importorskip("aiohttp")
+import aiohttp
 from chromium import CTRL, Chromium, Page, needs_chromium
 from visitors import Visitor
 from web_hands import line, only_file
