@@ -17,7 +17,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.files import replacing
@@ -123,15 +122,8 @@ def _name_file(place: Path) -> Path:
     return place.with_suffix(".name")
 
 
-def _ignore_lost_pages(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Log no error where a page has gone while wslink was sending to it."""
-    if not isinstance(context.get("exception"), ConnectionResetError):
-        loop.default_exception_handler(context)
-
-
 async def _serve(web: WebEditor, autosave: Autosave, port: int) -> None:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
-    loop.set_exception_handler(_ignore_lost_pages)
 
     def ready(port: int) -> None:
         autosave.start()

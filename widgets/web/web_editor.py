@@ -156,6 +156,9 @@ class WebEditor:
 
     async def serve(self, *, port: int = 0, ready: Callable[[int], object] | None = None) -> None:
         """Serve the page, as `start` does, in the running event loop."""
+        own = asyncio.get_running_loop()
+        if own.get_exception_handler() is None:
+            own.set_exception_handler(_ignore_lost_pages)
 
         def begin(**_: object) -> None:
             loop = asyncio.get_running_loop()
@@ -269,6 +272,14 @@ class WebEditor:
         if self._is_plotter_ours:
             set_background(self.plotter.renderer, dark=dark is True)
         self.stream.want()
+
+
+def _ignore_lost_pages(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Report errors of tasks, but not where a page has gone while wslink was sending to it."""
+    of = getattr(context.get("future"), "get_coro", lambda: None)()
+    is_wslinks = getattr(of, "__qualname__", "").startswith("WslinkHandler.")
+    if not (is_wslinks and isinstance(context.get("exception"), ConnectionResetError)):
+        loop.default_exception_handler(context)
 
 
 @contextmanager

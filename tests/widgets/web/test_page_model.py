@@ -15,7 +15,6 @@ from vtk_segdeform import Session, models
 from vtk_segdeform.widgets.editor import Mode, keys_of
 from vtk_segdeform.widgets.editor.hints import hint
 from vtk_segdeform.widgets.panel.status import words_of
-from vtk_segdeform.widgets.web.client import _ignore_lost_pages
 from vtk_segdeform.widgets.web.touch import for_fingers
 
 KEYS = keys_of("pyvista")
@@ -73,13 +72,24 @@ def test_a_page_cannot_end_its_process(web):
 
 
 def test_a_page_that_leaves_is_no_error_but_all_else_is():
+    from vtk_segdeform.widgets.web.web_editor import _ignore_lost_pages
+
+    def task(name):
+        return SimpleNamespace(get_coro=lambda: SimpleNamespace(__qualname__=name))
+
     loop, seen = asyncio.new_event_loop(), []
     loop.default_exception_handler = seen.append
-    _ignore_lost_pages(loop, {"exception": ConnectionResetError(), "message": ""})
-    other = {"exception": ValueError(), "message": ""}
-    _ignore_lost_pages(loop, other)
+    sending, theirs = task("WslinkHandler.sendWrappedMessage"), task("their_own")
+    _ignore_lost_pages(loop, {"exception": ConnectionResetError(), "future": sending})
+    others = [
+        {"exception": ValueError(), "future": sending},
+        {"exception": ConnectionResetError(), "future": theirs},
+        {"exception": ConnectionResetError(), "message": ""},
+    ]
+    for context in others:
+        _ignore_lost_pages(loop, context)
     loop.close()
-    assert seen == [other]
+    assert seen == others
 
 
 def settle(editor):
