@@ -27,6 +27,7 @@ from qt_hands import (
     QtTest,
     QtWidgets,
     application,
+    new_screen,
     small,
     until,
 )
@@ -234,6 +235,54 @@ def watch_cycles(kind, times):
         each = MORE + OF_PLAIN_VTK * issubclass(kind, PlainDock)
         bound = SLACK + each * (len(memory) - SETTLED)
         assert grown < bound, f"{grown:.1f} MiB more: {np.round(memory, 1)}"
+
+
+DELETED = """
+import time
+import shiboken6
+from qtpy import QtWidgets
+from vtk_segdeform import models
+from vtk_segdeform.widgets.qt import DeformWidget
+
+application, mesh = QtWidgets.QApplication([]), models.cactus(700)
+
+def shown(window):
+    window.resize(500, 400)
+    window.show()
+    let_run()
+    return window
+
+def let_run():
+    end = time.monotonic() + 0.4
+    while time.monotonic() < end:
+        application.processEvents()
+
+other = shown(DeformWidget(mesh))
+for _ in range(4):
+    third = shown(DeformWidget(mesh))
+    window, widget = QtWidgets.QMainWindow(), DeformWidget(mesh)
+    window.setCentralWidget(widget)
+    shown(window)
+    shiboken6.delete(window)
+    let_run()
+    other.editor.view.request_render()
+    let_run()
+    other.editor.view.render()
+print("all drawn", flush=True)
+"""
+
+
+@pytest.mark.campaign
+def test_a_window_that_qt_deletes_without_closing_it_leaves_the_others_as_they_are():
+    pytest.importorskip("shiboken6")
+    application()  # or skip
+    own = {"DISPLAY": new_screen(), "PYVISTA_OFF_SCREEN": "false", "QT_XCB_GL_INTEGRATION": ""}
+    environment = {**os.environ, **own}
+    environment.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
+    done = subprocess.run(
+        [sys.executable, "-c", DELETED], capture_output=True, text=True, env=environment
+    )
+    assert "all drawn" in done.stdout, done.stderr[-2000:]  # it may crash at its own end
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs Linux's /proc")
