@@ -49,7 +49,7 @@ class Timers:
             self._schedule(timer)
 
     def postpone(self) -> None:
-        """Begin the periods of repeating timers anew, because of input."""
+        """Restart the period of every repeating timer, because there was input."""
         for timer, handle in self._handles.items():
             seconds, is_repeating = self._periods[timer]
             if self._loop is not None and is_repeating:

@@ -222,7 +222,7 @@ class WebEditor:
         self._remove_own()
 
     def _forget(self) -> None:
-        """Let go of the server, which trame and wslink keep until the next one is started."""
+        """Release the server; trame and wslink keep a reference to the last one."""
         if CoreServer.server is self.server:
             CoreServer.server = wslink_server.ws_server = None
 
