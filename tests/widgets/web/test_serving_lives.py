@@ -126,7 +126,7 @@ def test_a_client_ends_some_time_after_its_page(do, tmp_path):
 @ON_LINUX
 def test_the_address_continues_the_work_of_a_page_that_has_gone_on_this_machine_only(do, tmp_path):
     async def story():
-        async with serving(tmp_path, replace(LIMITS, keep=KEEP)) as (server, visitor):
+        async with serving(tmp_path, replace(LIMITS, clients=6, keep=KEEP)) as (server, visitor):
             one = visitor()
             first, _ = await one.enter()
             async with one.socket() as socket:
@@ -143,6 +143,10 @@ def test_the_address_continues_the_work_of_a_page_that_has_gone_on_this_machine_
             assert fourth not in (first, second, third)
             assert state == ""
             server.host = "127.0.0.1"
+            two = [await visitor().get(f"/?token={server.access.token}") for _ in range(2)]
+            assert two[0][2]["Location"] == one.path
+            assert two[1][2]["Location"] != one.path  # the first one is loading
+            await pass_by(100.0)
             assert await visitor().enter() == (first, "pulled")
 
     do(story())

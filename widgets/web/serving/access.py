@@ -20,8 +20,8 @@ from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
-_DAYS = 90  # that a browser keeps a cookie: longer than a client is expected to live
 ANY = frozenset({"0.0.0.0", "::", ""})  # reached by all names of the machine
+_DAYS = 90  # that a browser keeps a cookie: longer than a client is expected to live
 _HOST = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:.]+)\]|(?P<name>[A-Za-z0-9._-]+))(?::\d{1,5})?")
 
 _ERRORS = {

@@ -91,7 +91,7 @@ class Client:
         return 0.0 if self._visits else asyncio.get_running_loop().time() - self._seen
 
     @property
-    def is_left(self) -> bool:
+    def is_abandoned(self) -> bool:
         """Whether it had a page, which is gone for longer than a reload takes."""
         return self._had_page and self.absent > _RELOAD
 

@@ -45,10 +45,10 @@ class Clients:
         self._clients[client.id] = client
         return client
 
-    def left(self) -> Client | None:
-        """Return the client whose page was closed last, if there is one."""
-        left = [client for client in self._clients.values() if client.is_left]
-        return min(left, key=lambda client: client.absent, default=None)
+    def abandoned(self) -> Client | None:
+        """Return the client whose page went last, if there is one."""
+        found = [client for client in self._clients.values() if client.is_abandoned]
+        return min(found, key=lambda client: client.absent, default=None)
 
     def get(self, name: str) -> Client | None:
         """Return the client with this id, if there is one."""

@@ -91,7 +91,7 @@ class Server:
     async def _enter(self, request: web.Request) -> web.StreamResponse:
         self.access.require_token(request)
         # On this machine the work is that of the same user, whose page or browser has gone.
-        client = self.clients.left() if self.is_local else None
+        client = self.clients.abandoned() if self.is_local else None
         if client is None and self.clients.is_full:
             refuse(
                 503,
@@ -100,8 +100,9 @@ class Server:
             )
         client = client or self.clients.new()
         path = f"/s/{client.id}/"
-        response = web.Response(status=303, headers={hdrs.LOCATION: path})
-        self.access.set_cookie(response, client.key, path)
+        with client.visit():  # so that nobody else continues it before its page is loaded
+            response = web.Response(status=303, headers={hdrs.LOCATION: path})
+            self.access.set_cookie(response, client.key, path)
         return response
 
     async def _below(self, request: web.Request) -> web.StreamResponse:
