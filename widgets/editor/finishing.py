@@ -82,6 +82,11 @@ class Finishing:
         """Completed fraction, 0..1, coarsely; None if no pose is being finished."""
         return self._fraction
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether a pose is being finished, or will be in a moment."""
+        return self._stop_waiting is not None or self._job is not None
+
     def rest(self) -> None:
         """Finish the pose in a moment: a drag has just ended."""
         self.interrupt()

@@ -139,6 +139,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
         served.wait(lambda steps=steps: session.position == steps + 1 and served.is_at_rest)
     assert np.abs(changes).max() < 1e-12
 
+    served.wait(lambda: not editor.controller.finishing.is_pending)  # which changes the last step
     posed, steps = session.vertices, session.position
     while session.position:
         here = session.position
