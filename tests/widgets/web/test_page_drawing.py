@@ -61,7 +61,8 @@ class Drawn:
                 and stream._pictures.still() is not None
             )
         )
-        self.page.wait(f"!{LIVE} && getComputedStyle({BODY}.parentNode).opacity == '0'")
+        is_clear = f"!{LIVE} && getComputedStyle({BODY}.parentNode).opacity == '0'"
+        self.page.wait(f"{is_clear} && !document.querySelector('.sd-progress')")
 
     def top(self) -> tuple[float, float]:
         """Return where the page shows a point of the upper side."""
