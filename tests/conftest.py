@@ -8,6 +8,7 @@ import hashlib
 import os
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,13 @@ def fitted_once() -> Iterator[Any]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fit, "_fit", fitted)
         yield fitting
+
+
+@pytest.fixture(autouse=True)
+def _windows_again() -> Iterator[None]:
+    hands = sys.modules.get("hands")  # which imports VTK
+    with hands.windows_again() if hands else nullcontext():
+        yield
 
 
 @functools.cache

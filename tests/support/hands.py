@@ -6,7 +6,8 @@ imports this are skipped there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -19,9 +20,35 @@ from vtk_segdeform.pictures.canvas import require_offscreen
 from vtk_segdeform.widgets.scene.view import View
 
 
-def plain_view(size: tuple[int, int] = (400, 400)) -> View:
-    """Return a renderer in an off-screen window, with VTK's trackball camera and no pyvista."""
-    renderer, window = vtkRenderer(), vtkRenderWindow()
+# Windows, and what is drawn in them.  A new one needs 80 ms for its context and its shaders, as
+# much as twenty gestures.
+_spare: list[vtkRenderWindow] = []
+_in_use: list[tuple[vtkRenderWindow, vtkGenericRenderWindowInteractor]] = []
+
+
+@contextmanager
+def windows_again() -> Iterator[None]:
+    """Let later views use the windows of the views that are made in the ``with`` block."""
+    _in_use.clear()  # these are of fixtures of a module
+    yield
+    for window, interactor in _in_use:
+        for renderer in [*window.GetRenderers()]:
+            window.RemoveRenderer(renderer)
+        window.RemoveAllObservers()
+        window.SetNumberOfLayers(1)
+        interactor.SetRenderWindow(None)
+        window.SetInteractor(None)
+        _spare.append(window)
+    _in_use.clear()
+
+
+def plain_view(size: tuple[int, int] = (400, 400), *, is_own: bool = False) -> View:
+    """Return a renderer in an off-screen window, with VTK's trackball camera and no pyvista.
+
+    The window may have shown views of earlier tests, and will show later ones, unless *is_own*.
+    """
+    renderer = vtkRenderer()
+    window = vtkRenderWindow() if is_own or not _spare else _spare.pop()
     renderer.SetBackground(1.0, 1.0, 1.0)
     window.SetOffScreenRendering(True)
     window.SetMultiSamples(0)
@@ -31,6 +58,8 @@ def plain_view(size: tuple[int, int] = (400, 400)) -> View:
     interactor.SetRenderWindow(window)
     interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
     interactor.Initialize()
+    if not is_own:
+        _in_use.append((window, interactor))
     return View(renderer, interactor)
 
 

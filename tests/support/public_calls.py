@@ -240,7 +240,7 @@ def given() -> sd.Surface:
 def view() -> Any:
     from hands import plain_view
 
-    return plain_view((64, 64))
+    return plain_view((64, 64), is_own=True)
 
 
 @functools.cache

@@ -163,7 +163,7 @@ def test_stopping_after_the_window_is_closed_is_harmless():
 
 
 def test_a_timer_that_was_not_stopped_keeps_nothing_alive():
-    view = plain_view((60, 60))
+    view = plain_view((60, 60), is_own=True)
     OneTimerHost(view.interactor)
     view.every(20, view.request_render)
     gone = weakref.ref(view), weakref.ref(view.interactor)
