@@ -137,6 +137,7 @@ def test_table_one_splits_a_step_in_both_formulations():
     assert len(section.ratios) == 2
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("steady")
 def test_the_segmentation_study_has_a_row_for_each_number_of_regions():
     section = segmentation_study.run(TINY)

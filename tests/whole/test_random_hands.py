@@ -13,7 +13,7 @@ from monkey import Monkey
 @pytest.mark.parametrize(
     ("seed", "count"),
     [
-        (1, 100),
+        (5, 60),
         pytest.param(1, 150, marks=pytest.mark.campaign),
         pytest.param(9, 300, marks=pytest.mark.campaign),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),

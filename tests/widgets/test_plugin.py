@@ -208,7 +208,9 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
 @pytest.mark.parametrize(
     ("imports", "there"),
     [
-        ("import pyvista, vtk_segdeform", [True, True]),
+        pytest.param(
+            "import pyvista, vtk_segdeform", [True, True], marks=pytest.mark.campaign
+        ),
         (
             "import sys, vtk_segdeform; assert 'pyvista' not in sys.modules;"
             "import vtk_segdeform.cli.commands, vtk_segdeform.widgets.editor;"

@@ -85,6 +85,7 @@ def around(editor, mask):
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
 
+@pytest.mark.campaign
 def test_the_whole_story_in_qt(qt):
     _, editor, hand, _ = qt
     session, height = editor.session, MESH.vertices[:, 2]

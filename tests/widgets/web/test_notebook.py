@@ -26,6 +26,8 @@ def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
         running.run(
             "import asyncio, gc, sys, weakref\nimport pyvista as pv\nimport vtk_segdeform as sd"
         )
+        running.run("from vtk_segdeform.widgets.web import web_editor")
+        running.run("web_editor._SAMPLES = 0")  # multisampling in software takes long
         running.run(f"mesh = {SMALL}")
         running.run("kept = sd.edit(mesh)")  # runs until the kernel ends
         running.wait("kept.web.server.running")

@@ -218,7 +218,7 @@ def test_a_picture_older_than_what_the_page_draws_is_dropped(drawn: Drawn) -> No
     drawn.rest()
 
 
-@pytest.mark.parametrize("cause", ["lost", "refused"])
+@pytest.mark.parametrize("cause", ["lost", pytest.param("refused", marks=pytest.mark.campaign)])
 def test_when_the_page_cannot_draw_the_server_does(drawn: Drawn, cause: str) -> None:
     page, served = drawn.page, drawn.served
     end = drawn.drag((60.0, 0.0))
@@ -254,6 +254,7 @@ def test_when_the_page_cannot_draw_the_server_does(drawn: Drawn, cause: str) -> 
     drawn.rest()
 
 
+@pytest.mark.campaign
 def test_the_view_menu_decides_who_draws_and_the_browser_remembers(drawn: Drawn) -> None:
     page, entry = drawn.page, "[...document.querySelectorAll('.sd-menu button')].at(-1)"
     remembered = "localStorage.getItem('segdeform drawing')"
@@ -274,6 +275,7 @@ def test_the_view_menu_decides_who_draws_and_the_browser_remembers(drawn: Drawn)
         drawn.rest()
 
 
+@pytest.mark.campaign
 def test_of_two_pages_none_draws(drawn: Drawn) -> None:
     other = drawn.served.page(drawn.browser, size=SIZE, beside=drawn.page)
     assert not drawn.served.call(lambda: drawn.drawing.is_possible)
@@ -286,4 +288,7 @@ def test_of_two_pages_none_draws(drawn: Drawn) -> None:
     drawn.rest()
     other.close()
     drawn.await_surface()
+
+
+def test_the_page_has_reported_no_error(drawn: Drawn) -> None:
     assert [m for m in drawn.page.messages() if m.startswith("error") and "405" not in m] == []
