@@ -32,6 +32,7 @@ import pytest  # noqa: E402 - its plugins read the variables above
 _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 _WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 _KERNELS = "test_compiled.py"
+_PROGRAMS = {"app", "qt", "web"}
 
 
 class _Backwards(pytest.Dir):
@@ -47,13 +48,21 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give each worker a share of the tests of kernels first, to be compiled once."""
+    """Give each worker a share of the tests of kernels first, to be compiled once.
+
+    The last worker then begins with the tests of programs, so that the tests at the end, which
+    workers take from each other, are short and start no browser.
+    """
     if _WORKERS == 1:
         return
     items.sort(key=lambda item: item.path)
     kernels = [item for item in items if item.path.name == _KERNELS]
-    others = [item for item in items if item.path.name != _KERNELS]
-    n, k = len(others), len(kernels)
+    programs = [item for item in items if item.path.parent.name in _PROGRAMS]
+    first = {*kernels, *programs}
+    others = [item for item in items if item not in first]
+    n, k = len(items) - len(kernels), len(kernels)
+    last = (_WORKERS - 1) * n // _WORKERS
+    others[last:last] = programs
     items[:] = [
         item
         for w in range(_WORKERS)

@@ -19,7 +19,6 @@ from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.pictures.canvas import require_offscreen
 from vtk_segdeform.widgets.scene.view import View
 
-
 # Windows, and what is drawn in them.  A new one needs 80 ms for its context and its shaders, as
 # much as twenty gestures.
 _spare: list[vtkRenderWindow] = []

@@ -208,9 +208,7 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
 @pytest.mark.parametrize(
     ("imports", "there"),
     [
-        pytest.param(
-            "import pyvista, vtk_segdeform", [True, True], marks=pytest.mark.campaign
-        ),
+        pytest.param("import pyvista, vtk_segdeform", [True, True], marks=pytest.mark.campaign),
         (
             "import sys, vtk_segdeform; assert 'pyvista' not in sys.modules;"
             "import vtk_segdeform.cli.commands, vtk_segdeform.widgets.editor;"
