@@ -2,8 +2,8 @@
 
 in process   the editor in an off-screen window: a move is followed by a picture; meanwhile moves
              are replaced by later ones
-server       the editor in Chromium; the server draws
-page         the same; the page draws from W~ and the moves of the cage vertices
+server       the editor in a Chromium without WebGL, so that the server draws
+page         the same with WebGL; the page draws from W~ and the moves of the cage vertices
 
 The mouse moves sixty times a second along a prescribed path, in Chromium by its own events.  A
 picture is shown when the browser begins the next one; its latency is counted from the latest event
@@ -111,8 +111,9 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         text=[
             f"The top of a cactus with 3 regions and {scale.n_cage_vertices} cage vertices is "
             f"pulled to and fro, by {_RATE:.0f} moves of the mouse a second, for "
-            f"{_MOVES / _RATE:.0f} s in a page of {_SIZE[0]} x {_SIZE[1]} pixels. Chromium draws "
-            "in software (SwiftShader). *Latency* is the time from an event of the mouse to the "
+            f"{_MOVES / _RATE:.0f} s in a page of {_SIZE[0]} x {_SIZE[1]} pixels. Chromium has "
+            "WebGL in software (SwiftShader) where the page draws, and none where the server does. "
+            "*Latency* is the time from an event of the mouse to the "
             "picture that shows it. The last four columns are processor time over all cores, of "
             "the server and of Chromium's renderer, graphics and other processes."
         ],
@@ -234,7 +235,7 @@ def _in_browser(size: int, scale: Scale, *, draws: bool) -> Drag:
     ours, theirs = context.Pipe()
     server = context.Process(target=_serve, args=(size, scale, theirs), daemon=True)
     with contextlib.ExitStack() as stack:
-        browser = stack.enter_context(Chromium(_SIZE))
+        browser = stack.enter_context(Chromium(_SIZE, webgl=draws))
         server.start()
         theirs.close()
         stack.callback(server.kill)

@@ -1,6 +1,7 @@
 """Headless Chromium with a real mouse, through the DevTools protocol over a pipe.
 
-Its graphics are software's (SwiftShader), as those of a machine without a graphics processor.
+It uses no graphics processor: a page with WebGL draws in software (SwiftShader), one without it
+is put together by the processor, as Chromium does by itself where there is none.
 """
 
 from __future__ import annotations
@@ -21,11 +22,12 @@ from ..errors import MissingDependencyError
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome")
 _FLAGS = (
-    "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--use-gl=angle",
-    "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-first-run",
+    "--headless=new", "--no-sandbox", "--remote-debugging-pipe", "--no-first-run",
     "--disable-extensions", "--disable-background-networking", "--disable-dev-shm-usage",
     "--mute-audio",
 )  # fmt: skip
+_WEBGL = "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"
+_NO_WEBGL = "--disable-gpu", "--disable-software-rasterizer"
 _PATIENCE = 60.0  # seconds
 
 
@@ -36,6 +38,8 @@ class Chromium:
     ----------
     size : (width, height)
         Of the page, in pixels.
+    webgl : bool
+        Whether the page can use WebGL.
 
     Raises
     ------
@@ -43,7 +47,7 @@ class Chromium:
         If Chromium is not installed.
     """
 
-    def __init__(self, size: tuple[int, int]) -> None:
+    def __init__(self, size: tuple[int, int], *, webgl: bool) -> None:
         path = next(filter(None, map(shutil.which, _NAMES)), None)
         if path is None or os.name != "posix":
             raise MissingDependencyError(
@@ -54,8 +58,9 @@ class Chromium:
         self._in, answers = os.pipe()
         # Chromium reads commands from descriptor 3 and writes answers to 4.
         pipes = f'exec 3<&{commands} 4>&{answers}; exec "$0" "$@"'
+        flags = *_FLAGS, *(_WEBGL if webgl else _NO_WEBGL)
         self._process = subprocess.Popen(
-            ["bash", "-c", pipes, path, *_FLAGS, f"--user-data-dir={self._profile}", "about:blank"],
+            ["bash", "-c", pipes, path, *flags, f"--user-data-dir={self._profile}", "about:blank"],
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
             pass_fds=(commands, answers), start_new_session=True,
         )  # fmt: skip
