@@ -321,6 +321,23 @@ class HalfEdges:
                 renamed.__dict__[name] = self.__dict__[name]
         return renamed
 
+    def flipped(self, flip: BoolArray) -> HalfEdges:
+        """Return the half-edges with the faces *flip* (m,) in the other direction.
+
+        If these are whole shells, and every vertex has one fan, that is so afterwards, too.
+        """
+        if not flip.any():
+            return self
+        turned = HalfEdges(
+            np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces), self.n_vertices
+        )
+        alone = self.__dict__.get("_alone")
+        if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
+            face, corner = np.divmod(alone, 3)
+            turned.__dict__["_alone"] = 3 * face + np.where(flip[face], 2 - corner, corner)
+            turned.__dict__["shells"] = self.shells
+        return turned
+
     @cached_property
     def shells(self) -> IntArray:
         """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""

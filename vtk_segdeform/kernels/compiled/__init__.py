@@ -12,8 +12,8 @@
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
-    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`,
-                    `Mesh.face_areas`
+    triangles       `faults.Search`, `shells.shell_volumes`, `shells.shell_depths`,
+                    `grouping.first_equal_row`, `Mesh.face_areas`, `polygons.cut_into_triangles`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
@@ -41,7 +41,14 @@ from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .text import corners_of_lines, facet_corners, numbers_of_lines, plain_numbers
-from .triangles import face_areas, first_equal_points, flat_faces, shell_sums
+from .triangles import (
+    face_areas,
+    first_equal_points,
+    flat_faces,
+    quad_cuts,
+    shell_boxes,
+    shell_sums,
+)
 from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
@@ -72,9 +79,11 @@ __all__ = [
     "one_fan_each",
     "pair_half_edges",
     "plain_numbers",
+    "quad_cuts",
     "ring_normals",
     "rings",
     "rotations",
+    "shell_boxes",
     "shell_sums",
     "solve_factored",
     "used_vertices",

@@ -74,6 +74,74 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
 
 
 @_compile
+def shell_boxes(low, high, points, faces, shells):
+    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices."""
+    for f in range(len(faces)):
+        s = shells[f]
+        for c in range(3):
+            v = faces[f, c]
+            for axis in range(3):
+                x = points[v, axis]
+                if x < low[s, axis]:
+                    low[s, axis] = x
+                if x > high[s, axis]:
+                    high[s, axis] = x
+
+
+@_compile
+def quad_cuts(cut, square, points, quads):
+    """Put into *cut* (q,) along which diagonal to cut each of *quads* (q, 4).
+
+    0 or 1, from that corner; 2 is 1, as long as the other; -1 if two of the normals at corners are
+    not on the same side, or the height of a corner over a diagonal may have a smaller *square*.
+    """
+    up = np.empty((4, 3))
+    for q in range(len(quads)):
+        for k in range(4):
+            i, j, h = quads[q, k], quads[q, (k + 1) % 4], quads[q, (k + 3) % 4]
+            ux, uy, uz = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            vx, vy, vz = (
+                points[h, 0] - points[i, 0],
+                points[h, 1] - points[i, 1],
+                points[h, 2] - points[i, 2],
+            )
+            up[k, 0] = uy * vz - uz * vy
+            up[k, 1] = uz * vx - ux * vz
+            up[k, 2] = ux * vy - uy * vx
+        i, j = quads[q, 0], quads[q, 2]
+        x, y, z = (
+            points[i, 0] - points[j, 0],
+            points[i, 1] - points[j, 1],
+            points[i, 2] - points[j, 2],
+        )
+        first = (x * x + y * y) + z * z
+        i, j = quads[q, 1], quads[q, 3]
+        x, y, z = (
+            points[i, 0] - points[j, 0],
+            points[i, 1] - points[j, 1],
+            points[i, 2] - points[j, 2],
+        )
+        second = (x * x + y * y) + z * z
+        convex = True
+        for k in range(4):
+            x, y, z = up[k, 0], up[k, 1], up[k, 2]
+            convex &= (x * x + y * y) + z * z >= square * first
+            convex &= (x * x + y * y) + z * z >= square * second
+            for j in range(k):
+                convex &= (x * up[j, 0] + y * up[j, 1]) + z * up[j, 2] > 0.0
+        if not convex:
+            cut[q] = -1
+        elif first < second:
+            cut[q] = 0
+        else:
+            cut[q] = 2 if first == second else 1
+
+
+@_compile
 def first_equal_points(first, points, table):
     """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 
