@@ -14,7 +14,8 @@
     beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `shells.shell_depths`,
                     `grouping.first_equal_row`, `Mesh.face_areas`, `polygons.cut_into_triangles`
-    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`
+    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
+                    `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -40,7 +41,13 @@ from .pairs import facing_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
-from .text import corners_of_lines, facet_corners, numbers_of_lines, plain_numbers
+from .text import (
+    corners_of_lines,
+    facet_corners,
+    numbers_of_lines,
+    plain_numbers,
+    rows_of_lists,
+)
 from .triangles import (
     face_areas,
     first_equal_points,
@@ -83,6 +90,7 @@ __all__ = [
     "ring_normals",
     "rings",
     "rotations",
+    "rows_of_lists",
     "shell_boxes",
     "shell_sums",
     "solve_factored",
