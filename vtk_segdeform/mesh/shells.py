@@ -159,7 +159,8 @@ def _boxes(
     n_shells = int(shells.max()) + 1
     low, high = np.full((n_shells, 3), np.inf), np.full((n_shells, 3), -np.inf)
     if kernels := compiled_checks(len(faces)):
-        kernels.shell_boxes(low, high, *inputs(vertices, faces, shells))
+        last = np.full(len(vertices), -1, dtype=np.int32)
+        kernels.shell_boxes(low, high, last, *inputs(vertices, faces, shells))
         return low, high
     by_shell = np.argsort(shells, kind="stable")
     corners, starts = faces[by_shell].ravel(), 3 * first_members(shells[by_shell])

@@ -281,11 +281,11 @@ def _workarounds(
     if len(seam := np.flatnonzero(members > 1)):
         yield _workaround(Kind.COINCIDENT, len(seam), "welded # seam point", seam)
     if flip.any():
-        faces = triangles[kept][flip]
+        is_all = flip.all() and len(flip) == len(triangles)
+        faces = triangles if is_all else triangles[np.flatnonzero(kept)[flip]]
         there = np.flatnonzero(marked(faces))
         yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", there)
-    dropped = ~kept
-    dropped[flat] = False
+    dropped = np.setdiff1d(np.flatnonzero(~kept), flat, assume_unique=True)
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
     for kind, ignored in (

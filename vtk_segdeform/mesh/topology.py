@@ -328,9 +328,11 @@ class HalfEdges:
         """
         if not flip.any():
             return self
-        turned = HalfEdges(
-            np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces), self.n_vertices
-        )
+        faces = np.empty_like(self.faces)
+        faces[:, 0] = self.faces[:, 0]
+        for corner in (1, 2):
+            faces[:, corner] = np.where(flip, self.faces[:, 3 - corner], self.faces[:, corner])
+        turned = HalfEdges(faces, self.n_vertices)
         alone = self.__dict__.get("_alone")
         if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
             face, corner = np.divmod(alone, 3)

@@ -74,12 +74,18 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
 
 
 @_compile
-def shell_boxes(low, high, points, faces, shells):
-    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices."""
+def shell_boxes(low, high, last, points, faces, shells):
+    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices.
+
+    *last* (n,) must be filled with -1.
+    """
     for f in range(len(faces)):
         s = shells[f]
         for c in range(3):
             v = faces[f, c]
+            if last[v] == s:
+                continue
+            last[v] = s
             for axis in range(3):
                 x = points[v, axis]
                 if x < low[s, axis]:
