@@ -27,7 +27,7 @@ from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
 from vtk_segdeform.io.number_lines import Lines, numbers_of
-from vtk_segdeform.io.polygons import _quad_cuts, triangles_of
+from vtk_segdeform.io.polygons import _clipped_ears, _failed, _quad_cuts, triangles_of
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, mesh_of
@@ -566,6 +566,23 @@ def test_quads_are_cut_alike(twin, monkeypatch, kind):
     quick, slow = twin(lambda: _quad_cuts(points, quads))
     assert_array_equal(quick, slow)
     assert set(quick.tolist()) >= ({-1, 0, 1, 2} if kind == "whole numbers" else {-1, 0, 1})
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-8, 1.0])
+def test_wrongly_cut_polygons_are_found_alike(twin, monkeypatch, height):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    rng = np.random.default_rng(6)
+    counts = rng.integers(3, 7, 300)
+    corners = np.arange(counts.sum())
+    corners[1::29] = corners[:-1:29]  # repeated corners
+    points = rng.normal(size=(len(corners), 3)) * [1.0, 1.0, height]
+    faces, polygon = _clipped_ears(points, counts, corners)
+    left = np.arange(len(polygon)) % 11 > 0
+    faces, polygon = faces[left], polygon[left]
+    faces[::7] = faces[::7, ::-1]
+    quick, slow = twin(lambda: _failed(points, counts, corners, faces, polygon))
+    assert_array_equal(quick, slow)
+    assert 30 < len(quick) < 270
 
 
 @pytest.mark.parametrize("name", ["closed", "open", "two parts"])

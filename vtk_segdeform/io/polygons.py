@@ -20,6 +20,7 @@ from ..mesh import cross_rows, first_equal_row, normals, repeats_vertex
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
+_DOWN = -1e-9  # cosine of the normal of a triangle that is upside down, times its share of the area
 _NO_COUNTS: IntArray = np.empty(0, dtype=np.int64)
 # Of quads: VTK's filter takes a corner so near the diagonal beside it for one on it, at 1e-6.
 _LEAST_HEIGHT = 1e-5  # in the unit of the points
@@ -307,6 +308,11 @@ def _failed(
 ) -> IntArray:
     """Return the polygons with too few triangles, or planar with one of them upside down, (k,)."""
     starts = np.cumsum(counts) - counts
+    if kernels := compiled_checks(len(corners)):
+        found = np.zeros(len(counts), dtype=bool)
+        given = inputs(points, starts, counts, corners, faces, polygon)
+        kernels.wrongly_cut(found, _DOWN, _PLANAR, *given)
+        return np.flatnonzero(found)
     following = np.arange(1, len(corners) + 1)
     following[starts + counts - 1] = starts
     repeated = np.add.reduceat(corners == corners[following], starts)
@@ -316,7 +322,7 @@ def _failed(
         up = np.add.reduceat(np.cross(spoke, spoke[following]), starts)
         cosine = np.einsum("fx,fx->f", normals(points[faces]), up[polygon])
         square = np.einsum("cx,cx->c", up, up)
-        down = np.unique(polygon[cosine < -1e-9 * square[polygon]])
+        down = np.unique(polygon[cosine < _DOWN * square[polygon]])
         for each in down:
             spokes = spoke[starts[each] :][: counts[each]]
             height = np.abs(spokes @ up[each]).max()

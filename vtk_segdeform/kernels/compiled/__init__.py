@@ -55,6 +55,7 @@ from .triangles import (
     quad_cuts,
     shell_boxes,
     shell_sums,
+    wrongly_cut,
 )
 from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
@@ -99,4 +100,5 @@ __all__ = [
     "volume_gradient",
     "volume_sums",
     "weights",
+    "wrongly_cut",
 ]

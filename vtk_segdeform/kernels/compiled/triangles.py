@@ -148,6 +148,67 @@ def quad_cuts(cut, square, points, quads):
 
 
 @_compile
+def wrongly_cut(failed, down, planar, points, starts, counts, corners, faces, polygon):
+    """Mark polygons with too few triangles, or planar with one upside down, in *failed* (m,).
+
+    *faces* (k, 3) are the triangles, and *polygon* (k,) are those of which, in ascending order.
+    """
+    first = 0
+    for p in range(len(counts)):
+        begin, n, last = starts[p], counts[p], first
+        while last < len(polygon) and polygon[last] == p:
+            last += 1
+        o = corners[begin]
+        ux, uy, uz, n_repeated = 0.0, 0.0, 0.0, 0
+        for k in range(n):
+            i, j = corners[begin + k], corners[begin + (k + 1) % n]
+            n_repeated += i == j
+            ax, ay, az = (
+                points[i, 0] - points[o, 0],
+                points[i, 1] - points[o, 1],
+                points[i, 2] - points[o, 2],
+            )
+            bx, by, bz = (
+                points[j, 0] - points[o, 0],
+                points[j, 1] - points[o, 1],
+                points[j, 2] - points[o, 2],
+            )
+            ux += ay * bz - az * by
+            uy += az * bx - ax * bz
+            uz += ax * by - ay * bx
+        failed[p] = last - first < n - n_repeated - 2
+        square = (ux * ux + uy * uy) + uz * uz
+        is_down = False
+        for f in range(first, last):
+            i, j, h = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            bx, by, bz = (
+                points[h, 0] - points[i, 0],
+                points[h, 1] - points[i, 1],
+                points[h, 2] - points[i, 2],
+            )
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            is_down |= (x * ux + y * uy) + z * uz < down * square
+        if is_down:
+            height, size = 0.0, 0.0
+            for k in range(n):
+                i = corners[begin + k]
+                ax, ay, az = (
+                    points[i, 0] - points[o, 0],
+                    points[i, 1] - points[o, 1],
+                    points[i, 2] - points[o, 2],
+                )
+                height = max(height, abs((ax * ux + ay * uy) + az * uz))
+                size = max(size, abs(ax), abs(ay), abs(az))
+            failed[p] |= height <= planar * np.sqrt(square) * size
+        first = last
+
+
+@_compile
 def first_equal_points(first, points, table):
     """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 
