@@ -9,7 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pyvista as pv
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
 from ..arrays import FloatArray, IntArray
@@ -291,7 +293,14 @@ def _clipped_ears(
     points: FloatArray, counts: IntArray, corners: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Return what VTK finds; it leaves out some polygons and parts of others."""
-    surface = polydata_of(points, counts, corners)
+    _require_polygons(len(points), counts, corners)
+    places, cells = vtkPoints(), vtkCellArray()
+    places.SetData(numpy_to_vtk(np.ascontiguousarray(points)))
+    offsets = np.append(0, np.cumsum(counts))
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets), numpy_to_vtkIdTypeArray(corners))
+    surface = vtkPolyData()
+    surface.SetPoints(places)
+    surface.SetPolys(cells)
     polygon = numpy_to_vtk(np.arange(len(counts)))
     polygon.SetName("polygon")
     surface.GetCellData().AddArray(polygon)

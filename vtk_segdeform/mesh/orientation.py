@@ -100,11 +100,14 @@ def _linked(
         np.minimum(p, r)[counts] * q + np.maximum(p, r)[counts], return_inverse=True
     )
     total = np.bincount(which, vote[counts], len(keys))
-    cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
-    graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
-    tree = csgraph.minimum_spanning_tree(graph).tocoo()
-    agree = total[np.searchsorted(keys, tree.row.astype(np.int64) * q + tree.col)] >= 0.0
-    group, turned = two_sides(q, tree.row.astype(np.int64), tree.col.astype(np.int64), ~agree)
+    tree = keys
+    if len(keys) > 1:
+        cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
+        graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
+        links = csgraph.minimum_spanning_tree(graph).tocoo()
+        tree = links.row.astype(np.int64) * q + links.col
+    agree = total[np.searchsorted(keys, tree)] >= 0.0
+    group, turned = two_sides(q, *np.divmod(tree, q), ~agree)
     return np.unique(group, return_inverse=True)[1], turned
 
 
