@@ -31,6 +31,7 @@ from vtk_segdeform.io.polygons import _clipped_ears, _failed, _quad_cuts, triang
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, mesh_of
+from vtk_segdeform.mesh.grouping import first_members
 from vtk_segdeform.mesh.shells import _boxes
 from vtk_segdeform.regions.blending import blend_weights, border_distance
 from vtk_segdeform.regions.regions import Regions
@@ -566,6 +567,15 @@ def test_quads_are_cut_alike(twin, monkeypatch, kind):
     quick, slow = twin(lambda: _quad_cuts(points, quads))
     assert_array_equal(quick, slow)
     assert set(quick.tolist()) >= ({-1, 0, 1, 2} if kind == "whole numbers" else {-1, 0, 1})
+
+
+def test_first_members_are_equal(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    labels = np.append(RNG.permutation(7), RNG.integers(0, 7, 50))
+    for each in (labels, labels.astype(np.int32)):
+        quick, slow = twin(lambda each=each: first_members(each))
+        assert_array_equal(quick, slow)
+        assert quick.tolist() == [labels.tolist().index(k) for k in range(7)]
 
 
 @pytest.mark.parametrize("height", [0.0, 1e-8, 1.0])

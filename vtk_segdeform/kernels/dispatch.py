@@ -27,7 +27,7 @@ from .. import sizes
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 23  # bytes; only the pages that are used take memory
-_LARGE = 1 << 17  # bytes; less is taken from memory that the process has already
+_LARGE = 1 << 17  # bytes; a process has less than that at hand, without new pages
 _checked = [0]  # faces processed so far by equivalents in numpy
 _is_late = [False]  # whether small arrays are processed in numpy until the kernels are loaded
 

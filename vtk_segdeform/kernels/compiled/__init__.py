@@ -8,7 +8,8 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
-    half_edges      `topology.HalfEdges`, `grouping.connected`, `Mesh.adjacency`
+    half_edges      `topology.HalfEdges`, `grouping.connected`,
+                    `grouping.first_members`, `Mesh.adjacency`
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
@@ -27,6 +28,7 @@ from .half_edges import (
     border_half_edges,
     edge_lengths,
     edge_rows,
+    first_members,
     link,
     link_corners,
     number_trees,
@@ -77,6 +79,7 @@ __all__ = [
     "facet_corners",
     "facing_pairs",
     "first_equal_points",
+    "first_members",
     "flat_faces",
     "interpolated_rows",
     "link",
