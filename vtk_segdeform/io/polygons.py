@@ -187,11 +187,9 @@ def cut_into_triangles(
     polygon, first = np.repeat(number, n_triangles), np.cumsum(n_triangles) - n_triangles
     faces = np.empty((len(polygon), 3), dtype=np.int64)
     faces[first[triangles]] = _rows(corners, starts[triangles], 3)
-    faces[is_other[polygon]] = clipped
-    is_cut = cut != _NOT_CUT
-    two = np.take_along_axis(of_quads[is_cut], _CORNERS_OF_CUTS[cut[is_cut]], axis=1)
-    for k in range(2):
-        faces[first[quads[is_cut]] + k] = two[:, 3 * k : 3 * k + 3]
+    if len(clipped):
+        faces[is_other[polygon]] = clipped
+    _put_halves(faces, first[quads], of_quads, cut)
     is_other[quads[cut == _OF_EQUAL_LENGTH]] = True
     some = np.flatnonzero(is_other & (n_triangles == counts - 2))
     if len(some):  # other quads have the same shorter diagonal in any case
@@ -206,7 +204,8 @@ def _rows(corners: IntArray, starts: IntArray, size: int) -> IntArray:
     """Return the *corners* of polygons of *size* corners, (k, size)."""
     if len(starts) * size == len(corners):
         return corners.reshape(-1, size)
-    return corners[starts[:, None] + np.arange(size)]
+    rows: IntArray = corners[starts[:, None] + np.arange(size)]
+    return rows
 
 
 def _quad_cuts(points: FloatArray, quads: IntArray) -> NDArray[np.int8]:
@@ -233,6 +232,17 @@ def _quad_cuts(points: FloatArray, quads: IntArray) -> NDArray[np.int8]:
         cut[:] = np.where(first < second, 0, np.where(first == second, _OF_EQUAL_LENGTH, 1))
     cut[~convex] = _NOT_CUT
     return cut
+
+
+def _put_halves(faces: IntArray, first: IntArray, quads: IntArray, cut: NDArray[np.int8]) -> None:
+    """Put the two triangles of each of *quads* (q, 4) that is *cut* (q,) into *faces*."""
+    if kernels := compiled_checks(len(quads)):
+        kernels.quad_halves(faces, *inputs(first, quads, cut))
+        return
+    is_cut = cut != _NOT_CUT
+    two = np.take_along_axis(quads[is_cut], _CORNERS_OF_CUTS[cut[is_cut]], axis=1)
+    for k in range(2):
+        faces[first[is_cut] + k] = two[:, 3 * k : 3 * k + 3]
 
 
 def _dot(u: FloatArray, v: FloatArray) -> FloatArray:

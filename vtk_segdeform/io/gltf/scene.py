@@ -63,7 +63,7 @@ class _Shown(NamedTuple):
     joints: list[FloatArray]
 
 
-def products(matrices: FloatArray, vectors: Any) -> FloatArray:
+def products(matrices: Any, vectors: Any) -> FloatArray:
     """Return the products of *matrices*, (3, 3) or (n, 3, 3), and *vectors* (n, 3), (n, 3) float.
 
     >>> products(np.diag([2.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0]]))

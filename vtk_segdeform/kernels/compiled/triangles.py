@@ -148,6 +148,23 @@ def quad_cuts(cut, square, points, quads):
 
 
 @_compile
+def quad_halves(faces, first, quads, cut):
+    """Put the two triangles of each of *quads* (q, 4) into *faces*, at *first* (q,) and after it.
+
+    *cut* (q,) is as of `quad_cuts`; quads that are not cut are skipped.
+    """
+    for q in range(len(quads)):
+        a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
+        k = first[q]
+        if cut[q] == 0:
+            faces[k, 0], faces[k, 1], faces[k, 2] = a, b, c
+            faces[k + 1, 0], faces[k + 1, 1], faces[k + 1, 2] = a, c, d
+        elif cut[q] > 0:
+            faces[k, 0], faces[k, 1], faces[k, 2] = a, b, d
+            faces[k + 1, 0], faces[k + 1, 1], faces[k + 1, 2] = b, c, d
+
+
+@_compile
 def wrongly_cut(failed, down, planar, points, starts, counts, corners, faces, polygon):
     """Mark polygons with too few triangles, or planar with one upside down, in *failed* (m,).
 
