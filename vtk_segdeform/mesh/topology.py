@@ -92,8 +92,8 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        border, starts, *after = scratch(np.int32, n, n + 2, n, n)
-        links, tree = scratch(np.int64, 3 * m, n)
+        links, tree, narrow = scratch(np.int64, 3 * m, n, 2 * n + 1)
+        border, starts, *after = np.split(narrow.view(np.int32), np.cumsum([n, n + 2, n]))
         tree[:] = np.arange(n)
         found = [0, 0]
 
