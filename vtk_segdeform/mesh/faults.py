@@ -20,7 +20,7 @@ from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
-from .shells import closed_shells, shell_faults
+from .shells import ShellSums, closed_shells, shell_faults, shell_volumes
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
@@ -85,6 +85,21 @@ class Search:
         search = Search(points, self.triangles)
         search.__dict__["_corners"] = self._corners
         return search
+
+    def flipped(self, flip: BoolArray) -> Search:
+        """Return the search of the faces of `half_edges`, with *flip* (m,) of them flipped."""
+        half_edges = self.half_edges.flipped(flip)
+        search = Search.known(self.points, half_edges)
+        if "shell_sums" in self.__dict__ and "shells" in half_edges.__dict__:  # of whole shells
+            volume, area, size = self.shell_sums
+            sign = np.where(flip[first_members(half_edges.shells)], -1.0, 1.0)
+            search.__dict__["shell_sums"] = sign * volume, area, size
+        return search
+
+    @cached_property
+    def shell_sums(self) -> ShellSums:
+        """Volume, area and size of each shell; see `shell_volumes`."""
+        return shell_volumes(self.points, self.half_edges.faces, self.half_edges.shells)
 
     @cached_property
     def _corners(self) -> tuple[BoolArray, int | None]:
@@ -193,10 +208,14 @@ class Search:
 
     @cached_property
     def _inward_and_flat_shells(self) -> tuple[IntArray, IntArray]:
-        finite = None
+        closed = closed_shells(self.half_edges)
+        if not closed.any():
+            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
         if any(fault.kind is Kind.NON_FINITE for fault in self.number_faults):
-            finite = _finite(self.points)
-        return _inward_and_flat_shells(self.points, self.half_edges, finite)
+            return _finite_inward_and_flat_shells(self.points, self.half_edges, closed)
+        faces, shells = self.half_edges.faces, self.half_edges.shells
+        wrong, flat, first = shell_faults(self.points, faces, shells, closed, self.shell_sums)
+        return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
 
     @property
     def is_two_manifold(self) -> bool:
@@ -363,22 +382,19 @@ def _turned_edges(half_edges: HalfEdges) -> Iterator[Fault]:
         yield from _some(Kind.TURNED_EDGE, turned, half_edges)
 
 
-def _inward_and_flat_shells(
-    points: FloatArray, half_edges: HalfEdges, finite: BoolArray | None
+def _finite_inward_and_flat_shells(
+    points: FloatArray, half_edges: HalfEdges, closed: BoolArray
 ) -> tuple[IntArray, IntArray]:
     """Return a vertex of each shell that is inside-out, and of each that encloses no volume.
 
-    Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
-    says which points are, if not all.
+    Only of shells that are *closed* and have finite *points*; others may be around them.
     """
-    faces, shells = half_edges.faces, half_edges.shells
-    closed = closed_shells(half_edges)
-    if finite is not None:
-        valid = finite[faces].all(axis=1)
-        closed[shells[~valid]] = False
-        faces = faces[valid]
-        left, shells = np.unique(shells[valid], return_inverse=True)
-        closed = closed[left]
+    faces, shells, closed = half_edges.faces, half_edges.shells, closed.copy()
+    valid = _finite(points)[faces].all(axis=1)
+    closed[shells[~valid]] = False
+    faces = faces[valid]
+    left, shells = np.unique(shells[valid], return_inverse=True)
+    closed = closed[left]
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     wrong, flat, first = shell_faults(points, faces, shells, closed)

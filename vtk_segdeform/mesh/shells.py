@@ -12,6 +12,8 @@ winding numbers", ACM Trans. Graph. 32(4), 33, 2013.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -26,6 +28,9 @@ _PIECE = 10_000  # faces per task; their data fit into the cache
 NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
 _MANY = 100  # points for which columns are quicker
 _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
+
+# Volume, area and size of each shell, (k,) float each.
+ShellSums: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def closed_shells(half_edges: HalfEdges) -> BoolArray:
@@ -43,7 +48,11 @@ def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray
 
 
 def shell_faults(
-    vertices: FloatArray, faces: IntArray, shells: IntArray, closed: BoolArray
+    vertices: FloatArray,
+    faces: IntArray,
+    shells: IntArray,
+    closed: BoolArray,
+    sums: ShellSums | None = None,
 ) -> tuple[BoolArray, BoolArray, IntArray]:
     """Return which shells are inside-out or enclose no volume.
 
@@ -57,6 +66,8 @@ def shell_faults(
         The shell of each face, 0..k-1.
     closed : (k,) bool
         The shells to test, closed and consistently oriented.  Others may be around them.
+    sums : ShellSums, optional
+        Those of `shell_volumes`, if they are known.
 
     Returns
     -------
@@ -68,7 +79,7 @@ def shell_faults(
         Its first face.
     """
     first = first_members(shells)
-    volume, area, size = shell_volumes(vertices, faces, shells)
+    volume, area, size = sums or shell_volumes(vertices, faces, shells)
     tiny = NO_VOLUME * (area * size)
     outward = outward_signs(volume, shell_depths(vertices, faces, shells, closed), closed)
     wrong = outward * volume <= tiny
@@ -88,9 +99,7 @@ def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> Int
     return outward
 
 
-def shell_volumes(
-    vertices: FloatArray, faces: IntArray, shells: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def shell_volumes(vertices: FloatArray, faces: IntArray, shells: IntArray) -> ShellSums:
     """Return the volume, area and size of each shell, (k,) each, from its first vertex."""
     origins = vertices[faces[first_members(shells), 0]]
     if kernels := compiled_checks(len(faces)):

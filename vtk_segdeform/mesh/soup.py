@@ -152,7 +152,10 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     if len(flat):
         kept[flat] = False
         half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
-    flip = faces_to_flip(valid, half_edges)
+    sums = None
+    if half_edges is found.half_edges and not len(half_edges.turned) + len(half_edges.crowded):
+        sums = found.shell_sums
+    flip = faces_to_flip(valid, half_edges, sums)
     left = found.used
     if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
         left = np.zeros(len(points), dtype=bool)
@@ -160,8 +163,8 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     vertex_of, loose = target, _NONE
     if same and left.all() and not flip.any():
         mesh = Mesh.of(found)
-    elif left.all():
-        mesh = Mesh.of(Search.known(points, half_edges.flipped(flip)))
+    elif same and left.all():
+        mesh = Mesh.of(found.flipped(flip))
     else:
         number = np.cumsum(left) - 1
         flipped = half_edges.flipped(flip)
