@@ -3,6 +3,8 @@
 The checks run in this order: coordinates, indices, single faces, edges, vertices, and last the
 orientation of shells.  Each check skips everything that earlier ones rejected, so that a fault is
 reported once and under its own name.
+
+Long because all checks are beside each other, so that none repeats the work of another.
 """
 
 from __future__ import annotations
@@ -90,15 +92,15 @@ class Search:
         """Return the search of the faces of `half_edges`, with *flip* (m,) of them flipped."""
         half_edges = self.half_edges.flipped(flip)
         search = Search.known(self.points, half_edges)
-        if "shell_sums" in self.__dict__ and "shells" in half_edges.__dict__:  # of whole shells
+        if "shell_sums" in vars(self) and "shells" in vars(half_edges):  # whole shells
             volume, area, size = self.shell_sums
             sign = np.where(flip[first_members(half_edges.shells)], -1.0, 1.0)
-            search.__dict__["shell_sums"] = sign * volume, area, size
+            vars(search)["shell_sums"] = sign * volume, area, size
         return search
 
     @cached_property
     def shell_sums(self) -> ShellSums:
-        """Volume, area and size of each shell; see `shell_volumes`."""
+        """`shell_volumes` of `half_edges`."""
         return shell_volumes(self.points, self.half_edges.faces, self.half_edges.shells)
 
     @cached_property
@@ -208,14 +210,8 @@ class Search:
 
     @cached_property
     def _inward_and_flat_shells(self) -> tuple[IntArray, IntArray]:
-        closed = closed_shells(self.half_edges)
-        if not closed.any():
-            return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-        if any(fault.kind is Kind.NON_FINITE for fault in self.number_faults):
-            return _finite_inward_and_flat_shells(self.points, self.half_edges, closed)
-        faces, shells = self.half_edges.faces, self.half_edges.shells
-        wrong, flat, first = shell_faults(self.points, faces, shells, closed, self.shell_sums)
-        return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
+        has_others = any(fault.kind is Kind.NON_FINITE for fault in self.number_faults)
+        return _inward_and_flat_shells(self, _finite(self.points) if has_others else None)
 
     @property
     def is_two_manifold(self) -> bool:
@@ -382,22 +378,24 @@ def _turned_edges(half_edges: HalfEdges) -> Iterator[Fault]:
         yield from _some(Kind.TURNED_EDGE, turned, half_edges)
 
 
-def _finite_inward_and_flat_shells(
-    points: FloatArray, half_edges: HalfEdges, closed: BoolArray
-) -> tuple[IntArray, IntArray]:
+def _inward_and_flat_shells(search: Search, finite: BoolArray | None) -> tuple[IntArray, IntArray]:
     """Return a vertex of each shell that is inside-out, and of each that encloses no volume.
 
-    Only of shells that are *closed* and have finite *points*; others may be around them.
+    Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
+    says which points are, if not all.
     """
-    faces, shells, closed = half_edges.faces, half_edges.shells, closed.copy()
-    valid = _finite(points)[faces].all(axis=1)
-    closed[shells[~valid]] = False
-    faces = faces[valid]
-    left, shells = np.unique(shells[valid], return_inverse=True)
-    closed = closed[left]
+    faces, shells = search.half_edges.faces, search.half_edges.shells
+    closed = closed_shells(search.half_edges)
+    if finite is not None:
+        valid = finite[faces].all(axis=1)
+        closed[shells[~valid]] = False
+        faces = faces[valid]
+        left, shells = np.unique(shells[valid], return_inverse=True)
+        closed = closed[left]
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    wrong, flat, first = shell_faults(points, faces, shells, closed)
+    sums = search.shell_sums if finite is None else None
+    wrong, flat, first = shell_faults(search.points, faces, shells, closed, sums=sums)
     return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
 
 

@@ -52,6 +52,7 @@ def shell_faults(
     faces: IntArray,
     shells: IntArray,
     closed: BoolArray,
+    *,
     sums: ShellSums | None = None,
 ) -> tuple[BoolArray, BoolArray, IntArray]:
     """Return which shells are inside-out or enclose no volume.
