@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -9,12 +11,14 @@ from numpy.testing import assert_array_equal
 from solids import CUBE, TETRAHEDRON, icosphere
 from test_round_trips import Warnings, prism
 
-from vtk_segdeform import Mesh
+from vtk_segdeform import Mesh, sizes
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.ply_tables import tables_of
 from vtk_segdeform.io.surface import read_mesh
+from vtk_segdeform.kernels import dispatch
 
 HEADER = (
     "ply\nformat {kind} 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n"
@@ -235,3 +239,40 @@ def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path):
         write_mesh(tmp_path / "a.ply", surface)
         found = read_polydata(tmp_path / "a.ply").active_texture_coordinates
         assert_array_equal(found, np.column_stack([pairs[:, 0], v]))
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("length", ["char", "ushort", "double"])
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_lists_of_any_lengths_between_numbers(monkeypatch, kind, length, compiled):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if not compiled:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    order, of_length = "<" if "little" in kind else ">", {"char": "b", "ushort": "H", "double": "d"}
+    n = of_length[length]
+
+    def packed(a, b, c, d, lengths):
+        values = a, lengths[0], *b, lengths[1], *c, d
+        if kind == "ascii":
+            return (" ".join(map(str, values)) + "\n").encode()
+        return struct.pack(f"{order}f{n}{len(b)}i{n}{len(c)}dh", *values)
+
+    rows = [(1.5, [0, 1, 2], [], 7), (2.5, [], [0.5], -1), (3.5, [300, 4], [1.5, 2.5, -3.5], 0)]
+    header = (
+        f"ply\nformat {kind} 1.0\nelement face {len(rows)}\nproperty float a\n"
+        f"property list {length} int b\nproperty list {length} double c\nproperty short d\n"
+        "end_header\n"
+    ).encode()
+    *first, last = (packed(*row, (len(row[1]), len(row[2]))) for row in rows)
+    table = tables_of(header + b"".join([*first, last]))["face"]
+    assert table["a"].tolist() == [row[0] for row in rows]
+    assert table["d"].tolist() == [row[3] for row in rows]
+    for k, name in ((1, "b"), (2, "c")):
+        assert table[name].lengths.tolist() == [len(row[k]) for row in rows]
+        assert table[name].values.tolist() == [value for row in rows for value in row[k]]
+    with pytest.raises(MeshError, match="ends in the middle of a row of 'face'"):
+        tables_of(header + b"".join([*first, last[:-3]]))
+    if length != "ushort":
+        wrong = packed(*rows[-1], (2, -3))
+        with pytest.raises(MeshError, match="a list of 'face' has the length -3"):
+            tables_of(header + b"".join([*first, wrong, b"1 " * 3000]))

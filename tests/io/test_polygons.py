@@ -9,8 +9,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io import polygons
 from vtk_segdeform.io.polygons import _failed, cut_into_triangles, polydata_of, triangles_of
 
+SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
 
 
@@ -170,9 +172,9 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
     points = np.concatenate([ring, ring + [3.0, 0.0, 0.0], ring])
     own = np.arange(size) + (2 * size if apart else 0)
     again = [np.roll(own[::side], turn) for side in (1, -1) for turn in range(size)]
-    polygons = np.concatenate([np.arange(size), size + np.arange(size), *again])
+    corners = np.concatenate([np.arange(size), size + np.arange(size), *again])
     counts = np.full(2 + 2 * size, size)
-    faces, polygon = cut_into_triangles(points, counts, polygons)
+    faces, polygon = cut_into_triangles(points, counts, corners)
     assert_array_equal(np.bincount(polygon), counts - 2)
     first = {frozenset(face) for face in (faces[polygon == 0]).tolist()}
     for k in range(2, len(counts)):
@@ -181,3 +183,28 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         a, b, c = points[found].transpose(1, 0, 2)
         side = 1.0 if k < 2 + size else -1.0
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
+
+
+def test_the_same_corners_in_another_order_are_another_polygon():
+    square = flat((0, 0), (1, 0), (1, 1), (0, 1))
+    triangles, owner = cut(square, [0, 1, 3, 2], [0, 1, 2, 3])  # the first one crosses itself
+    assert_allclose(area_vectors(square, triangles[owner == 1])[:, 2], 0.5)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+@pytest.mark.parametrize("height", [0.0, 1.0])
+def test_quads_are_cut_as_by_vtk(monkeypatch, scale, height):
+    rng, number = np.random.default_rng(3), np.arange(200)
+    counts = np.where(number % 9 == 8, 3, np.where(number % 7 == 6, 5, 4))
+    corners = np.arange(counts.sum())
+    owner = np.repeat(number, counts)
+    points = rng.normal(size=(len(corners), 3)) * [1.0, 1.0, height]
+    points[owner % 4 == 1, 1] *= 1e-4  # corners near diagonals
+    points[owner % 4 == 2] += 3.0 * SQUARE[corners % 4][owner % 4 == 2]
+    points[owner % 4 == 3] = points[owner % 4 == 3].round()  # diagonals of equal length
+    points = scale * (points + 10.0 * owner[:, None])
+    faces, polygon = cut_into_triangles(points, counts, corners)
+    monkeypatch.setattr(polygons, "_LEAST_HEIGHT", np.inf)  # so that VTK's filter cuts all of them
+    expected, owner = cut_into_triangles(points, counts, corners)
+    assert_array_equal(polygon, owner)
+    assert_array_equal(faces, expected)

@@ -43,9 +43,24 @@ def with_attributes():
     return surface
 
 
+def with_an_array_of_two_uses():
+    """Return a surface with an array that is its scalars and its normals, and so written twice."""
+    surface = pv.Plane(i_resolution=3, j_resolution=2)
+    surface.clear_data()
+    surface.point_data["n"] = np.tile([0.0, np.nan, 1.0], (surface.n_points, 1))
+    surface.point_data.active_normals_name = "n"
+    assert surface.point_data.active_scalars_name == "n"
+    return surface
+
+
 @pytest.mark.parametrize("version", [_OLD, _NEW])
 @pytest.mark.parametrize("binary", [False, True])
-@pytest.mark.parametrize("make", [rich, with_attributes, lambda: pv.Sphere().triangulate()])
+@pytest.mark.parametrize(
+    "make",
+    [
+        rich, with_attributes, with_an_array_of_two_uses, lambda: pv.Sphere().triangulate(),
+    ],
+)  # fmt: skip
 @pytest.mark.parametrize("grid", [False, True])
 def test_all_versions_are_read_as_vtk_reads_them(tmp_path, grid, make, binary, version):
     surface = make().cast_to_unstructured_grid() if grid else make()
@@ -112,7 +127,9 @@ DAMAGE = {
     "too few rows of a field": (b"c 1 4 int\n5 6 7 8", b"c 1 3 int\n5 6 7"),
     "too wide an array": (b"c 1 4", b"c 999999999999 4"),
     "five components": (b"short 1", b"short 5"),
-    "an array of the same name": (b"c 1 4", b"a 1 4"),
+    "another array of the same name": (b"c 1 4 int", b"a 1 4 short"),
+    "the same numbers of another type": (b"c 1 4 int\n5 6 7 8", b"a 1 4 unsigned_short\n1 2 3 4"),
+    "a wider array of the same name": (b"c 1 4 int\n5 6 7 8", b"a 2 4 short\n1 2 3 4 1 2 3 4"),
     "numbers too large for their type": (b"1 2 3 4", b"1 2 3 99999"),
     "text in numbers": (b"5 6 7 8", b"5 x 7 8"),
     "metadata of an unknown kind": (b"LOOKUP_TABLE b 2", b"METADATA\nOTHER\n\nLOOKUP_TABLE b 2"),

@@ -27,6 +27,12 @@ def kernels(request, monkeypatch):
         monkeypatch.setattr(topology, "_LARGE", 0)
 
 
+# Of 3 x 3 vertices.
+SHEET = np.array(
+    [face for i in (0, 1, 3, 4) for face in ((i, i + 1, i + 4), (i, i + 4, i + 3))]
+)  # fmt: skip
+
+
 def random_faces(seed: int) -> np.ndarray:
     """Return a few triangles over a few vertices, without a vertex twice in one."""
     rng = np.random.default_rng(seed)
@@ -102,6 +108,20 @@ def test_renumbered_half_edges_are_those_of_the_renumbered_faces():
             "order", "first", "pairs", "boundary", "net_boundary", "pinched", "across", "shells",
             "crowded", "turned", "branching", "repeated", "one_sided",
         ):  # fmt: skip
+            assert_array_equal(getattr(found, name), getattr(fresh, name))
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_flipped_half_edges_are_those_of_the_flipped_faces(whole):
+    two = np.concatenate([SHEET, SHEET[:, ::-1] + 9, [[18, 19, 20], [18, 20, 19]]])
+    for faces in (two[:-2], two):  # the last two are one face, given twice
+        flip = np.arange(len(faces)) < (8 if whole else 3)
+        known = HalfEdges(faces, int(faces.max()) + 1)
+        assert len(known.boundary)
+        found = known.flipped(flip)
+        fresh = HalfEdges(np.where(flip[:, None], faces[:, [0, 2, 1]], faces), known.n_vertices)
+        assert known.flipped(np.zeros(len(faces), dtype=bool)) is known
+        for name in ("faces", "boundary", "shells", "turned", "net_boundary", "all_twins"):
             assert_array_equal(getattr(found, name), getattr(fresh, name))
 
 

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from ..arrays import IntArray
 from ..errors import MeshError
+from ..kernels import compiled_checks, inputs
 from .array_names import decoded
 from .number_lines import numbers_of
 
@@ -192,16 +194,64 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
                 lengths = np.full(element.count, len(first[k]))
                 columns[each.name] = Lists(lengths, values) if each.length else values
             return columns, start + element.count * layout.itemsize
-    rows = []
-    for _ in range(element.count):
-        row, start = _row(data, start, element, order)
-        rows.append(row)
-    columns = {}
+    return _table_of_lists(data, start, element, order)
+
+
+def _table_of_lists(data: bytes, start: int, element: _Element, order: str) -> tuple[Table, int]:
+    """Return the columns of an element with lists of several lengths, and the position after it."""
+    begins, lengths = np.empty((2, element.count, len(element.properties)), dtype=np.int64)
+    end = _walk(data, start, element, order, begins, lengths)
+    if end < 0:  # a row is wrong: say how
+        for _ in range(element.count):
+            _, start = _row(data, start, element, order)
+    columns: Table = {}
+    letters = np.frombuffer(data, np.uint8)[start:end]
     for k, each in enumerate(element.properties):
-        values = np.concatenate([row[k] for row in rows])
-        lengths = np.array([len(row[k]) for row in rows])
-        columns[each.name] = Lists(lengths, values) if each.length else values
-    return columns, start
+        kind = np.dtype(order + each.kind)
+        change = np.zeros(len(letters) + 1, dtype=np.int8)  # where its values begin and end
+        change[begins[:, k] - start] += 1
+        change[begins[:, k] - start + kind.itemsize * lengths[:, k]] -= 1
+        values = letters[np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)].view(kind)
+        columns[each.name] = Lists(lengths[:, k].copy(), values) if each.length else values
+    return columns, end
+
+
+def _walk(
+    data: bytes, start: int, element: _Element, order: str, begins: IntArray, lengths: IntArray
+) -> int:
+    """Put where the values of each property begin, and how many they are, into (n, p) arrays.
+
+    Return the position after the rows; -1 if a row is wrong or exceeds the data.
+    """
+    sizes = [np.dtype(each.kind).itemsize for each in element.properties]
+    words = [np.dtype(each.length or "V0") for each in element.properties]
+    kinds = "".join(word.kind for word in words)
+    doubles = {*sizes, *(word.itemsize for word in words)} <= {0, 8} and not start % 8
+    if ("f" not in kinds or (doubles and order == "<")) and (
+        kernels := compiled_checks(element.count)
+    ):
+        given = inputs(
+            np.frombuffer(data, np.uint8),
+            np.frombuffer(data, "<f8", len(data) // 8),
+            np.array(sizes),
+            np.array([word.itemsize for word in words]),
+            np.frombuffer(kinds.encode(), np.uint8),
+        )
+        return int(kernels.rows_of_lists(begins, lengths, start, order == ">", *given))
+    at = start
+    for row in range(element.count):
+        for k, (size, word) in enumerate(zip(sizes, words, strict=True)):
+            n = 1
+            if word.itemsize:
+                if at + word.itemsize > len(data):
+                    return -1
+                n = int(np.frombuffer(data, order + word.str[1:], 1, at)[0])
+                at += word.itemsize
+            if n < 0 or at + size * n > len(data):
+                return -1
+            begins[row, k], lengths[row, k] = at, n
+            at += size * n
+    return at
 
 
 def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[Any], int]:

@@ -8,17 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from ..freezing import read_only
-from ..mesh import first_equal_row, normals, repeats_vertex
+from ..kernels import compiled_checks, inputs
+from ..mesh import cross_rows, first_equal_row, normals, repeats_vertex
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
+_DOWN = -1e-9  # cosine of the normal of a triangle that is upside down, times its share of the area
 _NO_COUNTS: IntArray = np.empty(0, dtype=np.int64)
+# Of quads: VTK's filter takes a corner so near the diagonal beside it for one on it, at 1e-6.
+_LEAST_HEIGHT = 1e-5  # in the unit of the points
+_NOT_CUT, _OF_EQUAL_LENGTH = -1, 2
+_CORNERS_OF_CUTS = np.array([[0, 1, 2, 0, 2, 3], *[[0, 1, 3, 1, 2, 3]] * 2])
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
@@ -157,30 +166,108 @@ def cut_into_triangles(
 ) -> tuple[IntArray, IntArray]:
     """Return triangles (m, 3), and the polygon of each, (m,) int, in the order of polygons.
 
-    Polygons are cut by ear clipping, planar ones without overlaps.  Where that fails, as for one
-    that touches or crosses itself, the triangulation has the least area.  A polygon that is given
-    again, in either direction, is cut like the first one.
+    Convex quads are cut along their shorter diagonal, other polygons by ear clipping, planar ones
+    without overlaps.  Where that fails, as for one that touches or crosses itself, the
+    triangulation has the least area.  A polygon that is given again, in either direction, is cut
+    like the first one.
     """
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
-    faces, polygon = _clipped_ears(points, counts, corners)
     starts = np.cumsum(counts) - counts
-    failed = _failed(points, counts, corners, faces, polygon)
-    if len(failed):
-        kept = ~np.isin(polygon, failed)
-        parts, owners = [faces[kept]], [polygon[kept]]
-        for each in failed:
-            parts.append(_cut_alone(points, corners[starts[each] :][: counts[each]]))
-            owners.append(np.full(len(parts[-1]), each))
-        faces, polygon = np.concatenate(parts), np.concatenate(owners)
-        order = np.argsort(polygon, kind="stable")
-        faces, polygon = faces[order], polygon[order]
-    place, pieces = first_equal_row(points), np.bincount(polygon, minlength=len(counts))
-    for size in np.unique(counts[counts > 3]):
-        some = np.flatnonzero((counts == size) & (pieces == size - 2))
-        _cut_alike(faces, polygon, some, corners[starts[some][:, None] + np.arange(size)], place)
+    triangles, quads = np.flatnonzero(counts == 3), np.flatnonzero(counts == 4)
+    of_quads = _rows(corners, starts[quads], 4)
+    cut = _quad_cuts(points, of_quads)
+    n_triangles = np.zeros(len(counts), dtype=np.int64)
+    n_triangles[triangles], n_triangles[quads] = 1, np.where(cut == _NOT_CUT, 0, 2)
+    is_other = n_triangles == 0
+    others = np.flatnonzero(is_other)
+    clipped, owner = _clipped(points, counts[others], corners[np.repeat(is_other, counts)])
+    n_triangles[others] = np.bincount(owner, minlength=len(others))
+    polygon, first = np.repeat(number, n_triangles), np.cumsum(n_triangles) - n_triangles
+    faces = np.empty((len(polygon), 3), dtype=np.int64)
+    faces[first[triangles]] = _rows(corners, starts[triangles], 3)
+    if len(clipped):
+        faces[is_other[polygon]] = clipped
+    _put_halves(faces, first[quads], of_quads, cut)
+    is_other[quads[cut == _OF_EQUAL_LENGTH]] = True
+    some = np.flatnonzero(is_other & (n_triangles == counts - 2))
+    if len(some):  # other quads have the same shorter diagonal in any case
+        place = first_equal_row(points)
+        for size in np.unique(counts[some]):
+            alike = some[counts[some] == size]
+            _cut_alike(faces, polygon, alike, _rows(corners, starts[alike], size), place)
     return faces, polygon
+
+
+def _rows(corners: IntArray, starts: IntArray, size: int) -> IntArray:
+    """Return the *corners* of polygons of *size* corners, (k, size)."""
+    if len(starts) * size == len(corners):
+        return corners.reshape(-1, size)
+    rows: IntArray = corners[starts[:, None] + np.arange(size)]
+    return rows
+
+
+def _quad_cuts(points: FloatArray, quads: IntArray) -> NDArray[np.int8]:
+    """Return along which diagonal to cut each of *quads* (q, 4): 0 or 1, from that corner.
+
+    2, _OF_EQUAL_LENGTH, is 1 as well.  -1, _NOT_CUT, if a quad is not convex, which is so if the
+    normals at two corners are not on the same side, or a corner is near the diagonal beside it.
+    This is what VTK's filter does, and the same from any first corner and in both directions.
+    """
+    cut = np.empty(len(quads), dtype=np.int8)
+    if kernels := compiled_checks(len(quads)):
+        kernels.quad_cuts(cut, _LEAST_HEIGHT**2, *inputs(points, quads))
+        return cut
+    with np.errstate(invalid="ignore", over="ignore"):
+        p = [points[corner] for corner in quads.T]
+        up = [cross_rows(p[(k + 1) % 4] - p[k], p[k - 1] - p[k]) for k in range(4)]
+        first, second = (_dot(p[k] - p[k + 2], p[k] - p[k + 2]) for k in range(2))
+        least = _LEAST_HEIGHT**2 * np.maximum(first, second)
+        convex = np.ones(len(quads), dtype=bool)
+        for k in range(4):
+            convex &= _dot(up[k], up[k]) >= least
+            for j in range(k):
+                convex &= _dot(up[j], up[k]) > 0.0
+        cut[:] = np.where(first < second, 0, np.where(first == second, _OF_EQUAL_LENGTH, 1))
+    cut[~convex] = _NOT_CUT
+    return cut
+
+
+def _put_halves(faces: IntArray, first: IntArray, quads: IntArray, cut: NDArray[np.int8]) -> None:
+    """Put the two triangles of each of *quads* (q, 4) that is *cut* (q,) into *faces*."""
+    if kernels := compiled_checks(len(quads)):
+        kernels.quad_halves(faces, *inputs(first, quads, cut))
+        return
+    is_cut = cut != _NOT_CUT
+    two = np.take_along_axis(quads[is_cut], _CORNERS_OF_CUTS[cut[is_cut]], axis=1)
+    for k in range(2):
+        faces[first[is_cut] + k] = two[:, 3 * k : 3 * k + 3]
+
+
+def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
+    """Return the dot products of the rows of *u* and *v*, (k,) float."""
+    x, y, z = (u * v).T
+    return np.asarray((x + y) + z)
+
+
+def _clipped(points: FloatArray, counts: IntArray, corners: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the triangles of polygons by ear clipping, or the least area where that fails."""
+    if not len(counts):
+        return np.empty((0, 3), dtype=np.int64), _NO_COUNTS
+    faces, polygon = _clipped_ears(points, counts, corners)
+    failed = _failed(points, counts, corners, faces, polygon)
+    if not len(failed):
+        return faces, polygon
+    starts = np.cumsum(counts) - counts
+    kept = ~np.isin(polygon, failed)
+    parts, owners = [faces[kept]], [polygon[kept]]
+    for each in failed:
+        parts.append(_cut_alone(points, corners[starts[each] :][: counts[each]]))
+        owners.append(np.full(len(parts[-1]), each))
+    faces, polygon = np.concatenate(parts), np.concatenate(owners)
+    order = np.argsort(polygon, kind="stable")
+    return faces[order], polygon[order]
 
 
 def _cut_alike(
@@ -198,9 +285,11 @@ def _cut_alike(
     )
     first = first[again]
     size = at.shape[1]
-    # Where the first two corners of the earlier polygon are.
-    one, two = ((at[again] == at[first, k][:, None]).argmax(axis=1) for k in (0, 1))
-    forth, back = (one + 1) % size == two, (two + 1) % size == one
+    one = (at[again] == at[first, :1]).argmax(axis=1)[:, None]  # where the earlier one begins
+    forth, back = (
+        (np.take_along_axis(at[again], (one + step) % size, axis=1) == at[first]).all(axis=1)
+        for step in (np.arange(size), -np.arange(size))
+    )
     known = forth | back
     again, first, forth = again[known], first[known], forth[known]
     rows = np.searchsorted(polygon, some)[:, None] + np.arange(size - 2)
@@ -214,7 +303,14 @@ def _clipped_ears(
     points: FloatArray, counts: IntArray, corners: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Return what VTK finds; it leaves out some polygons and parts of others."""
-    surface = polydata_of(points, counts, corners)
+    _require_polygons(len(points), counts, corners)
+    places, cells = vtkPoints(), vtkCellArray()
+    places.SetData(numpy_to_vtk(np.ascontiguousarray(points)))
+    offsets = np.append(0, np.cumsum(counts))
+    cells.SetData(numpy_to_vtkIdTypeArray(offsets), numpy_to_vtkIdTypeArray(corners))
+    surface = vtkPolyData()
+    surface.SetPoints(places)
+    surface.SetPolys(cells)
     polygon = numpy_to_vtk(np.arange(len(counts)))
     polygon.SetName("polygon")
     surface.GetCellData().AddArray(polygon)
@@ -231,6 +327,11 @@ def _failed(
 ) -> IntArray:
     """Return the polygons with too few triangles, or planar with one of them upside down, (k,)."""
     starts = np.cumsum(counts) - counts
+    if kernels := compiled_checks(len(corners)):
+        found = np.zeros(len(counts), dtype=bool)
+        given = inputs(points, starts, counts, corners, faces, polygon)
+        kernels.wrongly_cut(found, _DOWN, _PLANAR, *given)
+        return np.flatnonzero(found)
     following = np.arange(1, len(corners) + 1)
     following[starts + counts - 1] = starts
     repeated = np.add.reduceat(corners == corners[following], starts)
@@ -240,7 +341,7 @@ def _failed(
         up = np.add.reduceat(np.cross(spoke, spoke[following]), starts)
         cosine = np.einsum("fx,fx->f", normals(points[faces]), up[polygon])
         square = np.einsum("cx,cx->c", up, up)
-        down = np.unique(polygon[cosine < -1e-9 * square[polygon]])
+        down = np.unique(polygon[cosine < _DOWN * square[polygon]])
         for each in down:
             spokes = spoke[starts[each] :][: counts[each]]
             height = np.abs(spokes @ up[each]).max()

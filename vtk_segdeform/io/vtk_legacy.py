@@ -194,8 +194,13 @@ class _File:
             demand(values.min() >= 0.0 and values.max() <= 1.0)
             values = (255.0 * values.astype(np.float64) + 0.5).astype(np.uint8)
         is_ids = sort.lower() == "vtkidtype"
-        array = add_array(attributes, name, values.astype(np.int64) if is_ids else values,
-                          is_ids=is_ids)  # fmt: skip
+        values = values.astype(np.int64) if is_ids else values
+        array = attributes.GetArray(name)
+        if array is None:
+            array = add_array(attributes, name, values, is_ids=is_ids)
+        else:  # VTK writes an array again for each attribute that it is
+            known = pv.convert_array(array).reshape(shape)
+            demand(known.dtype == values.dtype and known.tobytes() == values.tobytes())
         for k, part in enumerate(self._metadata(shape[1])):
             array.SetComponentName(k, part)
 

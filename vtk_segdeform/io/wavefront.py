@@ -100,9 +100,9 @@ def read_obj(path: Path) -> pv.PolyData:
         if rows:
             setattr(surface, name, [n for row in rows for n in (len(row), *row)])
     texture = _table("texture coordinate", lines, "vt", (2, 3))[:, :2]
-    _keep_corners(surface, "texture coordinate", texture, indices[:, 1])
+    _keep_corners(surface, "texture coordinate", texture, counts, indices[:, [0, 1]])
     normals = _table("normal", lines, "vn", (3,))
-    _keep_corners(surface, "normal", normals, indices[:, 2])
+    _keep_corners(surface, "normal", normals, counts, indices[:, [0, 2]])
     _keep_runs(surface, runs)
     if libraries:
         set_names(surface, _LIBRARY, libraries)
@@ -187,14 +187,19 @@ def _are_numbers(words: list[str], least: int) -> bool:
         return False
 
 
-def _keep_corners(surface: pv.PolyData, what: str, values: FloatArray, of_corner: IntArray) -> None:
-    """Store values of corners per point if every point has a unique one, else per corner."""
+def _keep_corners(
+    surface: pv.PolyData, what: str, values: FloatArray, counts: IntArray, indices: IntArray
+) -> None:
+    """Store values of corners per point if every point has a unique one, else per corner.
+
+    *indices* (c, 2) are the point and the value of each corner.
+    """
+    corners, of_corner = indices.T
     if not len(values) or (of_corner < 0).all():
         return
     if of_corner.max() >= len(values):
         raise MeshError(f"a face refers to {what} {of_corner.max() + 1} of {len(values)}")
     of_point_name, of_corner_name = _OF_CORNERS[what]
-    counts, corners = polygons_of(surface)
     of_point = np.full(surface.n_points, -1)
     if len(values) == len(of_point) and (of_corner == corners).all():
         of_point = np.arange(len(of_point))

@@ -3,6 +3,8 @@
 The checks run in this order: coordinates, indices, single faces, edges, vertices, and last the
 orientation of shells.  Each check skips everything that earlier ones rejected, so that a fault is
 reported once and under its own name.
+
+Long because all checks are beside each other, so that none repeats the work of another.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
-from .shells import closed_shells, shell_faults
+from .shells import ShellSums, closed_shells, shell_faults, shell_volumes
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
@@ -85,6 +87,21 @@ class Search:
         search = Search(points, self.triangles)
         search.__dict__["_corners"] = self._corners
         return search
+
+    def flipped(self, flip: BoolArray) -> Search:
+        """Return the search of the faces of `half_edges`, with *flip* (m,) of them flipped."""
+        half_edges = self.half_edges.flipped(flip)
+        search = Search.known(self.points, half_edges)
+        if "shell_sums" in vars(self) and "shells" in vars(half_edges):  # whole shells
+            volume, area, size = self.shell_sums
+            sign = np.where(flip[first_members(half_edges.shells)], -1.0, 1.0)
+            vars(search)["shell_sums"] = sign * volume, area, size
+        return search
+
+    @cached_property
+    def shell_sums(self) -> ShellSums:
+        """`shell_volumes` of `half_edges`."""
+        return shell_volumes(self.points, self.half_edges.faces, self.half_edges.shells)
 
     @cached_property
     def _corners(self) -> tuple[BoolArray, int | None]:
@@ -193,10 +210,8 @@ class Search:
 
     @cached_property
     def _inward_and_flat_shells(self) -> tuple[IntArray, IntArray]:
-        finite = None
-        if any(fault.kind is Kind.NON_FINITE for fault in self.number_faults):
-            finite = _finite(self.points)
-        return _inward_and_flat_shells(self.points, self.half_edges, finite)
+        has_others = any(fault.kind is Kind.NON_FINITE for fault in self.number_faults)
+        return _inward_and_flat_shells(self, _finite(self.points) if has_others else None)
 
     @property
     def is_two_manifold(self) -> bool:
@@ -363,16 +378,14 @@ def _turned_edges(half_edges: HalfEdges) -> Iterator[Fault]:
         yield from _some(Kind.TURNED_EDGE, turned, half_edges)
 
 
-def _inward_and_flat_shells(
-    points: FloatArray, half_edges: HalfEdges, finite: BoolArray | None
-) -> tuple[IntArray, IntArray]:
+def _inward_and_flat_shells(search: Search, finite: BoolArray | None) -> tuple[IntArray, IntArray]:
     """Return a vertex of each shell that is inside-out, and of each that encloses no volume.
 
     Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
     says which points are, if not all.
     """
-    faces, shells = half_edges.faces, half_edges.shells
-    closed = closed_shells(half_edges)
+    faces, shells = search.half_edges.faces, search.half_edges.shells
+    closed = closed_shells(search.half_edges)
     if finite is not None:
         valid = finite[faces].all(axis=1)
         closed[shells[~valid]] = False
@@ -381,7 +394,8 @@ def _inward_and_flat_shells(
         closed = closed[left]
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    wrong, flat, first = shell_faults(points, faces, shells, closed)
+    sums = search.shell_sums if finite is None else None
+    wrong, flat, first = shell_faults(search.points, faces, shells, closed, sums=sums)
     return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
 
 

@@ -130,6 +130,9 @@ def first_members(labels: NDArray[np.integer]) -> IntArray:
     first = np.zeros(int(labels.max(initial=-1)) + 1, np.int64)
     if len(first) == 1:
         return first
+    if kernels := compiled_checks(len(labels)):
+        kernels.first_members(first, *inputs(np.asarray(labels, dtype=np.int64)))
+        return first
     first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
     return first
 

@@ -21,16 +21,19 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from .grouping import begins, connected, first_members, two_sides
-from .shells import NO_VOLUME, outward_signs, shell_depths, shell_volumes
+from .shells import NO_VOLUME, ShellSums, outward_signs, shell_depths, shell_volumes
 from .topology import HalfEdges
 
 _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to its own
 
 
-def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
+def faces_to_flip(
+    points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None = None
+) -> BoolArray:
     """Return which faces (m,) to flip; those of a second call are none.
 
     Afterwards all pairs agree, except on one-sided patches, and no closed shell is inside-out.
+    *sums* are those of the shells, if known and if all pairs agree before.
     """
     patch, flip, two_sided = _patches(half_edges)
     unit = patch
@@ -44,7 +47,7 @@ def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> BoolArray:
         flip ^= minority[unit] & two_sided[patch]
     if not two_sided.all():
         one_sided[unit[~two_sided[patch]]] = True
-    wrong = _inside_out(points, half_edges, flip, unit, one_sided)
+    wrong = _inside_out(points, half_edges, flip, unit, one_sided, sums)
     return np.asarray(flip ^ wrong[unit]) if wrong.any() else flip
 
 
@@ -100,11 +103,14 @@ def _linked(
         np.minimum(p, r)[counts] * q + np.maximum(p, r)[counts], return_inverse=True
     )
     total = np.bincount(which, vote[counts], len(keys))
-    cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
-    graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
-    tree = csgraph.minimum_spanning_tree(graph).tocoo()
-    agree = total[np.searchsorted(keys, tree.row.astype(np.int64) * q + tree.col)] >= 0.0
-    group, turned = two_sides(q, tree.row.astype(np.int64), tree.col.astype(np.int64), ~agree)
+    tree = keys
+    if len(keys) > 1:
+        cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
+        graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
+        links = csgraph.minimum_spanning_tree(graph).tocoo()
+        tree = links.row.astype(np.int64) * q + links.col
+    agree = total[np.searchsorted(keys, tree)] >= 0.0
+    group, turned = two_sides(q, *np.divmod(tree, q), ~agree)
     return np.unique(group, return_inverse=True)[1], turned
 
 
@@ -131,6 +137,7 @@ def _inside_out(
     flip: BoolArray,
     unit: IntArray,
     one_sided: BoolArray,
+    sums: ShellSums | None,
 ) -> BoolArray:
     """Return which units enclose a volume of the wrong sign, (u,) bool, with faces flipped."""
     shells = half_edges.shells
@@ -140,7 +147,7 @@ def _inside_out(
     closed = alone & ~one_sided[of_shell]
     closed[shells[half_edges.boundary // 3]] = False
     faces = _flipped(half_edges.faces, flip)
-    volume, area, size = shell_volumes(points, faces, unit)
+    volume, area, size = sums or shell_volumes(points, faces, unit)
     under_lids, lids = _lids(points, half_edges, flip, unit)
     volume = volume + under_lids
     encloses = (lids <= _MOST_LIDS * area) & ~one_sided

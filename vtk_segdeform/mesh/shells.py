@@ -12,6 +12,8 @@ winding numbers", ACM Trans. Graph. 32(4), 33, 2013.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -26,6 +28,9 @@ _PIECE = 10_000  # faces per task; their data fit into the cache
 NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
 _MANY = 100  # points for which columns are quicker
 _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
+
+# Volume, area and size of each shell, (k,) float each.
+ShellSums: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def closed_shells(half_edges: HalfEdges) -> BoolArray:
@@ -43,7 +48,12 @@ def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray
 
 
 def shell_faults(
-    vertices: FloatArray, faces: IntArray, shells: IntArray, closed: BoolArray
+    vertices: FloatArray,
+    faces: IntArray,
+    shells: IntArray,
+    closed: BoolArray,
+    *,
+    sums: ShellSums | None = None,
 ) -> tuple[BoolArray, BoolArray, IntArray]:
     """Return which shells are inside-out or enclose no volume.
 
@@ -57,6 +67,8 @@ def shell_faults(
         The shell of each face, 0..k-1.
     closed : (k,) bool
         The shells to test, closed and consistently oriented.  Others may be around them.
+    sums : ShellSums, optional
+        Those of `shell_volumes`, if they are known.
 
     Returns
     -------
@@ -68,7 +80,7 @@ def shell_faults(
         Its first face.
     """
     first = first_members(shells)
-    volume, area, size = shell_volumes(vertices, faces, shells)
+    volume, area, size = sums or shell_volumes(vertices, faces, shells)
     tiny = NO_VOLUME * (area * size)
     outward = outward_signs(volume, shell_depths(vertices, faces, shells, closed), closed)
     wrong = outward * volume <= tiny
@@ -88,9 +100,7 @@ def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> Int
     return outward
 
 
-def shell_volumes(
-    vertices: FloatArray, faces: IntArray, shells: IntArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def shell_volumes(vertices: FloatArray, faces: IntArray, shells: IntArray) -> ShellSums:
     """Return the volume, area and size of each shell, (k,) each, from its first vertex."""
     origins = vertices[faces[first_members(shells), 0]]
     if kernels := compiled_checks(len(faces)):
@@ -124,23 +134,24 @@ def shell_depths(
     depth = np.zeros(len(inner), dtype=np.int64)
     if len(inner) < 2 or not inner.any():
         return depth
-    by_shell = np.argsort(shells, kind="stable")
-    ends = np.cumsum(np.bincount(shells))
-    starts = ends - np.bincount(shells)
-    corners = vertices[faces[by_shell]]
-    low = np.minimum.reduceat(corners.min(axis=1), starts)
-    high = np.maximum.reduceat(corners.max(axis=1), starts)
+    low, high = _boxes(vertices, faces, shells)
     order, begin, end = _beginning_within(low, high)
+    within = []
     for outer in np.flatnonzero(end > begin):
         near = order[begin[outer] : end[outer]]
         near = near[inner[near]]
-        within = ((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)
-        if not within.any():
-            continue
+        near = near[((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)]
+        if len(near):
+            within.append((outer, near))
+    if not within:  # as for most surfaces
+        return depth
+    by_shell = np.argsort(shells, kind="stable")
+    ends = np.cumsum(np.bincount(shells))
+    starts = ends - np.bincount(shells)
+    for outer, inside in within:
         owned, its_faces = _owned(faces[by_shell[starts[outer] : ends[outer]]])
         if its_faces[0, 1] > its_faces[0, 2]:  # the same rounding for both orientations
             its_faces = its_faces[:, [0, 2, 1]]
-        inside = near[within]
         extremes = []
         for one in inside:
             points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
@@ -149,6 +160,25 @@ def shell_depths(
         is_inside = _surrounded(np.concatenate(extremes), vertices[owned], its_faces)
         depth[inside] += np.logical_and.reduceat(is_inside, begins)
     return depth
+
+
+def _boxes(
+    vertices: FloatArray, faces: IntArray, shells: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest coordinates of each shell, (k, 3) each."""
+    n_shells = int(shells.max()) + 1
+    low, high = np.full((n_shells, 3), np.inf), np.full((n_shells, 3), -np.inf)
+    if kernels := compiled_checks(len(faces)):
+        last = np.full(len(vertices), -1, dtype=np.int32)
+        kernels.shell_boxes(low, high, last, *inputs(vertices, faces, shells))
+        return low, high
+    by_shell = np.argsort(shells, kind="stable")
+    corners, starts = faces[by_shell].ravel(), 3 * first_members(shells[by_shell])
+    for axis in range(3):  # numpy takes ten times as long for rows of three numbers
+        x = vertices[:, axis][corners]
+        low[:, axis] = np.minimum.reduceat(x, starts)
+        high[:, axis] = np.maximum.reduceat(x, starts)
+    return low, high
 
 
 def _surrounded(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:

@@ -152,7 +152,10 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     if len(flat):
         kept[flat] = False
         half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
-    flip = faces_to_flip(valid, half_edges)
+    sums = None
+    if half_edges is found.half_edges and not len(half_edges.turned) + len(half_edges.crowded):
+        sums = found.shell_sums
+    flip = faces_to_flip(valid, half_edges, sums)
     left = found.used
     if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
         left = np.zeros(len(points), dtype=bool)
@@ -160,15 +163,12 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     vertex_of, loose = target, _NONE
     if same and left.all() and not flip.any():
         mesh = Mesh.of(found)
+    elif same and left.all():
+        mesh = Mesh.of(found.flipped(flip))
     else:
         number = np.cumsum(left) - 1
-        if flip.any():
-            faces_left = half_edges.faces
-            faces_left = np.where(flip[:, None], faces_left[:, [0, 2, 1]], faces_left)
-            mesh = Mesh(points[left], number[faces_left])
-        else:
-            kept_edges = half_edges.renumbered(number, int(left.sum()))
-            mesh = Mesh.of(Search.known(points[left], kept_edges))
+        flipped = half_edges.flipped(flip)
+        mesh = Mesh.of(Search.known(points[left], flipped.renumbered(number, int(left.sum()))))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)
@@ -271,20 +271,24 @@ def _workarounds(
 ) -> Iterator[Workaround]:
     """Yield the sentences, from what was changed to what was left as it is."""
 
+    def marked(points: IntArray) -> BoolArray:
+        mask = np.zeros(len(target), dtype=bool)
+        mask[points] = True
+        return mask
+
     def at(vertices: IntArray) -> IntArray:
         """Return the given points that follow *vertices*."""
-        marked = np.zeros(len(target), dtype=bool)
-        marked[vertices] = True
-        return np.flatnonzero(marked[target])
+        return np.flatnonzero(marked(vertices)[target])
 
     members = np.bincount(target, minlength=len(target))[target]
     if len(seam := np.flatnonzero(members > 1)):
         yield _workaround(Kind.COINCIDENT, len(seam), "welded # seam point", seam)
     if flip.any():
-        faces = triangles[kept][flip]
-        yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", np.unique(faces))
-    dropped = ~kept
-    dropped[flat] = False
+        is_all = flip.all() and len(flip) == len(triangles)
+        faces = triangles if is_all else triangles[np.flatnonzero(kept)[flip]]
+        there = np.flatnonzero(marked(faces))
+        yield _workaround(Kind.TURNED_EDGE, len(faces), "flipped # face", there)
+    dropped = np.setdiff1d(np.flatnonzero(~kept), flat, assume_unique=True)
     faces = triangles[dropped]
     degenerate = repeats_vertex(target[faces])
     for kind, ignored in (
@@ -294,18 +298,18 @@ def _workarounds(
     ):
         if len(ignored):
             text = f"ignored {counted(len(ignored), kind.one, kind.many)}"
-            yield Workaround(text, np.unique(ignored), kind, len(ignored))
+            yield Workaround(text, np.flatnonzero(marked(ignored)), kind, len(ignored))
     if len(flat):
         loose = np.setdiff1d(loose, at(target[triangles[flat]]))
     if len(loose):
         text = f"{counted(len(loose), 'point is', 'points are')} in no face"
         yield Workaround(text, loose, Kind.UNREFERENCED, len(loose))
-    some = half_edges.boundary
-    ends = np.stack([half_edges.tail[some], half_edges.head_of(some)])
-    corners, ends = np.unique(ends, return_inverse=True)
-    if len(corners):
-        n_holes = int(connected(len(corners), *ends.reshape(2, -1)).max()) + 1
-        yield _workaround(Kind.HOLE, n_holes, "# hole", at(corners))
+    if len(some := half_edges.boundary):
+        ends = half_edges.tail[some], half_edges.head_of(some)
+        on_border = marked(np.append(*ends))
+        number = np.cumsum(on_border) - 1
+        n_holes = int(connected(int(on_border.sum()), *(number[end] for end in ends)).max()) + 1
+        yield _workaround(Kind.HOLE, n_holes, "# hole", np.flatnonzero(on_border[target]))
     if len(crowded := half_edges.branching):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
         there = at(np.append(half_edges.tail[crowded], half_edges.head_of(crowded)))

@@ -92,8 +92,8 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        border, starts, *after = scratch(np.int32, n, n + 2, n, n)
-        links, tree = scratch(np.int64, 3 * m, n)
+        links, tree, narrow = scratch(np.int64, 3 * m, n, 2 * n + 1)
+        border, starts, *after = np.split(narrow.view(np.int32), np.cumsum([n, n + 2, n]))
         tree[:] = np.arange(n)
         found = [0, 0]
 
@@ -320,6 +320,25 @@ class HalfEdges:
             if name in self.__dict__:
                 renamed.__dict__[name] = self.__dict__[name]
         return renamed
+
+    def flipped(self, flip: BoolArray) -> HalfEdges:
+        """Return the half-edges with the faces *flip* (m,) in the other direction.
+
+        If these are whole shells, and every vertex has one fan, that is so afterwards, too.
+        """
+        if not flip.any():
+            return self
+        faces = np.empty_like(self.faces)
+        faces[:, 0] = self.faces[:, 0]
+        for corner in (1, 2):
+            faces[:, corner] = np.where(flip, self.faces[:, 3 - corner], self.faces[:, corner])
+        turned = HalfEdges(faces, self.n_vertices)
+        alone = self.__dict__.get("_alone")
+        if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
+            face, corner = np.divmod(alone, 3)
+            turned.__dict__["_alone"] = 3 * face + np.where(flip[face], 2 - corner, corner)
+            turned.__dict__["shells"] = self.shells
+        return turned
 
     @cached_property
     def shells(self) -> IntArray:

@@ -25,7 +25,7 @@ from ..polygons import polygons_of
 from .accessors import Accessors
 from .buffers import Document, copied, glb_of, object_, objects
 from .reading import arrays_of, surface_of, unit
-from .scene import COMPRESSED, Block, scene_of
+from .scene import COMPRESSED, Block, products, scene_of
 
 _log = logging.getLogger(__name__)
 _WORST = 1e8  # condition of a frame that can still be inverted
@@ -134,14 +134,14 @@ def _local(document: Document, block: Block, world: dict[str, FloatArray]) -> di
     linear, shift = block.frames[..., :3, :3], block.frames[..., :3, 3]
     inverse = np.linalg.pinv(linear, rcond=1.0 / _WORST)
     stored = {key: document.array(block.attributes[key], "VEC3", "VEC4") for key in world}
-    position = np.einsum("...ij,...j->...i", inverse, world["POSITION"] - shift)
+    position = products(inverse, world["POSITION"] - shift)
     result = {"POSITION": stored["POSITION"].astype(float) + (position - block.local)}
     if "NORMAL" in world:
-        normal = np.einsum("...ji,...j->...i", linear, world["NORMAL"])
+        normal = products(linear.swapaxes(-1, -2), world["NORMAL"])
         length = np.linalg.norm(stored["NORMAL"], axis=1, keepdims=True)
         result["NORMAL"] = length * unit(normal)
     if "TANGENT" in world:
-        tangent = unit(np.einsum("...ij,...j->...i", inverse, world["TANGENT"]))
+        tangent = unit(products(inverse, world["TANGENT"]))
         result["TANGENT"] = np.column_stack([tangent, stored["TANGENT"][:, 3]])
     return result
 

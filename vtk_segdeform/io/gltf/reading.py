@@ -24,7 +24,7 @@ from ..array_names import set_names
 from ..polygons import polydata_of
 from .buffers import Document
 from .contained import self_contained
-from .scene import Block, Piece, attribute, scene_of
+from .scene import Block, Piece, attribute, products, scene_of
 
 DOCUMENT = "glTF"
 _log = logging.getLogger(__name__)
@@ -97,9 +97,9 @@ def arrays_of(document: Document, block: Block) -> dict[str, Any]:
             arrays["RGB" if values.shape[1] == 3 else "RGBA"] = np.rint(255 * colour).astype("u1")
         elif key == "NORMAL" and values.shape[1] == 3:
             if (determinant != 0).all():
-                arrays[key] = unit(np.einsum("...ji,...j->...i", np.linalg.inv(linear), values))
+                arrays[key] = unit(products(np.linalg.inv(linear).swapaxes(-1, -2), values))
         elif key == "TANGENT" and values.shape[1] == 4:
-            along = unit(np.einsum("...ij,...j->...i", linear, values[:, :3].astype(float)))
+            along = unit(products(linear, values[:, :3]))
             arrays[key] = np.column_stack([along, values[:, 3] * np.sign(determinant)])
         elif not key.startswith(("NORMAL", "TANGENT")):
             arrays[key] = np.ascontiguousarray(values[:, 0] if values.shape[1] == 1 else values)
@@ -108,8 +108,9 @@ def arrays_of(document: Document, block: Block) -> dict[str, Any]:
 
 def unit(vectors: Any) -> Any:
     """Return vectors (n, 3) with length one; those of length zero remain."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors / np.where(length > 0, length, 1.0)
+    x, y, z = vectors.T
+    length = np.sqrt((x * x + y * y) + z * z)
+    return vectors / np.where(length > 0, length, 1.0)[:, None]
 
 
 def _name_cells(

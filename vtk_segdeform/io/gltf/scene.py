@@ -43,9 +43,7 @@ class Block(NamedTuple):
     @property
     def points(self) -> FloatArray:
         """Return the positions (n, 3) in the world."""
-        linear, shift = self.frames[..., :3, :3], self.frames[..., :3, 3]
-        result: FloatArray = np.einsum("...ij,...j->...i", linear, self.local) + shift
-        return result
+        return products(self.frames[..., :3, :3], self.local) + self.frames[..., :3, 3]
 
 
 class Piece(NamedTuple):
@@ -63,6 +61,21 @@ class _Shown(NamedTuple):
     node: dict[str, Any]
     world: FloatArray
     joints: list[FloatArray]
+
+
+def products(matrices: Any, vectors: Any) -> FloatArray:
+    """Return the products of *matrices*, (3, 3) or (n, 3, 3), and *vectors* (n, 3), (n, 3) float.
+
+    >>> products(np.diag([2.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0]]))
+    array([[2., 2., 3.]])
+    """
+    # By columns: numpy takes five times as long for rows of three numbers.
+    x, y, z = vectors.T.astype(np.float64)
+    result = np.empty(vectors.shape)
+    for i in range(3):
+        a, b, c = (matrices[..., i, j] for j in range(3))
+        result[:, i] = (a * x + b * y) + c * z
+    return result
 
 
 def scene_of(document: Document) -> tuple[list[Block], list[Piece]]:

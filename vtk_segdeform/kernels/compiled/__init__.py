@@ -8,13 +8,15 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
-    half_edges      `topology.HalfEdges`, `grouping.connected`, `Mesh.adjacency`
+    half_edges      `topology.HalfEdges`, `grouping.connected`,
+                    `grouping.first_members`, `Mesh.adjacency`
     pairs           `contact.Contact`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
-    triangles       `faults.Search`, `shells.shell_volumes`, `grouping.first_equal_row`,
-                    `Mesh.face_areas`
-    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`
+    triangles       `faults.Search`, `shells.shell_volumes`, `shells.shell_depths`,
+                    `grouping.first_equal_row`, `Mesh.face_areas`, `polygons.cut_into_triangles`
+    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
+                    `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -26,6 +28,7 @@ from .half_edges import (
     border_half_edges,
     edge_lengths,
     edge_rows,
+    first_members,
     link,
     link_corners,
     number_trees,
@@ -40,8 +43,23 @@ from .pairs import facing_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
-from .text import corners_of_lines, facet_corners, numbers_of_lines, plain_numbers
-from .triangles import face_areas, first_equal_points, flat_faces, shell_sums
+from .text import (
+    corners_of_lines,
+    facet_corners,
+    numbers_of_lines,
+    plain_numbers,
+    rows_of_lists,
+)
+from .triangles import (
+    face_areas,
+    first_equal_points,
+    flat_faces,
+    quad_cuts,
+    quad_halves,
+    shell_boxes,
+    shell_sums,
+    wrongly_cut,
+)
 from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
 
 __all__ = [
@@ -62,6 +80,7 @@ __all__ = [
     "facet_corners",
     "facing_pairs",
     "first_equal_points",
+    "first_members",
     "flat_faces",
     "interpolated_rows",
     "link",
@@ -72,9 +91,13 @@ __all__ = [
     "one_fan_each",
     "pair_half_edges",
     "plain_numbers",
+    "quad_cuts",
+    "quad_halves",
     "ring_normals",
     "rings",
     "rotations",
+    "rows_of_lists",
+    "shell_boxes",
     "shell_sums",
     "solve_factored",
     "used_vertices",
@@ -82,4 +105,5 @@ __all__ = [
     "volume_gradient",
     "volume_sums",
     "weights",
+    "wrongly_cut",
 ]

@@ -201,6 +201,13 @@ def number_trees(parent):
 
 
 @_compile
+def first_members(first, labels):
+    """Put the first item with each of *labels* (n,) into *first* (k,)."""
+    for i in range(len(labels) - 1, -1, -1):
+        first[labels[i]] = i
+
+
+@_compile
 def used_vertices(used, faces):
     """Mark the vertices of faces in *used* (n,) and return how many faces repeat a vertex.
 

@@ -1,4 +1,4 @@
-"""Numbers in text, for `number_lines`, `wavefront` and `stl`.
+"""Numbers in text, for `number_lines`, `wavefront` and `stl`, and rows of lists, for `ply_tables`.
 
 A number is m 10^p with an integer m.  If m is up to 2^53 and p from -22 to 22, both factors are
 doubles, and their product or quotient is rounded once.  Otherwise m and 10^|p| are sums of two
@@ -27,6 +27,7 @@ _LINE_FEED, _SPACE, _TAB, _RETURN = b"\n \t\r"
 _PLUS, _MINUS, _POINT, _SLASH, _ZERO, _NINE, _E = b"+-./09e"
 _MOST_DIGITS = 17  # of an index
 _LETTER_CASE = 0x20
+_FLOAT, _INTEGER = b"fi"
 _VERTEX, _FACET = np.frombuffer(b"vertex", "u1"), np.frombuffer(b"facet", "u1")
 _END_FACET, _END_SOLID = np.frombuffer(b"endfacet", "u1"), np.frombuffer(b"endsolid", "u1")
 
@@ -248,3 +249,36 @@ def facet_corners(text, corners, counts):
             at += 1
         at += 1
     return True
+
+
+@_compile
+def rows_of_lists(begins, lengths, at, swapped, letters, numbers, sizes, word_sizes, kinds):
+    """Put where values begin, and how many they are, into *begins* and *lengths* (n, p).
+
+    A row of a PLY element has for each property p one value of *sizes*, or, if *word_sizes* is not
+    0, a length and so many values.  Lengths are of numpy's *kinds*: unsigned, integers, or floats,
+    which are read from *numbers*, the same bytes as *letters*.  Return the end of the rows; -1 if
+    a length is wrong, or if they exceed the bytes.
+    """
+    for row in range(len(begins)):
+        for k in range(len(sizes)):
+            n, size = np.int64(1), word_sizes[k]
+            if at + size > len(letters):
+                return -1
+            if kinds[k] == _FLOAT:
+                length = numbers[at // 8]
+                if not 0.0 <= length < _EXACT:
+                    return -1
+                n = np.int64(length)
+            elif size:
+                n = np.int64(0)
+                for b in range(size):
+                    n |= np.int64(letters[at + (size - 1 - b if swapped else b)]) << (8 * b)
+                if kinds[k] == _INTEGER and n >> (8 * size - 1):
+                    return -1
+            at += size
+            if n > (len(letters) - at) // sizes[k]:
+                return -1
+            begins[row, k], lengths[row, k] = at, n
+            at += sizes[k] * n
+    return at

@@ -74,6 +74,158 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
 
 
 @_compile
+def shell_boxes(low, high, last, points, faces, shells):
+    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices.
+
+    *last* (n,) must be filled with -1.
+    """
+    for f in range(len(faces)):
+        s = shells[f]
+        for c in range(3):
+            v = faces[f, c]
+            if last[v] == s:
+                continue
+            last[v] = s
+            for axis in range(3):
+                x = points[v, axis]
+                if x < low[s, axis]:
+                    low[s, axis] = x
+                if x > high[s, axis]:
+                    high[s, axis] = x
+
+
+@_compile
+def quad_cuts(cut, square, points, quads):
+    """Put into *cut* (q,) along which diagonal to cut each of *quads* (q, 4).
+
+    0 or 1, from that corner; 2 is 1, as long as the other; -1 if two of the normals at corners are
+    not on the same side, or the height of a corner over a diagonal may have a smaller *square*.
+    """
+    up = np.empty((4, 3))
+    for q in range(len(quads)):
+        for k in range(4):
+            i, j, h = quads[q, k], quads[q, (k + 1) % 4], quads[q, (k + 3) % 4]
+            ux, uy, uz = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            vx, vy, vz = (
+                points[h, 0] - points[i, 0],
+                points[h, 1] - points[i, 1],
+                points[h, 2] - points[i, 2],
+            )
+            up[k, 0] = uy * vz - uz * vy
+            up[k, 1] = uz * vx - ux * vz
+            up[k, 2] = ux * vy - uy * vx
+        i, j = quads[q, 0], quads[q, 2]
+        x, y, z = (
+            points[i, 0] - points[j, 0],
+            points[i, 1] - points[j, 1],
+            points[i, 2] - points[j, 2],
+        )
+        first = (x * x + y * y) + z * z
+        i, j = quads[q, 1], quads[q, 3]
+        x, y, z = (
+            points[i, 0] - points[j, 0],
+            points[i, 1] - points[j, 1],
+            points[i, 2] - points[j, 2],
+        )
+        second = (x * x + y * y) + z * z
+        convex = True
+        for k in range(4):
+            x, y, z = up[k, 0], up[k, 1], up[k, 2]
+            convex &= (x * x + y * y) + z * z >= square * first
+            convex &= (x * x + y * y) + z * z >= square * second
+            for j in range(k):
+                convex &= (x * up[j, 0] + y * up[j, 1]) + z * up[j, 2] > 0.0
+        if not convex:
+            cut[q] = -1
+        elif first < second:
+            cut[q] = 0
+        else:
+            cut[q] = 2 if first == second else 1
+
+
+@_compile
+def quad_halves(faces, first, quads, cut):
+    """Put the two triangles of each of *quads* (q, 4) into *faces*, at *first* (q,) and after it.
+
+    *cut* (q,) is as of `quad_cuts`; quads that are not cut are skipped.
+    """
+    for q in range(len(quads)):
+        a, b, c, d = quads[q, 0], quads[q, 1], quads[q, 2], quads[q, 3]
+        k = first[q]
+        if cut[q] == 0:
+            faces[k, 0], faces[k, 1], faces[k, 2] = a, b, c
+            faces[k + 1, 0], faces[k + 1, 1], faces[k + 1, 2] = a, c, d
+        elif cut[q] > 0:
+            faces[k, 0], faces[k, 1], faces[k, 2] = a, b, d
+            faces[k + 1, 0], faces[k + 1, 1], faces[k + 1, 2] = b, c, d
+
+
+@_compile
+def wrongly_cut(failed, down, planar, points, starts, counts, corners, faces, polygon):
+    """Mark polygons with too few triangles, or planar with one upside down, in *failed* (m,).
+
+    *faces* (k, 3) are the triangles, and *polygon* (k,) are those of which, in ascending order.
+    """
+    first = 0
+    for p in range(len(counts)):
+        begin, n, last = starts[p], counts[p], first
+        while last < len(polygon) and polygon[last] == p:
+            last += 1
+        o = corners[begin]
+        ux, uy, uz, n_repeated = 0.0, 0.0, 0.0, 0
+        for k in range(n):
+            i, j = corners[begin + k], corners[begin + (k + 1) % n]
+            n_repeated += i == j
+            ax, ay, az = (
+                points[i, 0] - points[o, 0],
+                points[i, 1] - points[o, 1],
+                points[i, 2] - points[o, 2],
+            )
+            bx, by, bz = (
+                points[j, 0] - points[o, 0],
+                points[j, 1] - points[o, 1],
+                points[j, 2] - points[o, 2],
+            )
+            ux += ay * bz - az * by
+            uy += az * bx - ax * bz
+            uz += ax * by - ay * bx
+        failed[p] = last - first < n - n_repeated - 2
+        square = (ux * ux + uy * uy) + uz * uz
+        is_down = False
+        for f in range(first, last):
+            i, j, h = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
+            bx, by, bz = (
+                points[h, 0] - points[i, 0],
+                points[h, 1] - points[i, 1],
+                points[h, 2] - points[i, 2],
+            )
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            is_down |= (x * ux + y * uy) + z * uz < down * square
+        if is_down:
+            height, size = 0.0, 0.0
+            for k in range(n):
+                i = corners[begin + k]
+                ax, ay, az = (
+                    points[i, 0] - points[o, 0],
+                    points[i, 1] - points[o, 1],
+                    points[i, 2] - points[o, 2],
+                )
+                height = max(height, abs((ax * ux + ay * uy) + az * uz))
+                size = max(size, abs(ax), abs(ay), abs(az))
+            failed[p] |= height <= planar * np.sqrt(square) * size
+        first = last
+
+
+@_compile
 def first_equal_points(first, points, table):
     """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 
