@@ -19,6 +19,7 @@ from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.deformer.locality import Ring, SurfaceSamples
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.finish import Finisher
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
@@ -225,6 +226,22 @@ def test_on_a_coarse_mesh_a_pulled_vertex_stays_in_the_plane_of_its_neighbours(
         assert abs(pose.volume_change) < 1e-12
         assert np.linalg.norm(pose.vertices[vertex] - to) < 1e-4 * d
         assert spike(mesh, pose.vertices, vertex) < 0.1
+
+
+@pytest.mark.parametrize(("refused", "part"), [(1, 0.5), (2, 0.25), (3, 0.0)])
+def test_less_of_the_finish_of_a_pull_is_used_where_all_of_it_is_no_better(
+    refused, part, monkeypatch
+):
+    d, x = coarse().mesh.diagonal, coarse().mesh.vertices
+    local = coarse().hold(handle=[0]).local(0, 0.3 * d, 0.075 * d)
+    solution = local.solve(x[[0]] + [0.0, 0.0, 0.1 * d])
+    whole = local.finish(solution).vertices - solution.vertices
+    answers = iter([False] * refused + [True])
+    monkeypatch.setattr(Finisher, "is_better", lambda *_: next(answers))
+    finished = local.finish(solution)
+    assert abs(finished.volume_change) < 1e-12
+    moved = finished.vertices - solution.vertices
+    assert np.linalg.norm(moved - part * whole) <= 0.02 * np.linalg.norm(whole)
 
 
 def test_only_rings_that_would_bend_resist():

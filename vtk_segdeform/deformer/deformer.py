@@ -117,6 +117,7 @@ _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
+_PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 1.0  # weight of `locality` from which a finish moves nothing: at 1.4 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
@@ -637,8 +638,9 @@ class Deformer:
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
         only the surface within the reach is finished: it stays from 1.4 times the reach on, and
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
-        volume, because hardly a vertex is free, is returned unchanged; so is a pull whose
-        surface would have more energy, or more folds.
+        volume, because hardly a vertex is free, is returned unchanged.  Of the finish of a pull
+        half is used, or a quarter, if all of it would add energy or folds; if these do as well,
+        the pose is returned unchanged.
 
         Where *solution* has no crossings there are none after it, either.
 
@@ -685,9 +687,11 @@ class Deformer:
         finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
         found = finisher.run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
-            found = replace(found, vertices=finisher.between(start, found.vertices, shares))
-            if not finisher.is_better(start, found.vertices):
+            ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)
+            better = next((x for x in ways if finisher.is_better(start, x)), None)
+            if better is None:
                 return solution
+            found = replace(found, vertices=better)
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:
