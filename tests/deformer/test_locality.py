@@ -16,9 +16,10 @@ from solids import rotation
 from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
-from vtk_segdeform.deformer.locality import SurfaceSamples
+from vtk_segdeform.deformer.locality import Ring, SurfaceSamples
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.finish import Finisher
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
@@ -143,13 +144,30 @@ def test_a_pose_out_of_all_proportion_is_not_shown_and_the_status_says_so(monkey
     assert np.linalg.norm(after.vertices[HIGH] - X[HIGH] - 0.2 * UP) < 6e-4 * D
 
 
+def ring_around(mesh, vertex):
+    """Return the directed edges opposite to *vertex* in its triangles, (k, 2)."""
+    faces = mesh.faces[(mesh.faces == vertex).any(axis=1)]
+    turned = np.argmax(faces == vertex, axis=1)[:, None] + [1, 2]
+    return np.take_along_axis(faces, turned % 3, axis=1)
+
+
+def outward(x, vertex, ring):
+    normal = np.cross(x[ring[:, 0]] - x[vertex], x[ring[:, 1]] - x[vertex]).sum(axis=0)
+    return normal / np.linalg.norm(normal)
+
+
+def offset(x, vertex, ring):
+    """Return the signed offset of a vertex from the plane of its neighbours."""
+    middle = x[np.unique(ring)].mean(axis=0)
+    normal = np.cross(x[ring[:, 0]] - middle, x[ring[:, 1]] - middle).sum(axis=0)
+    return (x[vertex] - middle) @ normal / np.linalg.norm(normal)
+
+
 def spike(mesh, x, vertex):
-    """Return how far a vertex is from the plane of its neighbours, in edge lengths."""
-    near = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
-    middle = x[near].mean(axis=0)
-    normal = np.linalg.svd(x[near] - middle)[2][2]
-    edge = np.linalg.norm(mesh.vertices[near] - mesh.vertices[vertex], axis=1).mean()
-    return abs((x[vertex] - middle) @ normal) / edge
+    """Return the change of a vertex's offset from the plane of its neighbours, in edge lengths."""
+    ring = ring_around(mesh, vertex)
+    edge = np.linalg.norm(mesh.vertices[np.unique(ring)] - mesh.vertices[vertex], axis=1).mean()
+    return abs(offset(x, vertex, ring) - offset(mesh.vertices, vertex, ring)) / edge
 
 
 def dense():
@@ -180,9 +198,78 @@ def test_a_pull_reaches_its_target_without_a_spike_and_far_away_nothing_moves(na
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-12
     assert np.linalg.norm(solution.vertices[vertex] - to) < 6e-4 * mesh.diagonal
-    assert spike(mesh, solution.vertices, vertex) - spike(mesh, x, vertex) < 0.1
+    assert spike(mesh, solution.vertices, vertex) < 0.1
     far = np.linalg.norm(solution.vertices - x, axis=1)[away > 4.0 * radius]
     assert far.max(initial=0.0) < 2e-3 * mesh.diagonal
+
+
+@functools.cache
+def coarse():
+    """Return a ball whose cage is about as dense as itself, without handles."""
+    mesh = models.sphere(400)
+    regions = Regions.single(mesh)
+    return Deformer(mesh, regions, fit_cages(mesh, regions, 150))
+
+
+@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize(("vertex", "spread"), [(0, 0.075), (217, 0.02)])  # an edge is 0.055
+def test_on_a_coarse_mesh_a_pulled_vertex_stays_in_the_plane_of_its_neighbours(
+    vertex, spread, share
+):
+    mesh = coarse().mesh
+    x, d, ring = mesh.vertices, mesh.diagonal, ring_around(mesh, vertex)
+    local = coarse().hold(handle=[vertex]).local(vertex, 0.3 * d, spread * d)
+    to = x[vertex] + share * d * outward(x, vertex, ring)
+    solution = local.solve(to[None])
+    for pose in (solution, local.finish(solution)):
+        assert pose.status is Status.CONVERGED
+        assert abs(pose.volume_change) < 1e-12
+        assert np.linalg.norm(pose.vertices[vertex] - to) < 1e-4 * d
+        assert spike(mesh, pose.vertices, vertex) < 0.1
+
+
+@pytest.mark.parametrize(("refused", "part"), [(1, 0.5), (2, 0.25), (3, 0.0)])
+def test_less_of_the_finish_of_a_pull_is_used_where_all_of_it_is_no_better(
+    refused, part, monkeypatch
+):
+    d, x = coarse().mesh.diagonal, coarse().mesh.vertices
+    local = coarse().hold(handle=[0]).local(0, 0.3 * d, 0.075 * d)
+    solution = local.solve(x[[0]] + [0.0, 0.0, 0.1 * d])
+    whole = local.finish(solution).vertices - solution.vertices
+    answers = iter([False] * refused + [True])
+    monkeypatch.setattr(Finisher, "is_better", lambda *_: next(answers))
+    finished = local.finish(solution)
+    assert abs(finished.volume_change) < 1e-12
+    moved = finished.vertices - solution.vertices
+    assert np.linalg.norm(moved - part * whole) <= 0.02 * np.linalg.norm(whole)
+
+
+def test_only_rings_that_would_bend_resist():
+    deformer, d = coarse(), coarse().mesh.diagonal
+    plain = deformer._binding.energy
+    one = deformer.hold(handle=[0]).local(0, 0.3 * d, 0.075 * d)
+    more = one._constraints.solver.energy.constant - plain.constant
+    assert more > 0.0
+    fine = deformer.hold(handle=[0]).local(0, 0.3 * d, 0.8 * d)  # more than 8 edges
+    patch = deformer.hold(handle=[0, *ring_around(deformer.mesh, 0)[:, 0]])
+    beside = deformer.hold(handle=[0], fixed=ring_around(deformer.mesh, 0)[:1, 0])
+    for other in (fine, patch.local(0, 0.3 * d, 0.075 * d), beside.local(0, 0.3 * d, 0.075 * d)):
+        assert other._constraints.solver.energy is plain
+    far = deformer.hold(handle=[0, 217]).local(0, 0.3 * d, 0.075 * d)
+    assert far._constraints.solver.energy.constant > plain.constant + 1.5 * more
+
+
+def test_a_ring_has_its_vertex_as_an_affine_mean_of_the_neighbours():
+    mesh = coarse().mesh
+    ring = Ring.around(mesh, 5, 0.1)
+    around = np.setdiff1d(mesh.adjacency[[5]].indices, [5])
+    assert ring.vertices.tolist() == [5, *around]
+    assert_allclose(ring.combinations.sum(axis=1), 0.0, atol=1e-12)
+    assert_allclose(ring.offsets[1:], mesh.vertices[5] - mesh.vertices[around], atol=1e-12)
+    normal = outward(mesh.vertices, 5, ring_around(mesh, 5))
+    assert np.linalg.norm(np.cross(ring.offsets[0], normal)) < 0.02 * ring.edge
+    assert ring.weights[0] > ring.weights[1:].sum()
+    assert Ring.around(mesh, 5, 20.0 * ring.edge) is None
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-7])

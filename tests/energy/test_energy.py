@@ -7,7 +7,7 @@ import pytest
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform.energy.energy import shape_energy, with_cage_stiffness
+from vtk_segdeform.energy.energy import shape_energy, with_cage_stiffness, with_rotating_rows
 from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import cage_subspace
 
@@ -103,4 +103,36 @@ def test_the_slope_is_half_the_gradient(stretch, n_clusters):
     for t in (2e-4, 1e-4):
         ahead, _ = energy.local_step(p + t * direction, SUBSPACE.map(p + t * direction))
         errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
+    assert 3.5 < errors[0] / errors[1] < 4.5
+
+
+def with_arms(weight=50.0):
+    """Return an energy, the same with the arms from a vertex to others, and these at rest."""
+    energy, ids = shape(10.0, 40), np.arange(30, 36)
+    rows, rest = SUBSPACE.at(ids), SCENE.mesh.vertices[ids]
+    rows, arms = rows[1:] - rows[0], rest[1:] - rest[0]
+    return energy, with_rotating_rows(energy, rows, arms, np.full(len(arms), weight)), arms
+
+
+def value_at(energy, p):
+    return energy.local_step(p, SUBSPACE.map(p))[0]
+
+
+def test_rotating_rows_resist_growth_but_no_rigid_motion():
+    plain, energy, arms = with_arms(weight=50.0)
+    turned = REST @ rotation([3, 1, 2], 0.8).T + [3.0, 2.0, 1.0]
+    assert abs(value_at(energy, turned)) < 1e-9 * energy.constant
+    for growth in (0.7, 1.4):
+        more = value_at(energy, growth * turned) - value_at(plain, growth * turned)
+        assert more == pytest.approx(50.0 * (growth - 1.0) ** 2 * (arms**2).sum(), rel=1e-6)
+
+
+def test_with_rotating_rows_the_slope_is_half_the_gradient():
+    _, energy, _ = with_arms()
+    p, direction = wobble(), wobble(1, 1.0) - REST
+    value, slope = energy.local_step(p, SUBSPACE.map(p))
+    errors = []
+    for t in (2e-4, 1e-4):
+        expected = value + 2.0 * t * np.vdot(slope, direction)
+        errors.append(abs(value_at(energy, p + t * direction) - expected))
     assert 3.5 < errors[0] / errors[1] < 4.5

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scenes import sausage
 
 from vtk_segdeform.solver.extrapolation import Way
+from vtk_segdeform.solver.gauss_newton import GaussNewton
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)  # 1026 vertices in two overlapping cages
@@ -121,3 +125,29 @@ def test_a_strong_pull_against_the_volume_neither_diverges_nor_breaks():
     solution = scene.deformer().solve(0.5 * SCENE.mesh.vertices)
     assert np.isfinite(solution.vertices).all()
     assert abs(solution.volume_change) < 1e-12
+
+
+def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
+    """Its steps are too long at any of their shares, so the paper's steps replace them."""
+    of_h, asked = GaussNewton._full_factor, []
+
+    def almost_singular(self, *args):
+        factor = of_h(self, *args)
+        asked.append(factor)
+        return replace(factor, triangle=np.asfortranarray(1e-3 * factor.triangle))
+
+    deformer = SCENE.held()
+    expected = deformer.solve(SCENE.turned(10))
+    with monkeypatch.context() as wrong:
+        wrong.setattr(GaussNewton, "_full_factor", almost_singular)
+        found = SCENE.held().solve(SCENE.turned(10), max_steps=20)
+    assert asked
+    assert found.status is Status.STEP_LIMIT
+    assert distance(found, expected) < 5e-3
+
+
+def test_the_compliance_is_how_far_points_move_under_unit_forces():
+    solver = SCENE.held()._constraints.solver
+    rows = solver.energy.subspace.at(np.array([100, 400]))
+    h, compliance = solver._hessian, solver.compliance(rows)
+    assert_allclose(compliance, rows @ np.linalg.solve(h, rows.T), rtol=1e-6)

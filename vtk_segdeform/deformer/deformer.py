@@ -44,6 +44,7 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
+from ..energy import Energy, with_rotating_rows
 from ..errors import ArgumentError, Cancelled, ConstraintError
 from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
@@ -92,7 +93,7 @@ from .arguments import (
 from .binding import BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
-from .locality import SurfaceSamples
+from .locality import Ring, SurfaceSamples
 
 _POSITION_WEIGHT = 90.0  # of a handle or fixed patch, times the scale of the shape energy
 _ANCHOR_WEIGHT = 1.0  # kappa of a local deformer, in weights of a handle; see `locality`
@@ -100,6 +101,7 @@ _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
 _PULLED = 5e-5  # largest error of pulled points in a final pose
+_SPIKE, _FAR_PULL = 0.08, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
 _LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
@@ -115,6 +117,7 @@ _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
+_PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 1.0  # weight of `locality` from which a finish moves nothing: at 1.4 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
@@ -404,7 +407,7 @@ class Deformer:
             moves.  Infinite: all of it is free.
         spread : float
             Distance along the surface, from a handle of one vertex, within which it pulls, so that
-            it makes no spike.
+            it makes no spike.  Where the mesh is too coarse for that, its neighbours rotate as one.
         follows : float
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
@@ -422,20 +425,23 @@ class Deformer:
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
         before, p = self._constraints.solver, self._p
         rows, soft, of_target = before.positions.rows.copy(), [], []
+        anchors = Anchors(weight * quadratic, p, np.zeros_like(p))
+        energy, flat = self._with_flat_rings(anchors, spread / self._frame.size)
         for number, ids in enumerate(self._constraints.handles):
-            row = self._soft_row(ids, spread / self._frame.size)
+            row = flat.get(number)
+            row = self._soft_row(ids, spread / self._frame.size) if row is None else row
             if row is not None:
                 place = int(np.searchsorted(before.positions.set_of, number))
                 rows[place] = row
                 soft.append(place)
                 of_target.append(int(ids[0]))
-        none = np.zeros_like(p)
-        positions = before.positions.local(rows, Anchors(weight * quadratic, p, none))
+        positions = before.positions.local(rows, anchors)
         places = self._constraints.places(self._targets)
         pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
         pulled.vertices = self.handle[pulled.targets]
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
-        solver = replace(before, positions=positions, volumes=self._constraints.volumes)
+        volumes = self._constraints.volumes
+        solver = replace(before, energy=energy, positions=positions, volumes=volumes)
         load = solver.unbalanced(p, pulled.moved(places))
         steady = self._samples.steadying(p, load)
         anchors = Anchors(weight * quadratic + steady, p, load)
@@ -448,6 +454,41 @@ class Deformer:
         other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
         other._begin(p, self._targets)
         return other
+
+    def _with_flat_rings(
+        self, anchors: Anchors, spread: float
+    ) -> tuple[Energy, dict[int, FloatArray]]:
+        """Return the shape energy with the rings of pulled vertices that would become spikes.
+
+        And the rows of these vertices by the number of their handle; see `locality`.  *spread* is
+        in mesh sizes.
+        """
+        energy, flat = self._binding.energy, dict[int, FloatArray]()
+        handles, held = self._constraints.handles, np.concatenate([self.fixed, self.handle])
+        single = [(k, int(self.handle[ids[0]])) for k, ids in enumerate(handles) if len(ids) == 1]
+        around = [(k, Ring.around(self._rest, vertex, spread)) for k, vertex in single]
+        rings = [
+            (k, ring)
+            for k, ring in around
+            if ring is not None and not np.isin(ring.vertices[1:], held).any()
+        ]
+        if energy.has_vertex_rotations or not rings:  # rotations of vertices act on the mesh
+            return energy, flat
+        positions = self._constraints.solver.positions
+        positions = positions.local(positions.rows, anchors)
+        without = replace(self._constraints.solver, energy=energy, positions=positions)
+        far = _FAR_PULL * self.mesh.diagonal / self._frame.size
+        most = _POSITION_WEIGHT * energy.scale
+        for number, ring in rings:
+            points = self.subspace.at(ring.vertices)
+            rows = ring.combinations @ points
+            (own, both), (_, offset) = without.compliance(np.stack([points[0], rows[0]]))
+            excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
+            if excess > 0.0:
+                strength = most * excess / max(excess, most * (offset - both * both / own))
+                energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
+                flat[number] = points[0]
+        return energy, flat
 
     def _soft_row(self, ids: IntArray, spread: float) -> FloatArray | None:
         """Return the row with which the handle of targets *ids* pulls, if it is one vertex."""
@@ -597,8 +638,9 @@ class Deformer:
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
         only the surface within the reach is finished: it stays from 1.4 times the reach on, and
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
-        volume, because hardly a vertex is free, is returned unchanged; so is a pull whose
-        surface would have more energy, or more folds.
+        volume, because hardly a vertex is free, is returned unchanged.  Of the finish of a pull
+        half is used, or a quarter, if all of it would add energy or folds; if these do as well,
+        the pose is returned unchanged.
 
         Where *solution* has no crossings there are none after it, either.
 
@@ -645,9 +687,11 @@ class Deformer:
         finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
         found = finisher.run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
-            found = replace(found, vertices=finisher.between(start, found.vertices, shares))
-            if not finisher.is_better(start, found.vertices):
+            ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)
+            better = next((x for x in ways if finisher.is_better(start, x)), None)
+            if better is None:
                 return solution
+            found = replace(found, vertices=better)
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:
@@ -669,14 +713,15 @@ class Deformer:
     def _near_pulled_vertices(self) -> FloatArray:
         """Return 1 within half the spread of pulled vertices, 0 beyond the spread, (n,) float.
 
-        Samples are coarser than the vertices, and smoothing between them would let go of the
-        neighbours of a pulled vertex, which stays.
+        And 1 at their neighbours.  Samples are coarser than the vertices, and smoothing between
+        them would move the neighbours of a pulled vertex, which stays.
         """
         x, pulled = self._rest_pose.vertices, self._constraints.pulled
         near = np.zeros(len(x))
         for each in pulled.vertices:
             away = np.linalg.norm(x - x[each], axis=1) / pulled.spread
             near = np.maximum(near, np.clip(2.0 * (1.0 - away), 0.0, 1.0))
+            near[self.mesh.adjacency[[each]].indices] = 1.0
         return near
 
     @cached_property

@@ -26,10 +26,20 @@ with the least psi that decrease with the distance from the vertex v: moving lea
 reproduce every affine motion of these samples.  `Deformer` corrects the target of x~ until the
 vertex itself is in its place.
 
-On a mesh of few vertices a far pull bends the surface within an edge or two, and then the vertex
-leaves the plane of its neighbours: a bump as high as 10 % of the diagonal and four edges wide by
-at least a fifth of an edge.  A spread of 3 edges or more does not help: on a hand of 1,200 vertices
-the worst offset falls from 0.47 to 0.43 edges, while on others the vertex misses its target.
+Where the mesh is coarse, this is not enough: pulled by 0.3 diagonals, vertices of meshes of 500 to
+2,500 vertices left the plane of their neighbours x_j by up to 1.6 edges.  There the vertex itself
+is pulled, and its ring resists.  Added to the shape energy is
+
+    min_R  w |y - R y_rest|^2 + e w mean_j |x_j - x_v - R (x_j - x_v)_rest|^2
+    y = x_v - sum_j c_j x_j,    sum_j c_j = 1,    sum_j c_j v_j = v  in their plane at rest
+
+with a rotation R for each ring (`energy.with_rotating_rows`).  The compliance H^-1 of the solver
+tells by how much y would change without it, to first order; of 57 vertices none changed by more
+than 1.1 times as much.  The weight w is such that y changes by 0.08 edges in a pull by 0.3
+diagonals.  Where y would change by less, as on all dense meshes, nothing is added.
+
+The price is distortion, because a ring is wider than a point and moves more of the surface with it:
+1.11 times as much in the finished poses of ten bodies, and up to 1.18 times on a sphere.
 """
 
 from __future__ import annotations
@@ -52,7 +62,43 @@ _STEADY = 10.0  # times the least weight of anchors under a load; still far belo
 _FEWEST = 4  # samples that determine an affine motion
 _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
+_FINE = 8.0  # edges in the spread of a pull from which its ring needs no resistance to bending
+_RIGID = 0.1  # weight of the edges of a ring together, as a share of that of y
 _FLAT = 1e-3  # of the moments: thinner patches count as flat
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """A pulled vertex and its neighbours, as differences y of points that resist all but rotation.
+
+    The first one is the offset of the vertex from its neighbours, the others are its edges.
+    """
+
+    vertices: IntArray  # (r,), the pulled one first
+    combinations: FloatArray  # (r, r): y = combinations @ x
+    offsets: FloatArray  # (r, 3), y at rest
+    weights: FloatArray  # (r,)
+    edge: float  # mean length
+
+    @classmethod
+    def around(cls, mesh: Mesh, vertex: int, spread: float) -> Ring | None:
+        """Return the ring of *vertex* of *mesh*, at rest; None if it is small against *spread*."""
+        ring = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
+        arms = mesh.vertices[ring] - mesh.vertices[vertex]
+        edge = float(np.linalg.norm(arms, axis=1).mean()) if len(ring) else 0.0
+        if len(ring) < _FEWEST - 1 or spread > _FINE * edge:
+            return None
+        plane = linalg.svd(arms - arms.mean(axis=0))[2][:2]
+        basis = np.vstack([np.ones(len(ring)), plane @ arms.T])
+        equal = np.full(len(ring), 1.0 / len(ring))
+        missing = np.array([1.0, 0.0, 0.0]) - basis @ equal
+        shares = equal + np.linalg.pinv(basis, rcond=_FLAT) @ missing
+        others = np.vstack([-shares, -np.eye(len(ring))])
+        combinations = np.hstack([np.ones((len(ring) + 1, 1)), others])
+        vertices = np.concatenate([[vertex], ring])
+        offsets = combinations @ mesh.vertices[vertices]
+        weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
+        return cls(vertices, combinations, offsets, weights, edge)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ The files, in reading order:
     hessian              the exact Hessian, local rotations included, and its factor
 """
 
-from .energy import Energy, shape_energy, with_cage_stiffness
+from .energy import Energy, shape_energy, with_cage_stiffness, with_rotating_rows
 from .hessian import Factor, full_factor, quadratic_factor
 from .operators import reduced_operators, surface_operators
 from .rotation_clusters import join_rotations
@@ -24,4 +24,5 @@ __all__ = [
     "shape_energy",
     "surface_operators",
     "with_cage_stiffness",
+    "with_rotating_rows",
 ]

@@ -306,6 +306,36 @@ def with_cage_stiffness(
     )
 
 
+def with_rotating_rows(
+    energy: Energy, rows: FloatArray, offsets: FloatArray, weights: FloatArray
+) -> Energy:
+    """Return *energy* plus min_R sum_k w_k |rows_k p - R offsets_k|^2, one rotation R for the sum.
+
+    Parameters
+    ----------
+    energy : Energy
+        With rotations of clusters.
+    rows : (k, m) float
+        Differences of points of the surface, in p.
+    offsets : (k, 3) float
+        The same at rest; of at least rank 2, so that they determine R.
+    weights : (k,) float
+        w.
+    """
+    rotation = (offsets.T * weights) @ rows
+    covariance, load = (
+        np.concatenate([np.asarray(own), rotation])
+        for own in (energy.covariance_operator, energy.load_operator)
+    )
+    return replace(
+        energy,
+        quadratic=energy.quadratic + (rows.T * weights) @ rows,
+        constant=energy.constant + float(weights @ (offsets**2).sum(axis=1)),
+        covariance_operator=covariance,
+        load_operator=covariance if energy.has_exact_gradient else load,
+    )
+
+
 def _cage_edges(energy: Energy, faces: Sequence[IntArray]) -> tuple[IntArray, IntArray]:
     """Return both ends of every cage edge among all m cage vertices, in both directions."""
     # A closed cage has each edge once in each direction.

@@ -31,7 +31,8 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
-   rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).
+   rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).  If
+   that does not help, H is almost singular, and the step (21) of the paper is taken.
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    two, if the objective is lower there.  This saves a step in five.
 6. *Further terms* (`terms`), such as a barrier against folds.  While one of them is active, its
@@ -290,6 +291,11 @@ class GaussNewton:
             if ahead is None and is_renewable:
                 state.drop_factor()
                 continue
+            if ahead is None and state.factor.coupled:  # H may be almost singular
+                step, multipliers, directions = self._step(here, self._factor)
+                ahead = self._shortened(here, step, directions, term, options)
+                if ahead is not None and ahead.merit >= here.merit - self._rounding(here):
+                    ahead = None
             if ahead is None:
                 status, remaining = Status.STALLED, 0.0
                 break
@@ -308,6 +314,15 @@ class GaussNewton:
             shape=here.shape,
             merits=tuple(merits),
         )
+
+    def compliance(self, rows: FloatArray) -> FloatArray:
+        """Return rows H^-1 rows^T, (k, k): how far points of *rows* (k, m) yield to unit forces.
+
+        H with fixed rotations.  k is at most 3.
+        """
+        forces = np.zeros((rows.shape[1], 3))
+        forces[:, : len(rows)] = rows.T
+        return np.asarray(rows @ self._factor.solve(forces)[:, : len(rows)])
 
     def unbalanced(self, p: FloatArray, targets: FloatArray) -> FloatArray:
         """Return half the gradient of the objective at *p*, (m, 3), without that of the volumes.
@@ -436,7 +451,11 @@ class GaussNewton:
         return None
 
     def _improves(self, ahead: _Iterate, here: _Iterate) -> bool:
-        return ahead.merit <= here.merit + _RISE * (self.energy.constant + abs(here.merit))
+        return ahead.merit <= here.merit + self._rounding(here)
+
+    def _rounding(self, here: _Iterate) -> float:
+        """Return the difference of merits that counts as rounding."""
+        return _RISE * (self.energy.constant + abs(here.merit))
 
     def _farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
