@@ -112,9 +112,12 @@ def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, kept: str)
     assert status(kept) == 200
 
 
-def test_the_last_editor_is_freed_when_it_has_ended(cells: Kernel) -> None:
+def test_the_last_editor_is_freed_when_it_has_ended_also_if_a_page_was_there(cells: Kernel) -> None:
     cells.run("last = sd.edit(mesh)")
     cells.wait("last.web.server.running")
+    address = cells.value("last.address").strip("'")
+    assert status(address) == 200
+    assert status(address.replace("index.html", "ws"), upgrade=True) == 101
     cells.run("session = weakref.ref(last.session); last = None")
     cells.wait("[gc.collect(), session() is None][1]")
 

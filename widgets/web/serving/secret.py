@@ -13,6 +13,7 @@ import json
 import os
 import signal
 import threading
+import weakref
 
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
@@ -66,11 +67,15 @@ def guard(secret: str) -> Middleware:
     return guarded
 
 
-def below(secret: str) -> Middleware:
-    """Return a middleware that serves everything below the path ``/SECRET/``, and 403 elsewhere.
+def below(secret: str, application: web.Application) -> web.Application:
+    """Return an application that serves another one below the path ``/SECRET/``, and 403 elsewhere.
 
     For pages in frames of other sites, to which browsers send no cookies.
+
+    aiohttp caches applications that have a middleware, with all that they refer to, even after they
+    have ended.  So this one has only a weak reference: keep the other one while it is to be served.
     """
+    inner = weakref.ref(application)
 
     @web.middleware
     async def served(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -79,7 +84,11 @@ def below(secret: str) -> Middleware:
         if not rest or not _same(given, secret):
             return web.Response(status=403, text="This page belongs to a notebook.\n")
         place = request.rel_url.with_path(f"/{rest[0]}", encoded=True, keep_query=True)
-        match = await request.app.router.resolve(request.clone(rel_url=place))
+        # Static files may have been added to this application, after it replaced the other one.
+        for each in filter(None, (inner(), request.app)):
+            match = await each.router.resolve(request.clone(rel_url=place))
+            if match.http_exception is None:
+                break
         request.match_info.update(match)
         response = await match.handler(request)
         if not response.prepared:  # the secret is in the address, which no other page may learn
@@ -87,7 +96,7 @@ def below(secret: str) -> Middleware:
             response.headers["Cache-Control"] = "no-store"
         return response
 
-    return served
+    return web.Application(middlewares=[served])
 
 
 def _same(given: str, secret: str) -> bool:
