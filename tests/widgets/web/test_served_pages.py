@@ -110,7 +110,12 @@ def test_the_program_serves_the_editor(tmp_path: Path) -> None:
             _, _, headers = await guest.get(f"/?token={token}")
             guest.path, guest.cookie = headers["Location"], headers["Set-Cookie"].split(";")[0]
             await guest.get(f"{guest.path}index.html")
-            status, text, _ = await guest.get(f"{guest.path}index.html")
+            status, text, headers = await guest.get(f"{guest.path}index.html")
+            assert headers["Content-Encoding"] in ("deflate", "gzip")
+            for only in ({"Accept-Encoding": "identity"}, {"Range": "bytes=0-"}):
+                _, plain, headers = await guest.get(f"{guest.path}index.html", **only)
+                assert "Content-Encoding" not in headers
+                assert plain == text
             return status, text
 
     with served(tmp_path) as program:

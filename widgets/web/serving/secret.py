@@ -4,6 +4,8 @@ A client process listens on 127.0.0.1, where other users of the machine can conn
 answers only requests that carry a secret, which the server writes to its standard input.  The
 server keeps that pipe open; when the server ends, however it ends, the pipe closes and the client
 process ends with it.
+
+Scripts and styles are compressed here, because only these pages may be far from their server.
 """
 
 from __future__ import annotations
@@ -14,12 +16,14 @@ import os
 import signal
 import threading
 import weakref
+from pathlib import PurePosixPath
 
-from aiohttp import web
+from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
 HEADER = "X-Segdeform-Secret"
 _INPUT, _OUTPUT = 0, 1  # file descriptors
+_COMPRESSED = frozenset({".css", ".html", ".js", ".svg", ".ttf"})  # not compressed already
 
 
 def read_secret() -> str:
@@ -62,7 +66,7 @@ def guard(secret: str) -> Middleware:
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
         if not _same(request.headers.get(HEADER, ""), secret):
             return web.Response(status=403, text="This port is internal to segdeform serve.\n")
-        return await handler(request)
+        return _compressed(request, await handler(request))
 
     return guarded
 
@@ -90,13 +94,23 @@ def below(secret: str, application: web.Application) -> web.Application:
             if match.http_exception is None:
                 break
         request.match_info.update(match)
-        response = await match.handler(request)
+        response = _compressed(request, await match.handler(request))
         if not response.prepared:  # the secret is in the address, which no other page may learn
             response.headers["Referrer-Policy"] = "no-referrer"
             response.headers["Cache-Control"] = "no-store"
         return response
 
     return web.Application(middlewares=[served])
+
+
+def _compressed(request: web.Request, response: web.StreamResponse) -> web.StreamResponse:
+    """Return *response*: a whole file of the page is compressed if the browser accepts it."""
+    if not isinstance(response, web.FileResponse) or hdrs.RANGE in request.headers:
+        return response
+    if PurePosixPath(request.path).suffix in _COMPRESSED:
+        response.headers[hdrs.VARY] = hdrs.ACCEPT_ENCODING
+        response.enable_compression()
+    return response
 
 
 def _same(given: str, secret: str) -> bool:
