@@ -15,6 +15,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -78,19 +79,17 @@ class Lab:
                  "--LabApp.check_for_updates_class=jupyterlab.NeverCheckForUpdate"],
                 env=env, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
             )  # fmt: skip
-        self.url = self._started(folder / "runtime")
+        self._runtime, self.url = folder / "runtime", ""
 
-    def _started(self, runtime: Path) -> str:
-        """Wait until the server answers, and return its address."""
+    def wait(self) -> None:
+        """Wait until the server answers."""
         deadline = time.monotonic() + 120
-        while True:
-            for file in runtime.glob("jpserver-*.json"):
-                try:
+        while not self.url:
+            for file in self._runtime.glob("jpserver-*.json"):
+                with suppress(ValueError, OSError):
                     url = json.loads(file.read_text())["url"]
                     urllib.request.urlopen(f"{url}api", timeout=20).close()
-                except (ValueError, OSError):
-                    continue
-                return str(url)
+                    self.url = url
             assert self.process.poll() is None, self.log.read_text()
             assert time.monotonic() < deadline, self.log.read_text()
             time.sleep(0.1)
@@ -102,10 +101,9 @@ class Lab:
         nbformat.write(notebook, self.folder / name)
 
     def open(self, browser: Chromium, name: str) -> Notebook:
-        """Open a notebook and wait for its kernel."""
-        page = browser.page(
-            f"{self.url}lab/workspaces/{secrets.token_hex(4)}/tree/{name}?token={self.token}"
-        )
+        """Open a notebook, alone in a workspace, and wait for its kernel."""
+        workspace = f"workspaces/{secrets.token_hex(4)}"
+        page = browser.page(f"{self.url}lab/{workspace}/tree/{name}?token={self.token}")
         page.wait(_READY, 60.0)
         return Notebook(page)
 
@@ -184,8 +182,11 @@ class Notebook:
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
     lab = Lab(tmp_path_factory.mktemp("lab"))
-    yield lab
-    lab.close()
+    try:
+        lab.wait()
+        yield lab
+    finally:
+        lab.close()
 
 
 def _errors(page: Page) -> list[str]:
