@@ -223,6 +223,23 @@ class Page:
             raise PageError(fault.get("exception", {}).get("description", fault["text"]))
         return result["result"].get("value")
 
+    def frame(self, url: str, seconds: float = 30.0) -> Page:
+        """Wait for its frame at *url*, of another site; return it for scripts, without a mouse."""
+        deadline = time.monotonic() + seconds
+        while True:
+            known = self.browser.call("Target.getTargets")["targetInfos"]
+            found = [each["targetId"] for each in known if each["url"] == url]
+            if found:
+                break
+            if time.monotonic() > deadline:
+                raise PageError(f"no frame in {seconds:g} s: {url}")
+            time.sleep(0.03)
+        session = self.browser.call("Target.attachToTarget", targetId=found[0], flatten=True)
+        frame = Page(self.browser, session["sessionId"], found[0], self.context, False)
+        for domain in ("Runtime", "Log"):
+            frame.call(f"{domain}.enable")
+        return frame
+
     def wait(self, condition: str, seconds: float = 30.0) -> Any:
         """Wait until the expression *condition* is true, and return its value."""
         deadline = time.monotonic() + seconds

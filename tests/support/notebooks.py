@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
+from urllib.request import Request, urlopen
 
 import nbformat
 from nbclient import NotebookClient
@@ -70,6 +71,12 @@ def status(address: str, *, upgrade: bool = False) -> int | None:
         return None
     finally:
         connection.close()
+
+
+def loaded(address: str, **headers: str) -> tuple[bytes, str]:
+    """Return the body that *address* answers with, as it is sent, and its encoding."""
+    with urlopen(Request(address, headers=headers), timeout=20) as answer:
+        return answer.read(), answer.headers.get("Content-Encoding", "")
 
 
 def example(change: Callable[[str], str] = str) -> list[str]:

@@ -16,6 +16,8 @@ from chromium import Chromium, Page
 
 T = TypeVar("T")
 _SHOWN = "Number(document.querySelector('canvas')?.dataset.number) > 0"
+_STEPS = "document.querySelectorAll('.sd-history .sd-row').length"
+_WORK = "!!document.querySelector('.sd-work, .sd-progress')"
 
 
 class Served:
@@ -120,3 +122,27 @@ def only_file(folder: Path, pattern: str, seconds: float = 20.0) -> Path:
         assert time.monotonic() < deadline, [*folder.iterdir()]
         time.sleep(0.05)
     return found[0]
+
+
+def pull(
+    page: Page, start: tuple[float, float], by: tuple[float, float], frame: Page | None = None
+) -> None:
+    """Pull the surface at *start*, and wait until the step is made and nothing is computed.
+
+    The editor is in the *page* itself, or in a *frame* of it.
+    """
+    frame = frame or page
+    before = frame.evaluate(_STEPS)
+    page.drag(line(start, (start[0] + by[0], start[1] + by[1]), 8), pause=0.05)
+    frame.wait(f"{_STEPS} > {before}")
+    rested(frame)
+
+
+def rested(page: Page) -> None:
+    """Wait until the page shows a picture, and nothing is computed."""
+    page.wait(_SHOWN, 120.0)
+    since = time.monotonic()
+    while time.monotonic() < since + 1.0:
+        if page.evaluate(_WORK):
+            since = time.monotonic()
+        time.sleep(0.05)

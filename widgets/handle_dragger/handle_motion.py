@@ -264,10 +264,7 @@ def _intersection(
     projection: Projection, pointer: Pointer, point: FloatArray, normal: FloatArray
 ) -> FloatArray:
     """Return the intersection (3,) of the line of sight with the plane through *point*."""
-    near, far = projection.ray(pointer)
-    parallel = projection.camera.GetParallelProjection()
-    eye = near if parallel else np.array(projection.camera.GetPosition())
-    direction = (far - near) / np.linalg.norm(far - near)
+    eye, direction = projection.line_of_sight(pointer)
     towards = np.copysign(1.0, _line_of_sight(projection, point) @ normal) * normal
     slope = float(direction @ towards)
     if slope < _LEAST_SLOPE:

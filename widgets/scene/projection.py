@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from vtkmodules.vtkRenderingCore import vtkCamera
 
 from vtk_segdeform.arrays import FloatArray
 
@@ -34,7 +35,7 @@ class Projection:
 
     def to_display(self, points: FloatArray) -> FloatArray:
         """Return (k, 3) display coordinates of (k, 3) world *points*; NaN behind the camera."""
-        projection = self._projection()
+        projection = self._projection(self.camera)
         homogeneous = points @ projection[:, :3].T
         homogeneous += projection[:, 3]
         w = homogeneous[:, 3:]
@@ -52,9 +53,13 @@ class Projection:
 
         NaN where the camera's matrix cannot be inverted.
         """
+        return self._unprojected(display, self.camera)
+
+    def _unprojected(self, display: FloatArray, camera: Any) -> FloatArray:
+        """Return (k, 3) world points of (k, 3) *display* coordinates in the picture of *camera*."""
         clip = 2.0 * (np.asarray(display) - self._origin()) / self._extent() - 1.0
         try:
-            inverse = np.linalg.inv(self._projection())
+            inverse = np.linalg.inv(self._projection(camera))
         except np.linalg.LinAlgError:  # zoomed in or out beyond floating point
             return np.full(clip.shape, np.nan)
         homogeneous = np.column_stack([clip, np.ones(len(clip))]) @ inverse.T
@@ -64,6 +69,21 @@ class Projection:
         """Return the points (3,) where the line of sight enters and leaves the view frustum."""
         ends = self.to_world(np.array([[*pointer.position, 0.0], [*pointer.position, 1.0]]))
         return ends[0], ends[1]
+
+    def line_of_sight(self, pointer: Pointer) -> tuple[FloatArray, FloatArray]:
+        """Return a point (3,) of the line of sight, and its direction, of length 1.
+
+        Unlike those of `ray` they do not depend on the clipping range, not even in the last digit.
+        VTK sets that range at every frame, and other hosts draw other frames of the same input.
+        """
+        camera = vtkCamera()
+        camera.DeepCopy(self.camera)
+        distance = camera.GetDistance()
+        camera.SetClippingRange(0.5 * distance, 1.5 * distance)
+        ends = np.array([[*pointer.position, 0.0], [*pointer.position, 1.0]])
+        near, far = self._unprojected(ends, camera)
+        eye = near if camera.GetParallelProjection() else np.array(camera.GetPosition())
+        return eye, np.asarray((far - near) / np.linalg.norm(far - near))
 
     def pixel_at(self, point: FloatArray) -> float:
         """Return the length of one pixel at a world *point* (3,), in the mesh's unit."""
@@ -96,8 +116,8 @@ class Projection:
         inside = (pointer.position - self._origin()[:2]) / self._extent()[:2]
         return bool(((inside >= 0.0) & (inside <= 1.0)).all())
 
-    def _projection(self) -> FloatArray:
-        matrix = self.camera.GetCompositeProjectionTransformMatrix(
+    def _projection(self, camera: Any) -> FloatArray:
+        matrix = camera.GetCompositeProjectionTransformMatrix(
             self.renderer.GetTiledAspectRatio(), -1, 1
         )
         return np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])

@@ -105,16 +105,10 @@ class NotebookEditor:
         """Serve the page in the running event loop; again, do nothing."""
         if self.web is None or self._stop is not None:
             return
-        from .serving import below
-
         secret, port = secrets.token_urlsafe(32), _free_port()
         self._page = f"{port}/{secret}/index.html"
-        guard, ended = below(secret), asyncio.Event()
-        self.web.server.controller.on_server_bind.add(
-            lambda bound: bound.app.middlewares.append(guard)
-        )
-        loop = asyncio.get_running_loop()
-        self._serving = loop.create_task(self.web.serve_until(ended, port=port))
+        loop, ended = asyncio.get_running_loop(), asyncio.Event()
+        self._serving = loop.create_task(self.web.serve_until(ended, port=port, secret=secret))
         self._serving.add_done_callback(_report)
         self._stop = weakref.finalize(self, _end, loop, ended)
         self._stop.atexit = False

@@ -40,6 +40,7 @@ from .page_drawing import PageDrawing, Surface, Update
 from .page_model import PageModel
 from .pictures import Picture
 from .protocol import ViewProtocol
+from .serving import below
 from .stream import Stream
 from .timers import Timers
 from .transfer import UPLOAD_LIMIT, Transfer, formats
@@ -135,6 +136,7 @@ class WebEditor:
         self._transfer = Transfer(
             self.editor, self._folder, upload_limit, names, self.model.changed
         )
+        self._secret, self._hidden = "", None  # the application behind the secret
         self._make_page()
 
     @property
@@ -154,8 +156,11 @@ class WebEditor:
         """
         asyncio.run(self.serve(port=port, ready=ready))
 
-    async def serve(self, *, port: int = 0, ready: Callable[[int], object] | None = None) -> None:
-        """Serve the page, as `start` does, in the running event loop."""
+    async def serve(
+        self, *, port: int = 0, secret: str = "", ready: Callable[[int], object] | None = None
+    ) -> None:
+        """Serve the page, as `start` does, in the running event loop; with a *secret*, below it."""
+        self._secret = secret
         own = asyncio.get_running_loop()
         if own.get_exception_handler() is None:
             own.set_exception_handler(_ignore_lost_pages)
@@ -192,12 +197,13 @@ class WebEditor:
         ended: asyncio.Event,
         *,
         port: int = 0,
+        secret: str = "",
         ready: Callable[[int], object] | None = None,
         last: Callable[[], object] | None = None,
     ) -> None:
         """Serve the page, as `serve` does, until the event *ended* is set; call *last* before."""
         loop = asyncio.get_running_loop()
-        serving = loop.create_task(self.serve(port=port, ready=ready))
+        serving = loop.create_task(self.serve(port=port, secret=secret, ready=ready))
         ending = loop.create_task(ended.wait())
         await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
         if last is not None:
@@ -246,7 +252,7 @@ class WebEditor:
             }
         )
         server.add_protocol_to_configure(self._configure)
-        server.controller.on_server_bind.add(lambda app: self._transfer.add_routes(app.app))
+        server.controller.on_server_bind.add(self._bound)
         server.controller.trigger("press")(self.model.press)
         state = server.state
         state.formats = formats()
@@ -262,6 +268,13 @@ class WebEditor:
             pass
         # When the connection is lost, the page itself says so; trame would replace it.
         state.trame__template_error = state.trame__template_main
+
+    def _bound(self, server: Any) -> None:
+        """Add the routes of files to wslink's *server*; hide it if there is a secret."""
+        self._transfer.add_routes(server.app)
+        if self._secret:
+            self._hidden = server.app
+            server.set_app(below(self._secret, server.app))
 
     def _configure(self, root: Any) -> None:
         """Add the messages of the view; remove those by which a page could end this process."""

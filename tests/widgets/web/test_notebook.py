@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import re
 from collections.abc import Iterator
 
@@ -12,7 +13,7 @@ pytest.importorskip("trame")
 pytest.importorskip("ipykernel", reason="Jupyter is missing: pip install ipykernel nbclient")
 pytest.importorskip("nbclient", reason="Jupyter is missing: pip install ipykernel nbclient")
 from chromium import Chromium, needs_chromium
-from notebooks import Kernel, example, kernel, status
+from notebooks import Kernel, example, kernel, loaded, status
 from web_hands import line
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
@@ -102,6 +103,16 @@ def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, kept
     assert status(kept.replace("127.0.0.1", "127.0.0.2")) is None  # bound to one address
 
 
+def test_the_files_of_the_page_are_compressed_for_browsers_that_accept_it(kept: str) -> None:
+    script = kept.replace("index.html", "__segdeform/surface.js")
+    plain, encoding = loaded(script)
+    assert encoding == ""
+    packed, encoding = loaded(script, **{"Accept-Encoding": "gzip"})
+    assert encoding == "gzip"
+    assert gzip.decompress(packed) == plain
+    assert len(packed) < 0.5 * len(plain)
+
+
 def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, kept: str) -> None:
     cells.run("former = sd.edit(mesh)")
     cells.wait("former.web.server.running")
@@ -114,9 +125,12 @@ def test_an_editor_ends_when_it_is_gone_and_not_before(cells: Kernel, kept: str)
     assert status(kept) == 200
 
 
-def test_the_last_editor_is_freed_when_it_has_ended(cells: Kernel) -> None:
+def test_the_last_editor_is_freed_when_it_has_ended_also_if_a_page_was_there(cells: Kernel) -> None:
     cells.run("last = sd.edit(mesh)")
     cells.wait("last.web.server.running")
+    address = cells.value("last.address").strip("'")
+    assert status(address) == 200
+    assert status(address.replace("index.html", "ws"), upgrade=True) == 101
     cells.run("session = weakref.ref(last.session); last = None")
     cells.wait("[gc.collect(), session() is None][1]")
 

@@ -21,7 +21,7 @@ pytest.importorskip("aiohttp")
 import aiohttp
 from chromium import CTRL, Chromium, Page, needs_chromium
 from visitors import Visitor
-from web_hands import line, only_file
+from web_hands import line, only_file, pull, rested
 
 from vtk_segdeform import Session, load_session, models
 from vtk_segdeform.io import write_mesh
@@ -81,20 +81,9 @@ def opened(browser: Chromium, address: str) -> Page:
     return page
 
 
-def rested(page: Page) -> None:
-    """Wait until the page shows a picture, and nothing is computed."""
-    page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0", 120.0)
-    since = time.monotonic()
-    while time.monotonic() < since + 1.0:
-        if page.evaluate("!!document.querySelector('.sd-work, .sd-progress')"):
-            since = time.monotonic()
-        time.sleep(0.05)
-
-
-def pulled(page: Page, by: tuple[float, float], *, release: bool = True) -> None:
+def pulled(page: Page, by: tuple[float, float]) -> None:
     """Pull the surface in the middle of the view."""
-    x, y = page.centre(".sd-canvas")
-    page.drag(line((x, y), (x + by[0], y + by[1]), 8), pause=0.05, release=release)
+    pull(page, page.centre(".sd-canvas"), by)
 
 
 def saved(page: Page, folder: Path) -> Session:
@@ -121,7 +110,12 @@ def test_the_program_serves_the_editor(tmp_path: Path) -> None:
             _, _, headers = await guest.get(f"/?token={token}")
             guest.path, guest.cookie = headers["Location"], headers["Set-Cookie"].split(";")[0]
             await guest.get(f"{guest.path}index.html")
-            status, text, _ = await guest.get(f"{guest.path}index.html")
+            status, text, headers = await guest.get(f"{guest.path}index.html")
+            assert headers["Content-Encoding"] in ("deflate", "gzip")
+            for only in ({"Accept-Encoding": "identity"}, {"Range": "bytes=0-"}):
+                _, plain, headers = await guest.get(f"{guest.path}index.html", **only)
+                assert "Content-Encoding" not in headers
+                assert plain == text
             return status, text
 
     with served(tmp_path) as program:
@@ -138,8 +132,6 @@ def test_two_pages_do_not_see_each_other(tmp_path: Path) -> None:
         one, other = opened(browser, program.address), opened(browser, program.address)
         pulled(one, (60.0, 10.0))
         pulled(other, (-40.0, 20.0))
-        rested(one)
-        rested(other)
         first, second = saved(one, tmp_path / "one"), saved(other, tmp_path / "other")
         for session in (first, second):
             assert moved(session, session.mesh.vertices) > 0.03
@@ -154,9 +146,9 @@ def test_a_browser_killed_in_a_drag_loses_nothing(tmp_path: Path) -> None:
         with Chromium(900, 600) as browser:
             page = opened(browser, program.address)
             pulled(page, (60.0, 10.0))
-            rested(page)
             before = saved(page, tmp_path / "before")
-            pulled(page, (-30.0, 30.0), release=False)
+            x, y = page.centre(".sd-canvas")
+            page.drag(line((x, y), (x - 30.0, y + 30.0), 8), pause=0.05, release=False)
             browser.kill()
         time.sleep(6.0)  # until it is no reload
         with Chromium(900, 600) as browser:
@@ -203,6 +195,5 @@ def test_an_upload_of_two_gigabytes_is_refused_by_name(tmp_path: Path) -> None:
         page.wait("document.body.innerText.includes('large.ply is larger than 5 MB')", 120.0)
         assert program.left_behind[2] < memory + 20e6
         pulled(page, (60.0, 10.0))  # and the page works on
-        rested(page)
         session = saved(page, tmp_path / "after")
         assert moved(session, session.mesh.vertices) > 0.03

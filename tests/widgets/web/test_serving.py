@@ -32,18 +32,21 @@ def guest(server, do):
     return guest
 
 
-def test_without_the_token_nothing_is_answered_and_no_process_is_started(server, do):
-    server, visitor = server
-    stranger = visitor()
-    token = server.access.token
-    for path in ("/", "/?token=", f"/?token={token[:-1]}", f"/?token={token}x", "/?token=%C3%A9",
-                 "/?Token=" + token, f"/?token={token}&token=x", "/s/unknown/"):  # fmt: skip
-        status, text, headers = do(stranger.get(path))
-        assert status == 403, path
-        assert "segdeform serve printed" in text
-        assert token not in text
-        assert "Set-Cookie" not in headers
-    assert server.clients.is_empty
+def test_without_the_token_nothing_is_answered_and_no_process_is_started(do, tmp_path):
+    async def story():
+        async with serving(tmp_path) as (server, visitor):
+            stranger, token = visitor(), server.access.token
+            for path in ("/", "/?token=", f"/?token={token[:-1]}", f"/?token={token}x",
+                         "/?token=%C3%A9", "/?Token=" + token, f"/?token={token}&token=x",
+                         "/s/unknown/"):  # fmt: skip
+                status, text, headers = await stranger.get(path)
+                assert status == 403, path
+                assert "segdeform serve printed" in text
+                assert token not in text
+                assert "Set-Cookie" not in headers
+            assert server.clients.is_empty
+
+    do(story())
 
 
 def test_a_token_for_a_command_line_works_once(server, do):

@@ -27,6 +27,7 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.usefixtures("bound_once"),
 ]
+LIMIT = 4 * 10**6  # bytes of an upload: more than the session of any mesh here
 SIZE = 1010, 480  # the side panel is beside the view from 1001 on
 
 
@@ -38,7 +39,7 @@ def cactus() -> Mesh:
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory, cactus: Mesh) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("server")
-    with Served(cactus, name="cactus.ply", folder=folder, upload_limit=10**6) as served:
+    with Served(cactus, name="cactus.ply", folder=folder, upload_limit=LIMIT) as served:
         yield served
 
 
@@ -70,11 +71,21 @@ def page(served: Served, loaded: Page) -> Page:
     return loaded
 
 
+def _seen(served: Served, lowest: float, highest: float) -> Any:
+    """Return the vertex nearest to the camera, of those between two quantiles of height in view.
+
+    It is not hidden: what hides it is in front of it, at the same height.
+    """
+    view, vertices = served.web.editor.view, served.web.session.vertices
+    shown = served.call(lambda: view.to_display(vertices))
+    low, high = np.quantile(shown[:, 1], [lowest, highest])
+    among = (shown[:, 1] >= low) & (shown[:, 1] <= high)
+    return vertices[among][np.argmin(shown[among, 2])]
+
+
 def _top(served: Served) -> Any:
     """Return a vertex on the upper side that the camera sees."""
-    vertices = served.web.session.vertices
-    near = vertices[:, 2] > np.quantile(vertices[:, 2], 0.9)
-    return vertices[near][np.argmin(vertices[near][:, 1])]
+    return _seen(served, 0.9, 1.0)
 
 
 def _upload(served: Served, page: Page, file: Path) -> None:
@@ -107,17 +118,15 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
     assert len(changes) > 2
 
     page.key("g")
-    served.wait(lambda: "regions found" in editor.status and served.is_at_rest)
+    served.wait(lambda: " found" in editor.status and served.is_at_rest)
     page.key("f")
-    served.wait(lambda: "cages fitted" in editor.status and served.is_at_rest)
+    served.wait(lambda: " fitted" in editor.status and served.is_at_rest)
     page.wait("document.querySelector('.sd-history .selected').textContent == 'Fit cages'")
     page.key("2")
     served.wait(lambda: editor.mode is Mode.CAGES)
     page.key("3")
     served.wait(lambda: editor.mode is Mode.HANDLES)
-    vertices = session.vertices
-    low = vertices[vertices[:, 2] < np.quantile(vertices[:, 2], 0.15)]
-    start = served.seen(page, low[np.argmin(low[:, 1])])
+    start = served.seen(page, _seen(served, 0.0, 0.15))
     page.drag(line(start, (start[0] + 4, start[1] - 4), 4), pause=0.02)
     served.wait(lambda: len(session.fixed) > 0)
     page.key("d")
@@ -290,7 +299,7 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
 
 
 def _status(url: str, method: str, *, header: bool) -> int:
-    body = bytes(10**6 + 1) if method == "POST" else None
+    body = bytes(LIMIT + 1) if method == "POST" else None
     headers = {"X-Segdeform": "yes"} if header else {}
     request = urllib.request.Request(url, body, headers, method=method)
     try:

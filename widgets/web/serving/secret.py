@@ -4,6 +4,8 @@ A client process listens on 127.0.0.1, where other users of the machine can conn
 answers only requests that carry a secret, which the server writes to its standard input.  The
 server keeps that pipe open; when the server ends, however it ends, the pipe closes and the client
 process ends with it.
+
+Scripts and styles are compressed here, because only these pages may be far from their server.
 """
 
 from __future__ import annotations
@@ -13,12 +15,15 @@ import json
 import os
 import signal
 import threading
+import weakref
+from pathlib import PurePosixPath
 
-from aiohttp import web
+from aiohttp import hdrs, web
 from aiohttp.typedefs import Handler, Middleware
 
 HEADER = "X-Segdeform-Secret"
 _INPUT, _OUTPUT = 0, 1  # file descriptors
+_COMPRESSED = frozenset({".css", ".html", ".js", ".svg", ".ttf"})  # not compressed already
 
 
 def read_secret() -> str:
@@ -61,16 +66,20 @@ def guard(secret: str) -> Middleware:
     async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
         if not _same(request.headers.get(HEADER, ""), secret):
             return web.Response(status=403, text="This port is internal to segdeform serve.\n")
-        return await handler(request)
+        return _compressed(request, await handler(request))
 
     return guarded
 
 
-def below(secret: str) -> Middleware:
-    """Return a middleware that serves everything below the path ``/SECRET/``, and 403 elsewhere.
+def below(secret: str, application: web.Application) -> web.Application:
+    """Return an application that serves another one below the path ``/SECRET/``, and 403 elsewhere.
 
     For pages in frames of other sites, to which browsers send no cookies.
+
+    aiohttp caches applications that have a middleware, with all that they refer to, even after they
+    have ended.  So this one has only a weak reference: keep the other one while it is to be served.
     """
+    inner = weakref.ref(application)
 
     @web.middleware
     async def served(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -79,15 +88,29 @@ def below(secret: str) -> Middleware:
         if not rest or not _same(given, secret):
             return web.Response(status=403, text="This page belongs to a notebook.\n")
         place = request.rel_url.with_path(f"/{rest[0]}", encoded=True, keep_query=True)
-        match = await request.app.router.resolve(request.clone(rel_url=place))
+        # Static files may have been added to this application, after it replaced the other one.
+        for each in filter(None, (inner(), request.app)):
+            match = await each.router.resolve(request.clone(rel_url=place))
+            if match.http_exception is None:
+                break
         request.match_info.update(match)
-        response = await match.handler(request)
+        response = _compressed(request, await match.handler(request))
         if not response.prepared:  # the secret is in the address, which no other page may learn
             response.headers["Referrer-Policy"] = "no-referrer"
             response.headers["Cache-Control"] = "no-store"
         return response
 
-    return served
+    return web.Application(middlewares=[served])
+
+
+def _compressed(request: web.Request, response: web.StreamResponse) -> web.StreamResponse:
+    """Return *response*: a whole file of the page is compressed if the browser accepts it."""
+    if not isinstance(response, web.FileResponse) or hdrs.RANGE in request.headers:
+        return response
+    if PurePosixPath(request.path).suffix in _COMPRESSED:
+        response.headers[hdrs.VARY] = hdrs.ACCEPT_ENCODING
+        response.enable_compression()
+    return response
 
 
 def _same(given: str, secret: str) -> bool:
