@@ -15,7 +15,7 @@ Long because the caches above depend on each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
 
@@ -48,8 +48,32 @@ _CONSTRAINT_OPTIONS = (
     "avoid_contact",
 )  # changed by `Deformer.hold`
 _TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
+_LIVE_TURNS = 12  # the same of live solves for the same targets
 _MAX_TURNED = 3  # rotations in memory: of the finished pose, the last one and the next
 _NO_TARGETS = np.empty((0, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class _Aim:
+    """Where the cages of a finished pose are to bring its handles.
+
+    The shift of a handle turns with the surface around it, which turns with where the handle is
+    brought: solving for one after the other need not converge, and can alternate between three
+    poses for ever.  So after a few solves the mean over them is used (Mann 1953), and then it stays.
+    """
+
+    wanted: FloatArray  # (k, 3), the targets
+    shift: FloatArray  # (k, 3), by which the places of the cages are less
+    turns: int = 1
+
+    def turned(self, wanted: FloatArray, shift: FloatArray) -> _Aim:
+        """Return the next one, for the targets *wanted* and the *shift* of the last pose."""
+        if not np.array_equal(wanted, self.wanted):
+            return _Aim(wanted, shift)
+        if self.turns >= _LIVE_TURNS:
+            return self
+        share = 1.0 / max(1, self.turns - _TURNS + 2)
+        return _Aim(wanted, self.shift + share * (shift - self.shift), self.turns + 1)
 
 
 class PoseSolver:
@@ -67,6 +91,7 @@ class PoseSolver:
         self._constrained: tuple[Deformer, State, FloatArray | None, Deformer] | None = None
         self._local: tuple[Deformer, Locality, Deformer] | None = None
         self._current: Pose | None = None  # pose of the deformer in use; None if unknown
+        self._aim: _Aim | None = None  # of the current pose, if it is where it was to be
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
@@ -167,10 +192,15 @@ class PoseSolver:
         before, shift = state.pose, self._shift(state)
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
-        self._current = None  # in case the solve fails
+        aim, self._current, self._aim = self._aim, None, None  # in case the solve fails
         wanted = _stacked(targets)
         for _ in range(_TURNS if shift is not None and max_steps is None else 1):
-            places = _less(wanted, shift, deformer.handle)
+            if shift is None:
+                aim, places = None, wanted
+            else:
+                own = shift[deformer.handle]
+                aim = _Aim(wanted, own) if aim is None else aim.turned(wanted, own)
+                places = wanted - aim.shift
             solution = deformer.solve(places, max_steps=max_steps, within=within)
             if not np.isfinite(solution.vertices).all():
                 raise ConstraintError("no finite pose for these targets; move the handles less")
@@ -189,11 +219,13 @@ class PoseSolver:
                 break
         pose = Pose(cages, targets, finished)
         self._current = pose
+        if solution.targets is None:
+            self._aim = aim
         x, change = self._evaluate(state, pose)
         solution = replace(solution, vertices=x, volume=change)
-        if shift is None:
+        if aim is None:
             return pose, solution
-        reached = None if solution.targets is None else solution.targets + shift[deformer.handle]
+        reached = None if solution.targets is None else solution.targets + aim.shift
         ids = deformer.handle, deformer.fixed
         errors = partial(
             errors_at, ids, (wanted, _fixed_at(self._mesh, state)), self._mesh.diagonal
@@ -355,7 +387,7 @@ class PoseSolver:
         pose = state.pose
         if pose is not None and self._current is pose and self._used is deformer:
             return
-        self._used = deformer
+        self._used, self._aim = deformer, None
         deformer.reset()
         # Every step of the solver meets the constraints, so its starting pose must do so too.
         if pose is not None and self._meets_constraints(state, pose, deformer):
