@@ -17,6 +17,7 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, SessionE
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session import pose_solver
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import checked_state
 from vtk_segdeform.session.store import load_session, save_session
@@ -281,6 +282,17 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     assert_array_equal(session.vertices, poses[2])
     session.undo()
     assert_array_equal(session.vertices, poses[1])
+
+
+@pytest.mark.parametrize(("growth", "left"), [(-0.3, 0.01), (-1.0, 0.01), (-1.5, 0.1)])
+def test_offsets_that_turn_with_their_pose_come_to_rest(growth, left):
+    wanted, shift = np.zeros((1, 3)), np.ones((1, 3))
+    aim = pose_solver._Aim(wanted, shift)
+    for _ in range(20):
+        before, aim = aim, aim.turned(wanted, growth * aim.shift)
+    assert aim is before
+    assert np.abs(aim.shift).max() < left
+    assert aim.turned(wanted + 1.0, shift).shift is shift
 
 
 def test_a_finished_pose_that_does_not_fit_is_refused():

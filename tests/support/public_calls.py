@@ -58,6 +58,7 @@ NOT_CALLED |= {
     "contains",
     "guarded",
     "lifted",
+    "line_of_sight",
     "pixel_at",
     "pointer",
     "ray",

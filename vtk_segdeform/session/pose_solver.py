@@ -59,7 +59,7 @@ class _Aim:
 
     The shift of a handle turns with the surface around it, which turns with where the handle is
     brought: solving for one after the other need not converge, and can alternate between three
-    poses for ever.  So after a few solves the mean over them is used (Mann 1953), and then it stays.
+    poses for ever.  So after a few solves their mean is used (Mann 1953), and then it stays.
     """
 
     wanted: FloatArray  # (k, 3), the targets
