@@ -397,9 +397,10 @@ def effort(mesh):
 
 
 def test_the_search_grows_no_faster_than_sorting():
-    find_faults(*torus())  # whatever happens only once
-    calls, memory = effort(torus(100, 50))
-    more_calls, more_memory = effort(torus(200, 100))
+    small, large = torus(100, 50), torus(200, 100)
+    find_faults(*large)  # whatever happens only once, such as loading a kernel
+    calls, memory = effort(small)
+    more_calls, more_memory = effort(large)
     # Four times the vertices: a comparison of all pairs needs sixteen times the memory, or, in
     # pieces, four times the calls.  Times would depend on the load of the machine.
     assert more_calls < 2 * calls
