@@ -52,6 +52,7 @@ LEAVES = {
     "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"]
 }  # the others' pictures: `make docs`
 WHOLE = {"bend_the_cactus"}  # the README's runs as it is; the others do so in the campaign
+LONG = {"film_a_drag"}  # films are tested in widgets/recording
 FEW = {"cactus": 600, "dinosaur": 1000}  # vertices
 DRAW = {"carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
 ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
@@ -62,7 +63,10 @@ def test_every_example_has_a_number_to_hold():
 
 
 @pytest.mark.parametrize("whole", [False, pytest.param(True, marks=pytest.mark.campaign)])
-@pytest.mark.parametrize("name", RIGHT)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.campaign] if n in LONG else []) for n in RIGHT],
+)
 @pytest.mark.usefixtures("cached_models")
 def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_path):
     folder = tmp_path / "some" / "where"  # which it makes
