@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import (
     bottle,
@@ -109,7 +110,7 @@ BODIES, SHEETS = (
 )
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", every(3, BODIES))
 def test_a_body_encloses_a_volume(name):
     mesh = BODIES[name]()
     print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")

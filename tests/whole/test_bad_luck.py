@@ -99,8 +99,7 @@ def require_kept_on_a_full_disk(folder, suffix):
     "suffix",
     [
         *SUFFIXES,
-        *FOREIGN[:1],
-        *(pytest.param(each, marks=pytest.mark.campaign) for each in FOREIGN[1:]),
+        *(pytest.param(each, marks=pytest.mark.campaign) for each in FOREIGN),
     ],
 )
 def test_on_a_full_disk_a_mesh_file_is_unchanged_and_the_error_names_it(tmp_path, suffix, capfd):
@@ -111,6 +110,7 @@ def test_on_a_full_disk_a_mesh_file_is_unchanged_and_the_error_names_it(tmp_path
 
 
 @posix
+@pytest.mark.campaign
 def test_on_a_full_disk_a_vtkhdf_file_is_unchanged(tmp_path):
     call = "import pathlib, sys, test_bad_luck as t; "  # HDF5 prints again at exit
     call += "t.require_kept_on_a_full_disk(pathlib.Path(sys.argv[1]), '.vtkhdf')"
