@@ -72,6 +72,7 @@ def test_the_example_keeps_the_volume_and_shows_the_page(cells: Kernel) -> None:
     cells.run("editor.close()")
 
 
+@pytest.mark.campaign  # as in JupyterLab, see test_jupyterlab
 @needs_chromium
 def test_a_pull_in_the_page_is_there_in_the_next_cell(
     cells: Kernel, kept: str, browser: Chromium
