@@ -23,7 +23,8 @@ _WORK = "!!document.querySelector('.sd-work, .sd-progress')"
 class Served:
     """The editor of *mesh*, served until the end of the ``with`` block.
 
-    VTK's window belongs to the thread that serves it: use `call` for all but reading.
+    VTK's window belongs to the thread that serves it: use `call` for all but reading.  Meanwhile
+    no thread searches for garbage, since it would free windows of the other one.
     """
 
     def __init__(self, mesh: Any, **keywords: Any) -> None:
@@ -33,13 +34,18 @@ class Served:
         self.folder: Path = keywords.get("folder", Path())
 
     def __enter__(self) -> Served:
+        gc.collect()
+        gc.disable()
         self._thread.start()
         self.port = self._started.result(60)
         return self
 
     def __exit__(self, *_: object) -> None:
-        asyncio.run_coroutine_threadsafe(self.web.server.stop(), self.loop).result(20)
-        self._thread.join(20)
+        try:
+            asyncio.run_coroutine_threadsafe(self.web.server.stop(), self.loop).result(20)
+            self._thread.join(20)
+        finally:
+            gc.enable()
         assert not self._thread.is_alive()
 
     @property
