@@ -21,6 +21,7 @@ from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import Finisher
 from vtk_segdeform.io.surface import Surface
+from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
 from vtk_segdeform.solver.solution import Status
@@ -306,3 +307,11 @@ def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monk
 def test_arguments_of_a_local_deformer_are_checked(changes, says):
     with pytest.raises(ConstraintError, match=says):
         held().local(**{"vertex": HIGH, "reach": 1.0, "spread": 0.5, **changes})
+
+
+def test_a_pull_that_needs_every_correction_has_converged():
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    solution = pull(tetrahedron, 3, [0.0, 0.0, 1.3])
+    assert solution.status is Status.CONVERGED
+    assert solution.handle_error < 1e-4

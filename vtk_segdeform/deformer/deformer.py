@@ -775,15 +775,16 @@ class Deformer:
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
         error = pulled.error = pulled.error if is_same else np.inf
-        for _ in range(_CORRECTIONS if max_steps is None else 1):
-            is_drag = max_steps is not None and not is_same
+        is_live = max_steps is not None
+        for k in range(1 if is_live else _CORRECTIONS + 1):
+            is_drag = is_live and not is_same
             result, x, more = self._solve_once(goal, options, is_drag)
             steps += more
             off = self._off(goal, x)
             before, error = error, _largest(off)
             if result.status is Status.STEP_LIMIT or error <= _PULLED:
                 break
-            if error > _GAIN * before:
+            if error > _GAIN * before or k == _CORRECTIONS:
                 break
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)

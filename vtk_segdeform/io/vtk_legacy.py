@@ -105,6 +105,7 @@ class _File:
             self._begins = np.append(np.flatnonzero(is_word), len(data))
 
     def read(self) -> pv.PolyData | pv.UnstructuredGrid:
+        """Return the dataset; raise if anything in the file is not as expected."""
         demand(self._word().lower() == "dataset")
         sort = self._word().lower()
         demand(sort in ("polydata", "unstructured_grid"))
