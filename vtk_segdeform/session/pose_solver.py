@@ -55,19 +55,19 @@ _NO_TARGETS = np.empty((0, 3))
 
 @dataclass(frozen=True, eq=False)
 class _Aim:
-    """Where the cages of a finished pose are to bring its handles.
+    """The targets of handles in a finished pose, and the shift that the cages must leave out.
 
-    The shift of a handle turns with the surface around it, which turns with where the handle is
-    brought: solving for one after the other need not converge, and can alternate between three
-    poses for ever.  So after a few solves their mean is used (Mann 1953), and then it stays.
+    The shift of a handle rotates with the surface around it, and this rotation depends on the
+    shift: repeated solves need not converge, and can alternate between three poses for ever.  So
+    after a few solves the mean of their shifts is used (Mann 1953), and finally kept.
     """
 
     wanted: FloatArray  # (k, 3), the targets
-    shift: FloatArray  # (k, 3), by which the places of the cages are less
+    shift: FloatArray  # (k, 3), subtracted from the targets of the cages
     turns: int = 1
 
     def turned(self, wanted: FloatArray, shift: FloatArray) -> _Aim:
-        """Return the next one, for the targets *wanted* and the *shift* of the last pose."""
+        """Return the aim of the next solve, with the *shift* that the last pose has."""
         if not np.array_equal(wanted, self.wanted):
             return _Aim(wanted, shift)
         if self.turns >= _LIVE_TURNS:
@@ -91,7 +91,7 @@ class PoseSolver:
         self._constrained: tuple[Deformer, State, FloatArray | None, Deformer] | None = None
         self._local: tuple[Deformer, Locality, Deformer] | None = None
         self._current: Pose | None = None  # pose of the deformer in use; None if unknown
-        self._aim: _Aim | None = None  # of the current pose, if it is where it was to be
+        self._aim: _Aim | None = None  # of the current pose, if that has reached its targets
         self._used: Deformer | None = None
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
