@@ -23,6 +23,7 @@ from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
 from vtk_segdeform.errors import Cancelled, MeshError
 from vtk_segdeform.geometry.lids import lids_of
+from vtk_segdeform.geometry.local_volume import LocalVolume
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
@@ -172,6 +173,18 @@ def test_volumes_agree(twin, far):
     ):
         quick, plain = twin(call)
         assert_allclose(quick, plain, rtol=1e-12, atol=(1e-14 + 1e-15 * far) * size)
+
+
+@pytest.mark.parametrize("far", [0.0, 1e3])
+def test_local_volumes_and_their_slopes_agree(twin, far):
+    local = LocalVolume(MESH.with_vertices(MESH.vertices + far))
+    x, weights = MESH.vertices + 0.01 * MOVE + far, RNG.normal(size=MESH.n_vertices)
+    for call in (
+        lambda: local.change_with_slope(x)[0],
+        lambda: local.change_with_slope(x)[1](weights),
+    ):
+        quick, plain = twin(call)
+        assert_allclose(quick, plain, rtol=1e-9, atol=(1e-12 + 1e-12 * far) * abs(plain).max())
 
 
 def finned() -> Mesh:

@@ -16,7 +16,7 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages
-from ..deformer import Deformer
+from ..deformer import Deformer, finished
 from ..errors import MissingDependencyError
 from ..geometry import local_volume_change
 from ..mesh import Mesh
@@ -97,8 +97,15 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     )  # fmt: skip
     say(f"set-up          {time.perf_counter() - start:.1f} s")
     start = time.perf_counter()
-    solution = deformer.solve(pose.targets)
-    report_solution(solution, time.perf_counter() - start, say)
+    solved = deformer.solve(pose.targets)
+    report_solution(solved, time.perf_counter() - start, say)
+    start = time.perf_counter()
+    solution = finished(deformer, solved, None, progress=part(progress, 0.7, 0.8))
+    steps, seconds = solution.steps - solved.steps, time.perf_counter() - start
+    say(
+        f"finish          {steps} steps on the mesh, {1e3 * seconds:.0f} ms, "
+        f"handle error {100 * solution.handle_error:.3f} %, volume {solution.volume_change:+.1e}"
+    )
     change = local_volume_change(mesh, solution.vertices)
     usual = math.ceil(100 * np.percentile(np.abs(change), 99.0))  # as in the legend of the picture
     say(

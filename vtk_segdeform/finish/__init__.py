@@ -3,6 +3,7 @@
 The files, in reading order:
 
     cell_energy    the stretch energy over all vertices, and the rotations that it is fitted to
+    volume_band    how far the body may be compressed and expanded
     folds          triangles that a pose turned over
     unfolding      opens them where they are
     finisher       the iteration: fixed vertices, handles and volumes exact

@@ -15,7 +15,8 @@ quadratic part is the Laplacian, whatever t,
 
     E(x) = min_R  tr(x^T C x) - 2 sum_i tr(R_i S_i) + tr(X^T C X),     S = P K x,     X at rest
 
-The bi-Laplacian of the detail (5), whose factor takes ten times as long, is not needed.
+The bi-Laplacian of the detail (5), whose factor takes ten times as long, is not needed.  To E the
+band of local volumes is added (`volume_band`).
 
 Source
 ------
@@ -41,16 +42,18 @@ from ..geometry import (
     cotangent_laplacian,
 )
 from ..mesh import Mesh
+from .volume_band import VolumeBand
 
 
 @dataclass(frozen=True, eq=False)
 class CellEnergy:
-    """E(x) of a mesh; made by `CellEnergy.of`."""
+    """E(x) of a mesh, with its band; made by `CellEnergy.of`."""
 
     laplacian: sparse.csr_array  # C, (n, n)
     fans: sparse.csr_array  # K, (3n, n): S_i of c_0, the first rows of all i, then the second ...
     neighbours: sparse.csr_array  # (n, n): P for t = 1
     constant: float
+    band: VolumeBand
 
     @classmethod
     def of(cls, mesh: Mesh) -> CellEnergy:
@@ -68,12 +71,13 @@ class CellEnergy:
         laplacian = cotangent_laplacian(faces, surface.cotangents, n)
         relative = mesh.vertices - mesh.vertices.mean(axis=0)
         constant = float(np.vdot(relative, laplacian @ relative))
-        return cls(laplacian, sparse.vstack(fans).tocsr(), _neighbours(mesh), constant)
+        stacked = sparse.vstack(fans).tocsr()
+        return cls(laplacian, stacked, _neighbours(mesh), constant, VolumeBand.of(mesh))
 
     def value_and_slope(
         self, x: FloatArray, shares: Sequence[FloatArray]
     ) -> tuple[float, FloatArray]:
-        """Return E at *x* (n, 3), and half its gradient (n, 3).
+        """Return E + V at *x* (n, 3), and half its gradient (n, 3).
 
         *shares* has t (n, 1) of each round in which the cells grow by their neighbours.
         """
@@ -88,7 +92,8 @@ class CellEnergy:
         for share in reversed(shares):
             turned = turned + share * (self.neighbours.T @ turned - turned)
         load = self.fans.T @ np.swapaxes(turned.reshape(n, 3, 3), 0, 1).reshape(3 * n, 3)
-        return float(value), product - load
+        beyond, slope = self.band.value_and_slope(x)
+        return float(value) + beyond, product - load + slope
 
 
 def _neighbours(mesh: Mesh) -> sparse.csr_array:

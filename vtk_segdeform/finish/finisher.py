@@ -51,7 +51,7 @@ from .unfolding import unfolded
 # times, and 1.31, 1.27, 1.22 times.
 SHARE = 0.05
 _LARGE = 3  # rounds of t = 1 of the first cells
-_FIRST, _LAST = 10, 12  # steps, at most
+_FIRST, _LAST = 10, 16  # steps, at most
 _NEAR, _TOLERANCE = 1e-4, 1e-5  # root mean square of a step, in mesh sizes, after which they end
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
@@ -167,7 +167,7 @@ class Finisher:
                 break
             stays[self._mesh.faces[crossing]] = True
             stays = self._with_neighbours(stays)
-            held, own = self._held | stays, part(progress, turn / 3.0, (turn + 1) / 3.0)
+            held, own = self._held | stays, part(progress, 0.3 * turn, 0.3 * (turn + 1))
             places = begin[held] + share * (end[held] - begin[held])
             places[self._held[held]] = end[self._held]
             problem = Finisher(self._mesh, self._energy, held, self._constraints, own)
@@ -178,6 +178,9 @@ class Finisher:
                 best, least = found, crossing
         if len(least) and not len(before):
             return Finish(begin, (), steps)
+        opened = self._without_folds(best.vertices, part(progress, 0.9, 1.0))
+        if len(self._grown(opened, before)) <= len(least):
+            best = replace(best, vertices=opened)
         return replace(best, steps=steps)
 
     def _grown(self, x: FloatArray, before: IntArray) -> IntArray:

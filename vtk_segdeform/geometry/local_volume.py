@@ -25,14 +25,16 @@ neighbors and the normal field", The Visual Computer 28, 2012 (shrinking balls).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
 from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..kernels import in_parallel
-from ..mesh import Mesh, require_mesh
+from ..kernels import compiled_kernels, in_parallel, inputs
+from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
 from .volume import corner_and_edges, volume_gradient
@@ -54,8 +56,15 @@ class LocalVolume:
     mesh : Mesh
         The rest shape, n vertices.  For a large mesh the change is computed at the means of some
         thousand cells of neighbouring vertices and interpolated to the vertices.
+
+    Attributes
+    ----------
+    areas : (k,) float
+        Of the surface around the k places of `change_with_slope`, at rest; 0 at places with almost
+        no volume.
     """
 
+    areas: FloatArray
     _means: sparse.csr_array | None
     _interpolation: list[sparse.csr_array]
 
@@ -66,16 +75,17 @@ class LocalVolume:
         self._inside: IntArray | None = None
         if not encloses.all():
             mesh, self._inside = _part(mesh, encloses[mesh.components])
-        self._means, self._interpolation = None, []
+        self._means, self._interpolation, self.areas = None, [], np.zeros(0)
         if not encloses.any():
             return
-        points, faces = mesh.vertices, mesh.faces
+        points, faces, areas = mesh.vertices, mesh.faces, mesh.vertex_areas
         if mesh.n_vertices > sizes.LOCAL_VOLUME_CELLS:
             _, cells = voronoi_cells(mesh, sizes.LOCAL_VOLUME_POINTS, np.random.default_rng(0))
             between = faces_between(cells, faces)
             if len(between):  # none is left if every component is smaller than a cell
                 self._means, faces = _means(cells), between
                 points = self._means @ points
+                areas = np.asarray(np.bincount(cells, areas), dtype=float)
                 self._interpolation = _interpolation(
                     mesh.vertices, cells, points, _edges(faces, len(points))
                 )
@@ -83,6 +93,7 @@ class LocalVolume:
         self._rest = self._volumes.smoothed(points)
         floor = _LEAST * np.abs(self._rest).mean()
         self._reliable = self._rest > floor
+        self.areas = np.where(self._reliable, areas, 0.0)
 
     @property
     def is_defined(self) -> bool:
@@ -103,9 +114,46 @@ class LocalVolume:
             out[self._inside] = self._change(x[self._inside])
         return out
 
+    def change_with_slope(
+        self, vertices: FloatArray
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        """Return s at k places on the surface, and the gradient of sums of it as a function.
+
+        The places are the vertices, or the means of their cells.  The function takes weights (k,)
+        and returns sum_i w_i ds_i/dx, (n, 3).
+        """
+        if self._inside is None:
+            return self._change_with_slope(vertices)
+        inside = self._inside
+        s, slope = self._change_with_slope(vertices[inside])
+
+        def spread(weights: FloatArray) -> FloatArray:
+            out = np.zeros_like(vertices)
+            out[inside] = slope(weights)
+            return out
+
+        return s, spread
+
+    def _change_with_slope(
+        self, x: FloatArray
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        points = x if self._means is None else self._means @ x
+
+        def slope(weights: FloatArray) -> FloatArray:
+            scaled = np.divide(
+                weights, self._rest, where=self._reliable, out=np.zeros_like(weights)
+            )
+            result = self._volumes.slope(points, scaled)
+            return result if self._means is None else self._means.T @ result
+
+        return self._relative(points), slope
+
+    def _relative(self, points: FloatArray) -> FloatArray:
+        now = self._volumes.smoothed(points)
+        return np.divide(now - self._rest, self._rest, where=self._reliable, out=np.zeros(len(now)))
+
     def _change(self, x: FloatArray) -> FloatArray:
-        now = self._volumes.smoothed(x if self._means is None else self._means @ x)
-        s = np.divide(now - self._rest, self._rest, where=self._reliable, out=np.zeros(len(now)))
+        s = self._relative(x if self._means is None else self._means @ x)
         if self._means is None:
             return s
         out = np.empty(len(x))
@@ -137,16 +185,48 @@ class _Volumes:
 
     def smoothed(self, x: FloatArray) -> FloatArray:
         """Return sum_j k_ij L_j(x), (k,)."""
-        x = x - x.mean(axis=0)
-        a, e, f = corner_and_edges(x, self._faces)
-        normals = np.cross(e, f)
-        heights = np.einsum("ij,ij->i", a, normals)
-        sums = self._around @ np.column_stack([normals, heights])  # over the faces at each vertex
-        apex = x[self._opposite]
-        volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
+        if kernels := compiled_kernels(len(self._faces)):
+            volumes = np.zeros(len(x))
+            kernels.opposite_volumes(*inputs(x, self._faces, self._opposite), volumes)
+        else:
+            x = x - x.mean(axis=0)
+            a, e, f = corner_and_edges(x, self._faces)
+            normals = cross_rows(e, f)
+            heights = np.einsum("ij,ij->i", a, normals)
+            sums = self._around @ np.column_stack([normals, heights])  # over the faces at a vertex
+            apex = x[self._opposite]
+            volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
         for _ in range(self._rounds):
             volumes = np.asarray(self._average @ volumes)
         return np.asarray(volumes)
+
+    def slope(self, x: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return sum_ij w_i k_ij dL_j/dx, (k, 3), for *weights* (k,).
+
+        With u = k^T w, e = x_b - x_a, f = x_c - x_a and P = sum of u_v (x_a - x_o(v)) over the
+        corners v of T, the sum of u_j L_j over j is one of P . (e x f) / 18 over the triangles.
+        """
+        for _ in range(self._rounds):
+            weights = np.asarray(self._average.T @ weights)
+        share, faces = weights / 18.0, self._faces
+        if kernels := compiled_kernels(len(faces)):
+            kernels.opposite_slope(
+                *inputs(x, faces, self._opposite, share), summed := np.zeros_like(x)
+            )
+            return summed
+        a, e, f = corner_and_edges(x - x.mean(axis=0), faces)
+        total = share[faces].sum(axis=1)[:, None]
+        normals = cross_rows(e, f)
+        apexes = (share[:, None] * (x - x.mean(axis=0))[self._opposite])[faces].sum(axis=1)
+        p = total * a - apexes
+        at_b, at_c = cross_rows(f, p), cross_rows(p, e)
+        at_o = -share[:, None] * (self._around @ normals)
+        result = np.empty_like(x)
+        places = np.concatenate([*faces.T, self._opposite])
+        values = np.concatenate([total * normals - at_b - at_c, at_b, at_c, at_o])
+        for axis in range(3):
+            result[:, axis] = np.bincount(places, values[:, axis], minlength=len(x))
+        return result
 
 
 def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`,
-                    `barrier.Barrier`
+                    `barrier.Barrier`, `local_volume.LocalVolume`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -60,7 +60,14 @@ from .triangles import (
     shell_sums,
     wrongly_cut,
 )
-from .volumes import determinants, volume_along_sums, volume_gradient, volume_sums
+from .volumes import (
+    determinants,
+    opposite_slope,
+    opposite_volumes,
+    volume_along_sums,
+    volume_gradient,
+    volume_sums,
+)
 
 __all__ = [
     "add_adjoint",
@@ -89,6 +96,8 @@ __all__ = [
     "number_trees",
     "numbers_of_lines",
     "one_fan_each",
+    "opposite_slope",
+    "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",
     "quad_cuts",
