@@ -23,21 +23,21 @@ BALL = Mesh(*icosphere(3))
 SHEET = sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u)), 9, 9)
 
 
-@pytest.mark.parametrize("factor", [0.71, 1.0, 1.29])
-def test_nothing_resists_within_thirty_per_cent(factor):
+@pytest.mark.parametrize("factor", [0.76, 1.0, 1.24])
+def test_nothing_resists_within_a_quarter(factor):
     value, slope = VolumeBand.of(BALL).value_and_slope(BALL.vertices * [1.0, 1.0, factor])
     assert value == 0.0
     assert_array_equal(slope, 0.0)
 
 
-@pytest.mark.parametrize("change", [-0.8, -0.34, 0.32, 0.9])
+@pytest.mark.parametrize("change", [-0.8, -0.29, 0.27, 0.9])
 @pytest.mark.parametrize("cells", [10_000, 100])
 def test_the_value_is_the_work_of_a_force_that_grows_until_five_per_cent_beyond(
     change, cells, monkeypatch
 ):
     monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", cells)
     monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 120)
-    work, _ = quad(lambda e: 2.0 * 2.0 * min(e, 0.05), 0.0, abs(change) - 0.3, points=[0.05])
+    work, _ = quad(lambda e: 2.0 * min(e, 0.05), 0.0, abs(change) - 0.25, points=[0.05])
     for unit in (1.0, 1e-3):
         ball = BALL.with_vertices(unit * BALL.vertices)
         value, _ = VolumeBand.of(ball).value_and_slope(ball.vertices * [1.0, 1.0 + change, 1.0])

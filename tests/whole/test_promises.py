@@ -133,7 +133,7 @@ def test_volume_is_exact_on_every_mesh_at_every_angle_and_throughout_a_drag(name
 
 @pytest.mark.parametrize(
     ("name", "most", "finished_most"),
-    [("cactus", 0.10, 0.06), pytest.param("cylinder", 0.20, 0.08, marks=pytest.mark.campaign)],
+    [("cactus", 0.10, 0.06), pytest.param("cylinder", 0.20, 0.10, marks=pytest.mark.campaign)],
 )
 def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(name, most, finished_most):
     igl = pytest.importorskip("igl")

@@ -632,7 +632,7 @@ class Deformer:
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
         """Return the pose of the last solve, finished on the mesh itself; see `finish`.
 
-        A few steps over all vertices, which takes about as long as 20 iterations of
+        A few steps over all vertices, which takes about as long as 40 iterations of
         as-rigid-as-possible: triangles are less distorted, joints bend in less space, and the
         handles and fixed vertices are exact.  The volume is preserved as before.  The next solve
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`

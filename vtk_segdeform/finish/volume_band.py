@@ -1,8 +1,8 @@
-"""The volume band: the body resists where it is compressed or expanded by more than 30 %.
+"""The volume band: the body resists where it is compressed or expanded by more than a quarter.
 
-    V(x) = w sum_i A_i f(|s_i(x)| - 0.3),      f(e) = 0           for e < 0
-                                                      e^2         for e < d
-                                                      2 d e - d^2 beyond
+    V(x) = w sum_i A_i f(|s_i(x)| - 0.25),      f(e) = 0             for e < 0
+                                                       e^2           for e < d
+                                                       2 d e - d^2   beyond
 
 s_i is the local volume change (`geometry.local_volume`) and A_i the area around vertex i.  The
 total volume is preserved exactly whatever the pose, but without the band the inside of a bend loses
@@ -25,9 +25,9 @@ from ..arrays import FloatArray
 from ..geometry import LocalVolume
 from ..mesh import Mesh
 
-_BAND = 0.3
+_BAND = 0.25
 _FULL = 0.05  # d
-_STRENGTH = 2.0  # w
+_STRENGTH = 1.0  # w
 
 
 @dataclass(frozen=True, eq=False)

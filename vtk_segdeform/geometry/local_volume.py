@@ -122,13 +122,14 @@ class LocalVolume:
         The places are the vertices, or the means of their cells.  The function takes weights (k,)
         and returns sum_i w_i ds_i/dx, (n, 3).
         """
+        x = as_points(vertices, "vertices", self._shape[0])
         if self._inside is None:
-            return self._change_with_slope(vertices)
+            return self._change_with_slope(x)
         inside = self._inside
-        s, slope = self._change_with_slope(vertices[inside])
+        s, slope = self._change_with_slope(x[inside])
 
         def spread(weights: FloatArray) -> FloatArray:
-            out = np.zeros_like(vertices)
+            out = np.zeros_like(x)
             out[inside] = slope(weights)
             return out
 
