@@ -1,17 +1,21 @@
-"""The start of a solve, extrapolated from the ends of the last two.
+"""The start of a solve, extrapolated from the ends of the last ones.
 
-The targets of a drag usually continue in their direction, and the cages with them:
+The targets u of a drag usually continue in their direction, and the cages p follow a smooth path.
+With the length t of the path of the targets as its parameter, p(t) is the polynomial through the
+last ends, evaluated at
 
-    s    = (u - u_1) . (u_1 - u_0) / |u_1 - u_0|^2,  at most 2
-    p    = p_1 + s (p_1 - p_0)
+    t = t_1 + min(s, 2) |u_1 - u_0|,     s = (u - u_1) . (u_1 - u_0) / |u_1 - u_0|^2
 
-The ends of the last two solves are p_0, p_1, and their targets u_0, u_1.  A longer motion
-starts where the last solve ended: after a guess far from the solution, the length of a step says
-too little about the remaining distance, by which a live drag decides what to show.
+where u_0, u_1 are the targets of the last two ends.  Its degree is the one that would have come
+closest to the last end, as in integrators of variable order: 3 for a steady hand, 1 for a jerky
+one.  A longer motion starts where the last solve ended: after a guess far from the solution, the
+length of a step says too little about the remaining distance, by which a live drag decides what to
+show.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +24,9 @@ from ..arrays import FloatArray
 
 _FARTHEST = 2.0  # times the way between the last two ends
 _LONGEST = 0.02  # motion of targets, in mesh sizes
+_HIGHEST = 3  # degree of the polynomial
+_SAME = 0.2  # of the last way: an end so near the last one replaces it
+_STRAIGHT = 0.5  # least cosine between successive ways on one path
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +40,24 @@ class End:
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """The ends of the last solves, for two different targets at most."""
+    """The ends of the last solves, for different targets, on a path without sharp turns."""
 
     ends: tuple[End, ...] = ()
 
     def on_to(self, end: End) -> Way:
-        """Return these ends and *end*, which replaces one for the same targets."""
-        others = [each for each in self.ends if not np.array_equal(each.targets, end.targets)]
-        return Way((*others[-1:], end))
+        """Return these ends and *end*, which replaces the last one if it is near it."""
+        ends = self.ends
+        if ends and np.array_equal(ends[-1].targets, end.targets):
+            ends = ends[:-1]
+        elif len(ends) > 1:
+            last = ends[-1].targets - ends[-2].targets
+            if np.linalg.norm(end.targets - ends[-1].targets) < _SAME * np.linalg.norm(last):
+                ends = ends[:-1]
+        if len(ends) > 1:
+            last, way = ends[-1].targets - ends[-2].targets, end.targets - ends[-1].targets
+            if np.vdot(last, way) < _STRAIGHT * np.linalg.norm(last) * np.linalg.norm(way):
+                ends = ends[-1:]
+        return Way((*ends[-_HIGHEST - 1 :], end))
 
     def ahead(self, targets: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]] | None:
         """Return the extrapolated motion of the cages (m, 3) for *targets*, and the directions Z.
@@ -49,9 +66,35 @@ class Way:
         """
         if len(self.ends) < 2:
             return None
-        before, last = self.ends
+        before, last = self.ends[-2:]
         if np.abs(targets - last.targets).max() > _LONGEST:
             return None
         way = last.targets - before.targets
         share = min(float(np.vdot(targets - last.targets, way) / np.vdot(way, way)), _FARTHEST)
-        return (share * (last.p - before.p), last.directions) if share > 0.0 else None
+        if share <= 0.0:
+            return None
+        pairs = zip(self.ends[1:], self.ends, strict=False)
+        lengths = [float(np.linalg.norm(b.targets - a.targets)) for b, a in pairs]
+        t = np.concatenate([[0.0], np.cumsum(lengths)])
+        p = [end.p for end in self.ends]
+        degree = _best_degree(p, t)
+        there = _extrapolated(p, t, t[-1] + share * lengths[-1], degree)
+        return there - last.p, last.directions
+
+
+def _best_degree(p: Sequence[FloatArray], t: FloatArray) -> int:
+    """Return the degree that comes closest to the last of *p* at *t* (k,) from those before it."""
+    off = [
+        float(np.linalg.norm(_extrapolated(p[:-1], t[:-1], t[-1], degree) - p[-1]))
+        for degree in range(1, len(p) - 1)
+    ]
+    return 1 + int(np.argmin(off)) if off else 1
+
+
+def _extrapolated(p: Sequence[FloatArray], t: FloatArray, at: float, degree: int) -> FloatArray:
+    """Return the polynomial of *degree* through the last of *p* at *t*, evaluated *at* (Lagrange)."""
+    own, found = t[-degree - 1 :], np.zeros_like(p[-1])
+    for k, each in enumerate(p[-degree - 1 :]):
+        others = np.delete(own, k)
+        found += np.prod((at - others) / (own[k] - others)) * each
+    return found
