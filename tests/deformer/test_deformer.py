@@ -19,7 +19,6 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.models.shapes import cactus
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights
 from vtk_segdeform.regions.segmentation import segment
-from vtk_segdeform.solver.anderson import Anderson
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2)
@@ -187,18 +186,6 @@ def test_a_reset_discards_the_running_state():
     again, anew = deformer.solve(SCENE.turned(20)), SCENE.deformer().solve(SCENE.turned(20))
     assert again.steps == anew.steps
     assert_array_equal(again.vertices, anew.vertices)
-
-
-def test_acceleration_continues_from_frame_to_frame(monkeypatch):
-    def drag():
-        deformer = SCENE.deformer(hold_tolerance=1.0)
-        poses = [deformer.solve(SCENE.turned(degrees)) for degrees in range(25)]
-        return sum(pose.steps for pose in poses), poses[-1].vertices
-
-    (few, there), _ = drag(), monkeypatch.setattr(Anderson, "begin_elsewhere", Anderson.forget)
-    many, also_there = drag()
-    assert few < many
-    assert np.abs(there - also_there).max() < 1e-5 * SCENE.mesh.diagonal
 
 
 @pytest.mark.parametrize(

@@ -37,14 +37,6 @@ class Anderson:
         self._moves: list[FloatArray] = []  # differences of q = p + h
         self._changes: list[FloatArray] = []  # differences of the residual
 
-    def begin_elsewhere(self) -> None:
-        """Keep the differences; the next p does not follow from the last one.
-
-        A drag moves the fixed point, but hardly changes how residuals depend on p: the differences
-        of the last frames save the next frame half of its steps.
-        """
-        self._last = None
-
     def extrapolate(self, p: FloatArray, h: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the accelerated successor of *p*, whose plain successor is p + h."""
         q = p + h

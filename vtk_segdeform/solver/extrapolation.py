@@ -92,7 +92,7 @@ def _best_degree(p: Sequence[FloatArray], t: FloatArray) -> int:
 
 
 def _extrapolated(p: Sequence[FloatArray], t: FloatArray, at: float, degree: int) -> FloatArray:
-    """Return the polynomial of *degree* through the last of *p* at *t*, evaluated *at* (Lagrange)."""
+    """Return the polynomial of *degree* through the last of *p* at *t* (Lagrange), there *at*."""
     own, found = t[-degree - 1 :], np.zeros_like(p[-1])
     for k, each in enumerate(p[-degree - 1 :]):
         others = np.delete(own, k)

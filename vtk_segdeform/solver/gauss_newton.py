@@ -34,7 +34,7 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
    rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).  If
    that does not help, H is almost singular, and the step (21) of the paper is taken.
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
-   two, if the objective is lower there.  This saves a step in five.
+   ones, if the objective is lower there.  This saves half of the steps of a steady drag.
 6. *Further terms* (`terms`), such as a barrier against folds.  While one of them is active, its
    Hessian is in H, and no step goes where it is infinite.
 
@@ -177,10 +177,7 @@ class _State:
 
     def for_other_targets(self, options: SolverOptions) -> _State:
         """Return the state with which a solve for other targets begins."""
-        self.acceleration.begin_elsewhere()
-        is_same = self.acceleration.window == options.acceleration
-        acceleration = self.acceleration if is_same else Anderson(options.acceleration)
-        return _State(acceleration, self.factor, self.age, 0.0, self.has_terms)
+        return _State(Anderson(options.acceleration), self.factor, self.age, 0.0, self.has_terms)
 
     def ended_at(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Remember where the call ended; return itself."""
