@@ -27,6 +27,9 @@ from .timers import Timers
 _AHEAD = 2  # pictures that the page has not shown yet
 _LOST = 2.0  # seconds after which such a picture is no longer waited for
 _REST = 0.25  # seconds without another picture, after which the view rests
+_RECEIVING = 0.01  # seconds until messages that wait are received
+_EXCHANGE = 0.03  # seconds in which a picture is encoded, unless it is very large
+_TURNS = 3  # of the event loop, until a message has been sent or received
 _PERIOD = 0.04  # seconds between two checks whether a view that the page draws rests
 
 Send = Callable[[Picture | Update | Surface, int], None]
@@ -131,7 +134,7 @@ class Stream:
     async def _run(self) -> None:
         while True:
             await self._wait()
-            await asyncio.sleep(0)  # whatever has arrived meanwhile replaces stale moves
+            await self._exchange()
             self._awake.clear()
             if self.inputs:
                 for _ in range(len(self.inputs)):
@@ -149,6 +152,17 @@ class Stream:
         """Wait until there is something to do; while the page draws, not for long."""
         with suppress(asyncio.TimeoutError):
             await asyncio.wait_for(self._awake.wait(), _PERIOD if self._is_live else None)
+
+    async def _exchange(self) -> None:
+        """Send the last picture, and receive newer moves, which replace those that wait.
+
+        Otherwise both would wait until the next picture is drawn, as events and drawing leave the
+        event loop no time.
+        """
+        if self._encoding is not None:
+            await asyncio.wait([self._encoding], timeout=_EXCHANGE)
+        for _ in range(_TURNS):
+            await asyncio.sleep(0)
 
     async def _handle_input(self) -> None:
         """Send the oldest event to the view; if it begins a drag, let the page draw."""
@@ -218,6 +232,7 @@ class Stream:
             return self._pictures.draw()
         finally:
             self._is_drawing = False
+            self._timers.postpone(_RECEIVING)  # input that has arrived meanwhile comes first
             if self._drawing is not None:
                 self._drawing.note_picture()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,8 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.widgets.editor import keys_of
 from vtk_segdeform.widgets.editor.keys import event_key
 from vtk_segdeform.widgets.scene import View
+from vtk_segdeform.widgets.web import pictures
+from vtk_segdeform.widgets.web import stream as stream_module
 from vtk_segdeform.widgets.web.inputs import Inputs
 from vtk_segdeform.widgets.web.key_names import vtk_key
 from vtk_segdeform.widgets.web.stream import Stream
@@ -60,7 +63,7 @@ class Loop:
             self.due.remove(entry)
             self.now, call = entry
             call()
-        self.now = end
+        self.now = max(self.now, end)
 
 
 @pytest.fixture
@@ -140,6 +143,113 @@ def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
         timers.postpone()
     assert len(loop.due) == 1  # a timer that fires once does not wait
     timers.stop()
+
+
+def test_slow_ticks_take_a_twentieth_of_the_time_while_input_arrives(view: View) -> None:
+    loop, ticks = Loop(), []
+
+    def tick() -> None:
+        ticks.append(loop.now)
+        loop.now += duration
+
+    timers = Timers(view.interactor)
+    timers.start(loop)  # type: ignore[arg-type]
+    view.every(40, tick)
+    duration = 0.06
+    while loop.now < 3.5:
+        loop.run(0.01)
+        timers.postpone()
+    assert ticks == pytest.approx([0.5, 1.7, 2.9], abs=0.02)
+    duration = 1.0
+    while len(ticks) < 5:
+        loop.run(0.01)
+        timers.postpone()
+    assert ticks[4] - ticks[3] == pytest.approx(2.0, abs=0.02)  # no longer than that
+    timers.stop()
+
+
+def test_a_timer_may_be_postponed_by_less_than_its_period(view: View) -> None:
+    loop, ticks = Loop(), []
+    timers = Timers(view.interactor)
+    timers.start(loop)  # type: ignore[arg-type]
+    view.every(40, lambda: ticks.append(loop.now))
+    loop.run(0.02)
+    timers.postpone(0.01)  # it is not due before that
+    loop.run(0.015)
+    timers.postpone(0.01)
+    loop.run(0.02)
+    assert ticks == pytest.approx([0.045])
+    timers.stop()
+
+
+def receive(stream: Stream, x: float, turns: int) -> None:
+    """Let *stream* receive a move after some turns of the event loop."""
+    if turns:
+        asyncio.get_running_loop().call_soon(receive, stream, x, turns - 1)
+    else:
+        stream.put([{"name": "MouseMove", "x": x, "y": 0.5}])
+
+
+def test_a_move_is_replaced_by_one_that_takes_two_more_turns_to_be_read(view: View) -> None:
+    places: list[int] = []
+
+    async def story() -> None:
+        stream = Stream(view, Timers(view.interactor), lambda *_: None, lambda: None)
+        stream.start(asyncio.get_running_loop())
+        place = view.interactor.GetEventPosition
+        view.interactor.AddObserver("MouseMoveEvent", lambda *_: places.append(place()[0]))
+        receive(stream, 0.2, turns=1)
+        receive(stream, 0.4, turns=3)
+        while not places:
+            await asyncio.sleep(0.01)
+        await stream.stop()
+
+    asyncio.run(asyncio.wait_for(story(), 20.0))
+    assert places == [80]
+
+
+def test_what_arrives_during_a_drawing_comes_before_timers_and_after_its_picture(
+    view: View, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[object] = []
+    encoded = pictures._encoded
+
+    def slowly(*words: Any, **more: Any) -> pictures.Picture:
+        time.sleep(0.02)
+        return encoded(*words, **more)
+
+    monkeypatch.setattr(pictures, "_encoded", slowly)
+    monkeypatch.setattr(stream_module, "_RECEIVING", 0.2)
+    monkeypatch.setattr(stream_module, "_EXCHANGE", 20.0)
+    monkeypatch.setattr(stream_module, "_REST", 20.0)
+
+    async def story() -> None:
+        loop = asyncio.get_running_loop()
+        timers = Timers(view.interactor)
+        stream = Stream(view, timers, lambda _, number: seen.append(number), lambda: None)
+        stream.start(loop)
+        stream.open(200, 100)
+        while seen != [1]:
+            await asyncio.sleep(0.01)
+        stream.shown(1)
+
+        def draw_slowly(*_: object) -> None:
+            time.sleep(0.25)  # more than the period of the timer
+            receive(stream, 0.2, turns=3)
+            receive(stream, 0.4, turns=5)
+
+        tag = view.window.AddObserver("EndEvent", draw_slowly)
+        place = view.interactor.GetEventPosition
+        view.interactor.AddObserver("MouseMoveEvent", lambda *_: seen.append(place()[0]))
+        view.every(200, lambda: seen.append("tick"))
+        stream.want()
+        while len(seen) < 4:
+            await asyncio.sleep(0.01)
+            view.window.RemoveObserver(tag)
+        await stream.stop()
+
+    asyncio.run(asyncio.wait_for(story(), 20.0))
+    assert seen == [1, 2, 80, "tick"]
 
 
 def test_a_picture_names_the_last_event_that_it_shows(view: View) -> None:

@@ -35,6 +35,7 @@ HTML = f"data:text/html,<body style='margin:0'><canvas width={SIZE} height={SIZE
 START = """
 window.surface = SegdeformSurface.create(document.querySelector('canvas'));
 window.bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer;
+SegdeformSurface.slow.pixels = Infinity;
 surface !== null
 """
 
@@ -187,10 +188,15 @@ def test_marks_are_drawn_where_the_view_draws_them(page, scene):
     marks = marks_of(here.view, [here.surface.actor])
     assert set(send(page, here.due(marks=marks))) == {""}
     expected, got = here.picture(), drawn(page)
-    red = [(p[..., 0] > 200) & (p[..., 1] < 60) for p in (expected, got)]
+    size = "(share) => Object.assign(surface.canvas, {{ width: {0} * share, height: {0} * share }})"
+    page.evaluate(f"surface.share = 0.5, ({size.format(SIZE)})(0.5)")
+    fewer = drawn(page).repeat(2, axis=0).repeat(2, axis=1)
+    page.evaluate(f"surface.share = 1, ({size.format(SIZE)})(1)")
+    red = [(p[..., 0] > 200) & (p[..., 1] < 60) for p in (expected, got, fewer)]
     here.view.remove_foreground()
     assert red[0].sum() > 500
     assert (red[0] & red[1]).sum() > 0.8 * (red[0] | red[1]).sum()
+    assert (red[0] & red[2]).sum() > 0.6 * (red[0] | red[2]).sum()  # whole pixels of twice the size
     assert send(page, here.due()) == [""]
     compare(page, here)
 
@@ -237,7 +243,7 @@ def test_a_mark_that_moves_is_culled_and_clipped_as_in_the_view(page, scene):
     compare(page, here)
 
 
-def test_slow_software_draws_fewer_triangles(page, monkeypatch):
+def test_slow_software_draws_fewer_pixels_and_triangles(page, monkeypatch):
     monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
     monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
     here = InProcess(sausage_session())
@@ -245,10 +251,15 @@ def test_slow_software_draws_fewer_triangles(page, monkeypatch):
     every = page.evaluate("surface._corners")
     assert every == here.session.mesh.faces.size
     expected, full = here.picture(), drawn(page)
+    page.evaluate("SegdeformSurface.slow.pixels = 15")
     page.evaluate("window.clock = 0, performance.now = () => 1e5 * clock++")  # slow pictures
     for _ in range(8):
         page.evaluate("surface.draw()")
     page.evaluate("delete performance.now")
+    assert page.evaluate("surface.share") == 0.5
+    page.evaluate(
+        "SegdeformSurface.slow.pixels = Infinity, surface.share = 1"
+    )  # of a canvas that keeps its size here
     assert 0 < page.evaluate("surface._corners") < 0.6 * every
     posed_rows = page.evaluate("[surface._posedRows, surface._height]")
     assert posed_rows[0] < posed_rows[1]

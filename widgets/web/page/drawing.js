@@ -13,6 +13,10 @@ const CUT = 3; // pixels around the surface in the server's picture that are cut
 const SEVERAL = [[0, 0], [-CUT, -CUT], [CUT, -CUT], [-CUT, CUT], [CUT, CUT]];
 const COLOUR = /rgba?\([^)]*\)/g;
 
+function resize(canvas, width, height) {
+  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+}
+
 export default class Drawing {
   // *layer* has three canvases: for the picture, the surface and the texts.
   constructor(layer, picture, call) {
@@ -62,9 +66,9 @@ export default class Drawing {
   // Draw an update; the first one of a drag shows what the picture shows.
   show({ number, messages, labels, width, height, is_first: isFirst, time }) {
     if (!this.surface || !this.receive(messages)) return;
-    for (const canvas of [this.backdrop, this.body]) {
-      if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    }
+    resize(this.backdrop, width, height);
+    const share = this.surface.share; // of the pixels, each way
+    resize(this.body, Math.round(share * width), Math.round(share * height));
     this.number = number;
     this.time = time;
     this.write(labels, width, height);
@@ -104,7 +108,7 @@ export default class Drawing {
     const context = rest.getContext('2d');
     context.drawImage(this.picture, 0, 0, width, height);
     context.globalCompositeOperation = 'destination-out';
-    for (const [x, y] of SEVERAL) context.drawImage(this.body, x, y);
+    for (const [x, y] of SEVERAL) context.drawImage(this.body, x, y, width, height);
     const colours = getComputedStyle(this.layer).backgroundImage.match(COLOUR) ?? ['white'];
     const gradient = this.below.createLinearGradient(0, 0, 0, height);
     colours.forEach((each, k) => gradient.addColorStop(k / Math.max(1, colours.length - 1), each));

@@ -26,7 +26,6 @@
   const LOOK_NUMBERS = 44;
   const MARK_NUMBERS = 30;
   const LIGHTS = 4;
-  const SLOW = 60; // milliseconds for a picture, beyond which software draws fewer triangles
   const MEASURED = 8; // one of so many pictures is timed, the third one first
   const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
@@ -280,6 +279,9 @@ void main() {
   }
 
   class SegdeformSurface {
+    // Milliseconds for a picture beyond which software draws fewer pixels, and fewer triangles.
+    static slow = { pixels: 15, triangles: 40 };
+
     // Return a surface that draws in a canvas, or null where WebGL 2 cannot do it.
     static create(canvas, { antialias } = {}) {
       const options = { alpha: true, premultipliedAlpha: true, depth: true };
@@ -301,6 +303,7 @@ void main() {
       this.isSoftware = isSoftware;
       this.serial = null; // of the surface in use
       this.pose = null; // number of the pose that the next picture shows
+      this.share = 1; // of the pixels of the view that the canvas should have, each way
       this.pictures = 0;
       this.ondraw = null; // called after each picture with the number of its pose
       this.onlost = null; // called when the graphics memory was lost: the server must send all again
@@ -734,13 +737,17 @@ void main() {
       this._isMoved = false;
     }
 
-    // Draw fewer triangles, between the first vertices, and pose only these from now on, if
-    // pictures take too long without a graphics processor.
+    // Draw a quarter of the pixels, if pictures take too long without a graphics processor; then
+    // fewer triangles, between the first vertices, and pose only these from now on.
     _spareSoftware(began) {
       const gl = this.gl;
-      if (!this._coarse.length || this.pictures % MEASURED !== 2) return;
+      const isSpared = this.share < 1 && !this._coarse.length;
+      if (!this.isSoftware || isSpared || this.pictures % MEASURED !== 2) return;
       gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
-      if (performance.now() - began < SLOW) return;
+      const duration = performance.now() - began;
+      const { pixels, triangles } = SegdeformSurface.slow;
+      if (duration > pixels) this.share = 0.5;
+      if (duration < triangles || !this._coarse.length) return;
       const n = largest(this._coarse) + 1;
       const { fans, neighbours } = fansOf(n, this._coarse, []);
       this._fans = this._texture(gl.RGBA32UI, fans);
@@ -820,7 +827,7 @@ void main() {
       }
       if (each) {
         gl.uniform2f(uniforms.pixels, this.canvas.width / 2, this.canvas.height / 2);
-        gl.uniform1f(uniforms.size, mark.size / 2 + 0.5);
+        gl.uniform1f(uniforms.size, this.share * mark.size / 2 + 0.5);
         gl.uniform1f(uniforms.lift, 2e-3);
         gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, points.count / mark.shape);
       } else {
