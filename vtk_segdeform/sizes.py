@@ -76,11 +76,17 @@ Both depend on the shape only: for a million vertices they take 2.7 s of process
 DECIMATED_POINTS = 12_000
 """Vertices of the decimated mesh, about: several hundred for each limb."""
 
-DRAFT = 60_000
+DRAFT = 20_000
 """Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.
 
 In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
-of 1,200 at a million."""
+of 1,200 at a million; of 50,000 vertices 45 ms instead of 85 on a slow machine."""
+
+PAGE_POINTS = 5_000
+"""Vertices of such a mesh, about, that a page without a graphics processor draws.
+
+Software WebGL takes 50 ms of processor time for a picture of 50,000 vertices, 60 if 12,000 of them
+are drawn and 95 if all are."""
 
 FINISHED = 100_000
 """Vertices up to which `deform` and `pull` finish a pose on the mesh by themselves.
@@ -98,11 +104,6 @@ CACHED_BINDING = 20_000
 """Vertices from which a session keeps a binding on disk.
 
 A mesh of 22,000 vertices is bound in 1.1 s, and read in 0.05 s."""
-
-PAGE_DRAFT = 20_000
-"""Vertices beyond which a page without a graphics processor may draw a mesh decimated, if slow.
-
-Of a picture of 50,000 vertices, 47 of 67 ms of processor time are spent on its triangles."""
 
 LOCAL_VOLUME_CELLS = 20_000
 """Vertices beyond which local volume change is computed for cells of vertices.

@@ -232,8 +232,12 @@ def test_the_report_says_what_breaks_a_limit_and_what_could_not_be_drawn(tmp_pat
 
 
 def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
-    drags = {True: browser.Drag(30.0, (20.0, 40.0)), False: browser.Drag(12.0, (50.0, 90.0))}
-    monkeypatch.setattr(browser, "_in_browser", lambda *_, draws: drags[draws])
+    runs = iter([11.0, 30.0, 35.0, 30.0, 12.0, 30.0])  # by the server and by the page
+
+    def in_browser(*_, draws):
+        return browser.Drag(next(runs), (20.0, 40.0) if draws else (50.0, 90.0))
+
+    monkeypatch.setattr(browser, "_in_browser", in_browser)
     monkeypatch.setattr(
         browser, "in_own_process", lambda *_: browser.Drag(20.0, (30.0, 45.0), processors=(9.0,))
     )

@@ -154,6 +154,18 @@ def test_on_a_surface_with_one_side_they_agree_with_the_faces_up_to_the_turned_c
     assert np.einsum("fci,fi->fc", of_corner, of_face).min() > 0.99
 
 
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("count", [3, 300])
+@pytest.mark.parametrize("has_one_side", [False, True])
+def test_those_of_some_vertices_are_theirs_among_all(has_one_side, count):
+    strip = moebius()
+    mesh = Mesh(strip.points, strip.regular_faces) if has_one_side else models.cactus(2500)
+    some = np.random.default_rng(2).choice(mesh.n_vertices, count, replace=False)
+    normals = VertexNormals(mesh)
+    x = mesh.vertices * [1.0, 0.7, 1.2]
+    assert_allclose(normals.subset(some)(x), normals.of(x)[some], atol=1e-6)
+
+
 def test_only_surfaces_with_one_side_have_turned_corners():
     for mesh in (MESHES["torus"](), cut_ball(), finned_ball()):
         assert not len(VertexNormals(mesh).turned)

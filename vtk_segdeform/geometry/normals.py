@@ -30,6 +30,7 @@ from ..mesh import HalfEdges, Mesh, two_sides
 
 _PIECES = 16  # most tasks
 _PIECE = 1 << 12  # fewest vertices per task
+_FEW = 15  # times fewer vertices, below which the normals of all take less time
 _all_rings: WeakKeyDictionary[Mesh, tuple[NDArray[np.int32], IntArray]] = WeakKeyDictionary()
 
 
@@ -86,6 +87,8 @@ class VertexNormals:
 
     def subset(self, vertices: IntArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of a pose (n, 3) for the normals (k, 3) of these *vertices* (k,)."""
+        if self._n < _FEW * len(vertices) and compiled_kernels(len(self._faces)):
+            return lambda x: np.asarray(self.of(x)[vertices], dtype=float)
         row = np.full(self._n, -1)
         row[vertices] = np.arange(len(vertices))
         faces = np.flatnonzero((row[self._faces] >= 0).any(axis=1))

@@ -25,9 +25,9 @@ from vtk_segdeform.mesh import Mesh
 _PATIENCE = 0.02  # seconds until it is clear that the decimated mesh does not exist yet
 
 
-def decimated_triangles(mesh: Mesh) -> tuple[IntArray, IntArray]:
-    """Return the vertices (k,) of a large *mesh* that are drawn, and faces (f, 3) between them."""
-    coarse, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+def decimated_triangles(mesh: Mesh, n_points: int) -> tuple[IntArray, IntArray]:
+    """Return some *n_points* vertices (k,) of a large *mesh*, and faces (f, 3) between them."""
+    coarse, kept, _ = decimated(mesh, n_points)
     x, normals = mesh.vertices[kept], VertexNormals(mesh).subset(kept)(mesh.vertices)
     # Clusters may fold a face over, which light would show as a black dot.
     faces = coarse.faces
@@ -48,7 +48,7 @@ class _Shape:
     @classmethod
     def of(cls, mesh: Mesh) -> _Shape:
         """Return the shape of a large *mesh*."""
-        kept, faces = decimated_triangles(mesh)
+        kept, faces = decimated_triangles(mesh, sizes.DECIMATED_POINTS)
         normals_of = VertexNormals(mesh).subset(kept)
         return cls(kept, faces, normals_of(mesh.vertices), normals_of)
 

@@ -46,6 +46,11 @@ class Draft:
     ----------
     view : View
         Its window is changed only between `begin` and `end`.
+
+    Attributes
+    ----------
+    seconds : float
+        What the last picture in full quality took.
     """
 
     def __init__(self, view: View) -> None:
@@ -54,6 +59,9 @@ class Draft:
         self._stop: Stop | None = None
         self._begun = 0.0
         self._is_slow = False
+        self._drawn_since, self.seconds = 0.0, 0.0
+        for event, callback in (("StartEvent", self._starts), ("EndEvent", self._ends)):
+            view.renderer.AddObserver(event, callback)
 
     @classmethod
     def of(cls, view: View) -> Draft:
@@ -77,7 +85,7 @@ class Draft:
         if window is None:
             return
         if self._stop is None:
-            self._is_slow = renderer.GetLastRenderTimeInSeconds() > SLOW
+            self._is_slow = self.seconds > SLOW
             if if_slow and not self._is_slow:
                 return
         self._view.interactor.InvokeEvent(
@@ -115,6 +123,15 @@ class Draft:
         self._view.interactor.InvokeEvent(_ANNOUNCED, 0)
         if changes:
             self._view.request_render()
+
+    def _starts(self, *_: object) -> None:
+        self._drawn_since = time.perf_counter()
+
+    def _ends(self, *_: object) -> None:
+        """Measure a picture; most drivers go on drawing after they have returned."""
+        if self._stop is None:
+            self._view.renderer.GetRenderWindow().WaitForCompletion()
+            self.seconds = time.perf_counter() - self._drawn_since
 
     def _tick(self) -> None:
         if time.perf_counter() - self._begun > _REST:

@@ -35,7 +35,7 @@ from vtk_segdeform.pictures import BODY, INK, rgb
 from vtk_segdeform.session import Change, Session
 
 from .decimated_surface import DecimatedSurface, Decimating
-from .draft import SLOW, observe_drafts
+from .draft import SLOW, Draft, observe_drafts
 from .view import View
 
 _NOTHING = np.arange(0)
@@ -116,7 +116,7 @@ class SurfaceDisplay:
         self.view.renderer.AddActor(self.actor)
         self._decimating = Decimating(mesh)
         self._decimated: DecimatedSurface | None = None
-        self._is_draft = False
+        self._drafts, self._is_draft = Draft.of(self.view), False
         self._stops = [
             session.on_change(self._changed),
             observe_drafts(self.view.interactor, self._set_draft),
@@ -235,8 +235,8 @@ class SurfaceDisplay:
             self.view.request_render()
             return
         is_plain = self._style is SurfaceStyle.SHADED and bool(self.actor.GetVisibility())
-        seconds = self.view.renderer.GetLastRenderTimeInSeconds()
-        if self.session.mesh.n_vertices <= sizes.DRAFT or seconds <= SLOW or not is_plain:
+        is_slow = self._drafts.seconds > SLOW
+        if self.session.mesh.n_vertices <= sizes.DRAFT or not (is_slow and is_plain):
             return
         if self._decimated is None:
             surface = self.actor.GetProperty()

@@ -86,6 +86,18 @@ def test_slow_drafts_last_as_long_as_another_thread_is_spared(shown, monkeypatch
     assert shown.actor.GetVisibility()
 
 
+def test_pictures_in_full_quality_are_measured(shown):
+    view, seconds = shown.view, 0.05
+    view.renderer.AddObserver("StartEvent", lambda *_: time.sleep(seconds), -1.0)  # a late one
+    drafts = Draft.of(view)
+    view.render()
+    assert 0.05 < drafts.seconds < 1.0
+    drafts.begin()
+    seconds = 1.0
+    view.render()
+    assert drafts.seconds < 1.0
+
+
 def test_a_spared_thread_has_most_of_the_time(shown, monkeypatch):
     view, pictures = shown.view, []
     view.window.AddObserver("EndEvent", lambda *_: pictures.append(1))

@@ -121,8 +121,8 @@ def test_faces_are_those_of_the_mesh(session):
 
 
 def test_a_large_mesh_has_fewer_faces_for_software_close_to_it(session, monkeypatch):
-    monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
+    monkeypatch.setattr(sizes, "DRAFT", 100)
+    monkeypatch.setattr(sizes, "PAGE_POINTS", 600)
     surface = encoded(session)
     coarse = surface.order[read_surface(surface.message(1)).coarse]
     mesh = session.mesh

@@ -244,8 +244,8 @@ def test_a_mark_that_moves_is_culled_and_clipped_as_in_the_view(page, scene):
 
 
 def test_slow_software_draws_fewer_pixels_and_triangles(page, monkeypatch):
-    monkeypatch.setattr(sizes, "PAGE_DRAFT", 100)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 600)
+    monkeypatch.setattr(sizes, "DRAFT", 100)
+    monkeypatch.setattr(sizes, "PAGE_POINTS", 600)
     here = InProcess(sausage_session())
     assert set(send(page, here.due())) == {""}
     every = page.evaluate("surface._corners")

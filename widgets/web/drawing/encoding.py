@@ -171,8 +171,8 @@ def encode_surface(
     centre, scale = 0.5 * (low + high), float(mesh.diagonal)
     near = _along_curve(mesh.vertices)
     coarse, is_late = np.empty((0, 3), dtype=np.int64), np.ones(mesh.n_vertices, dtype=bool)
-    if mesh.n_vertices > sizes.PAGE_DRAFT:
-        kept, coarse = decimated_triangles(mesh)
+    if mesh.n_vertices > sizes.DRAFT:
+        kept, coarse = decimated_triangles(mesh, sizes.PAGE_POINTS)
         coarse = kept[coarse]
         is_late[coarse] = False
     parts: list[tuple[int, IntArray]] = []  # numbers of sets, and vertices of them
