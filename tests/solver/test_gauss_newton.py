@@ -99,6 +99,19 @@ def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
     assert distance(*(each.solve(SCENE.turned(4.0)) for each in (ahead, behind))) < 1e-5
 
 
+def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
+    """A large mesh is moved along them, so its pose would depend on the way, too."""
+    straight, roundabout = SCENE.held(), SCENE.held()
+    for angle in (10.0, 20.0, 30.0, 38.0, 39.5):
+        roundabout.solve(SCENE.turned(angle))
+    ends = []
+    for deformer in (straight, roundabout):
+        deformer.solve(SCENE.turned(40.0))
+        ends.append(deformer._constraints.solver._way.ends[-1])
+    (first,), (second,) = (end.directions for end in ends)
+    assert np.linalg.norm(first - second) < 1e-4 * np.linalg.norm(first)
+
+
 def test_rotation_clusters_stay_close_to_a_rotation_for_each_vertex():
     targets = SCENE.turned(30)
     fine = SCENE.deformer(rotation_groups=None).solve(targets)

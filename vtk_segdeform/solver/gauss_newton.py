@@ -298,6 +298,9 @@ class GaussNewton:
                 break
             here = ahead
             merits.append(here.merit)
+        if directions and len(merits) <= options.max_steps:
+            # Not those of a factor from another pose, on which the pose would depend.
+            directions = self._factor.solve_all([np.zeros_like(here.p), *here.rows])[1:]
         self._state, self._last = state.ended_at(here.p, targets, options), here
         self._way = self._way.on_to(End(here.p, targets, tuple(directions)))
         return SolverResult(
