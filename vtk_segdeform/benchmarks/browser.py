@@ -37,7 +37,7 @@ from .tasks import bent_cactus, prepare
 _SIZE = 1400, 900  # pixels of the page
 _RATE = 60.0  # moves per second
 _WARM_UP, _MOVES = 60, 240  # moves; the first ones are not measured
-_ROUNDS = 3
+_ROUNDS = 3  # of all drags, by turns: the speed of a shared machine varies
 _SWING = 0.12, 0.04  # heights of the view, across and upwards
 _PERIODS = 1.5, 1.0  # seconds
 _TICK = 0.04  # seconds between two timer events in process
@@ -103,10 +103,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             except MissingDependencyError as missing:
                 del works[name]
                 skipped.append(f"drag {name}, {size} vertices: {missing}")
-        found = {
-            name: sorted(all_, key=lambda drag: drag.frames)[len(all_) // 2]
-            for name, all_ in runs.items()
-        }
+        found = {name: _middle(drags) for name, drags in runs.items()}
         rows += [_row(size, name, drag) for name, drag in found.items()]
         rate = {name: drag.frames for name, drag in found.items()}
         if {"by the server", "in process"} <= rate.keys():
@@ -123,10 +120,10 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             f"pulled to and fro, by {_RATE:.0f} moves of the mouse a second, for "
             f"{_MOVES / _RATE:.0f} s in a page of {_SIZE[0]} x {_SIZE[1]} pixels. Chromium has "
             "WebGL in software (SwiftShader) where the page draws, and none where the server does. "
-            "*Latency* is the time from an event of the mouse to the picture that shows it. Of "
-            f"{_ROUNDS} runs by turns the one in the middle by frames counts. The last columns are "
-            "processor time over all cores, of the server and of Chromium's renderer, graphics "
-            "and other processes."
+            "*Latency* is the time from an event of the mouse to the picture that shows it. Each "
+            f"drag is repeated {_ROUNDS} times, by turns, and the repetition with the median frame "
+            "rate is listed. The last four columns are processor time over all cores, of the "
+            "server and of Chromium's renderer, graphics and other processes."
         ],
         tables=[Table(_HEAD, rows)],
         ratios=ratios,
@@ -137,6 +134,11 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
 def _view_of(runs: dict[str, list[Drag]]) -> tuple[int, int]:
     """Return the size of the view in the page, if it was drawn in there."""
     return next((drags[0].view for drags in runs.values()), _SIZE)
+
+
+def _middle(drags: list[Drag]) -> Drag:
+    """Return the drag with the median of frames."""
+    return sorted(drags, key=lambda drag: drag.frames)[len(drags) // 2]
 
 
 def _row(size: int, name: str, drag: Drag) -> tuple[Any, ...]:

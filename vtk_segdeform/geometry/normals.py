@@ -30,7 +30,7 @@ from ..mesh import HalfEdges, Mesh, two_sides
 
 _PIECES = 16  # most tasks
 _PIECE = 1 << 12  # fewest vertices per task
-_FEW = 15  # times fewer vertices, below which the normals of all take less time
+_FEW = 15  # vertices for each one of a subset, up to which computing all normals is faster
 _all_rings: WeakKeyDictionary[Mesh, tuple[NDArray[np.int32], IntArray]] = WeakKeyDictionary()
 
 

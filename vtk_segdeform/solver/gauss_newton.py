@@ -112,7 +112,7 @@ class SolverResult:
 
     p: FloatArray  # (m, 3), cage vertices
     multipliers: FloatArray
-    directions: tuple[FloatArray, ...]  # Z, (m, 3) for each constraint
+    directions: tuple[FloatArray, ...]  # Z with the H of (21), (m, 3) for each constraint
     status: Status
     steps: int
     step_size: float  # of the last step, root mean square over the surface
@@ -298,8 +298,7 @@ class GaussNewton:
                 break
             here = ahead
             merits.append(here.merit)
-        if directions and len(merits) <= options.max_steps:
-            # Not those of a factor from another pose, on which the pose would depend.
+        if directions:  # not those of a factor from another pose: the result would depend on it
             directions = self._factor.solve_all([np.zeros_like(here.p), *here.rows])[1:]
         self._state, self._last = state.ended_at(here.p, targets, options), here
         self._way = self._way.on_to(End(here.p, targets, tuple(directions)))

@@ -27,9 +27,9 @@ from .timers import Timers
 _AHEAD = 2  # pictures that the page has not shown yet
 _LOST = 2.0  # seconds after which such a picture is no longer waited for
 _REST = 0.25  # seconds without another picture, after which the view rests
-_RECEIVING = 0.01  # seconds until messages that wait are received
-_EXCHANGE = 0.03  # seconds in which a picture is encoded, unless it is very large
-_TURNS = 3  # of the event loop, until a message has been sent or received
+_RECEIVING = 0.01  # seconds to read waiting messages before a timer may fire
+_EXCHANGE = 0.03  # seconds to wait, at most, for a picture that is being encoded
+_TURNS = 3  # of the event loop, that sending or reading a message takes
 _PERIOD = 0.04  # seconds between two checks whether a view that the page draws rests
 
 Send = Callable[[Picture | Update | Surface, int], None]
@@ -154,10 +154,10 @@ class Stream:
             await asyncio.wait_for(self._awake.wait(), _PERIOD if self._is_live else None)
 
     async def _exchange(self) -> None:
-        """Send the last picture, and receive newer moves, which replace those that wait.
+        """Send the last picture, and read what the page has sent since.
 
-        Otherwise both would wait until the next picture is drawn, as events and drawing leave the
-        event loop no time.
+        Events and drawing block the event loop.  Without this pause, a picture would be sent only
+        once the next one is drawn, and stale mouse moves would be solved for.
         """
         if self._encoding is not None:
             await asyncio.wait([self._encoding], timeout=_EXCHANGE)

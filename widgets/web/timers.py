@@ -53,12 +53,9 @@ class Timers:
             self._schedule(timer)
 
     def postpone(self, pause: float = math.inf) -> None:
-        """Restart the period of every repeating timer, because there was input.
+        """Let repeating timers wait for input: for their period, or *pause* seconds if less.
 
-        Parameters
-        ----------
-        pause : float
-            Seconds until a timer may fire, if its period is longer.
+        Repeated calls cannot hold a timer back forever; see `_LONGEST` and `_SHARE`.
         """
         longest = max(_LONGEST, min(self._duration / _SHARE, _MOST))
         for timer, handle in self._handles.items():

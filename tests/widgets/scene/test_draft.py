@@ -98,6 +98,23 @@ def test_pictures_in_full_quality_are_measured(shown):
     assert drafts.seconds < 1.0
 
 
+def test_a_picture_is_measured_until_the_driver_has_drawn_it(shown):
+    """OpenGL in software returns before that."""
+    renderer, window = shown.view.renderer, shown.view.window
+
+    class Slow:
+        def __getattr__(self, name):
+            return getattr(window, name)
+
+        def WaitForCompletion(self):  # noqa: N802
+            time.sleep(0.1)
+
+    renderer.GetRenderWindow = Slow
+    window.Render()
+    del renderer.GetRenderWindow
+    assert 0.1 < Draft.of(shown.view).seconds < 1.0
+
+
 def test_a_spared_thread_has_most_of_the_time(shown, monkeypatch):
     view, pictures = shown.view, []
     view.window.AddObserver("EndEvent", lambda *_: pictures.append(1))

@@ -66,6 +66,13 @@ class Loop:
         self.now = max(self.now, end)
 
 
+def started(view: View) -> tuple[Loop, Timers]:
+    """Return a loop, and the timers of *view* that it fires."""
+    loop, timers = Loop(), Timers(view.interactor)
+    timers.start(loop)  # type: ignore[arg-type]
+    return loop, timers
+
+
 @pytest.fixture
 def view() -> Any:
     window, renderer = vtkRenderWindow(), vtkRenderer()
@@ -115,9 +122,8 @@ def test_timers_fire_while_they_run_and_not_otherwise(view: View) -> None:
 
 
 def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
-    loop, ticks = Loop(), []
-    timers = Timers(view.interactor)
-    timers.start(loop)  # type: ignore[arg-type]
+    loop, timers = started(view)
+    ticks: list[float] = []
     view.every(20, lambda: ticks.append(loop.now))
     other = view.interactor.CreateRepeatingTimer(500)
     view.interactor.DestroyTimer(other)
@@ -127,9 +133,8 @@ def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
 
 
 def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
-    loop, ticks = Loop(), []
-    timers = Timers(view.interactor)
-    timers.start(loop)  # type: ignore[arg-type]
+    loop, timers = started(view)
+    ticks: list[float] = []
     view.every(40, lambda: ticks.append(loop.now))
     for _ in range(60):  # input every 0.03 seconds
         loop.run(0.03)
@@ -146,14 +151,13 @@ def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
 
 
 def test_slow_ticks_take_a_twentieth_of_the_time_while_input_arrives(view: View) -> None:
-    loop, ticks = Loop(), []
+    loop, timers = started(view)
+    ticks = []
 
     def tick() -> None:
         ticks.append(loop.now)
         loop.now += duration
 
-    timers = Timers(view.interactor)
-    timers.start(loop)  # type: ignore[arg-type]
     view.every(40, tick)
     duration = 0.06
     while loop.now < 3.5:
@@ -169,9 +173,8 @@ def test_slow_ticks_take_a_twentieth_of_the_time_while_input_arrives(view: View)
 
 
 def test_a_timer_may_be_postponed_by_less_than_its_period(view: View) -> None:
-    loop, ticks = Loop(), []
-    timers = Timers(view.interactor)
-    timers.start(loop)  # type: ignore[arg-type]
+    loop, timers = started(view)
+    ticks: list[float] = []
     view.every(40, lambda: ticks.append(loop.now))
     loop.run(0.02)
     timers.postpone(0.01)  # it is not due before that

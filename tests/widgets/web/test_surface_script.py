@@ -257,9 +257,8 @@ def test_slow_software_draws_fewer_pixels_and_triangles(page, monkeypatch):
         page.evaluate("surface.draw()")
     page.evaluate("delete performance.now")
     assert page.evaluate("surface.share") == 0.5
-    page.evaluate(
-        "SegdeformSurface.slow.pixels = Infinity, surface.share = 1"
-    )  # of a canvas that keeps its size here
+    page.evaluate("SegdeformSurface.slow.pixels = Infinity")
+    page.evaluate("surface.share = 1")  # the canvas of this test keeps its size
     assert 0 < page.evaluate("surface._corners") < 0.6 * every
     posed_rows = page.evaluate("[surface._posedRows, surface._height]")
     assert posed_rows[0] < posed_rows[1]
