@@ -26,7 +26,8 @@ _FLAGS = (
     "--disable-extensions", "--disable-background-networking", "--disable-dev-shm-usage",
     "--mute-audio",
 )  # fmt: skip
-_WEBGL = "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"
+# WebGL by software; the page itself is put together as on any machine without graphics processor.
+_WEBGL = ("--enable-unsafe-swiftshader",)
 _NO_WEBGL = "--disable-gpu", "--disable-software-rasterizer"
 _PATIENCE = 60.0  # seconds
 

@@ -19,13 +19,10 @@ _SAMPLES = 3000  # vertices, at most, that stand for the body
 _CUBE = 110.0  # pixels, at the upper right: the orientation cube may be there
 # Costs: a covered point of the body or of a line, the cube, the far place, a new place.
 _POINT, _CORNER, _FARTHER, _OTHER = 1.0, 20.0, 0.5, 2.0
-_ANGLES = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+_ANGLES = np.roll(np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False), -1)
 # The place at the upper right comes first, and the near places before the far ones.
-_PLACES = [
-    (distance, (np.cos(angle), np.sin(angle)))
-    for distance in (_NEAR, _FAR)
-    for angle in np.roll(_ANGLES, -1)
-]
+_DISTANCES = np.repeat([_NEAR, _FAR], len(_ANGLES))
+_DIRECTIONS = np.tile(np.column_stack([np.cos(_ANGLES), np.sin(_ANGLES)]), (2, 1))
 
 
 class Caption:
@@ -91,20 +88,19 @@ class Caption:
         at = self._view.to_display(self._point[None])[0, :2] - origin
         low, high = np.full(2, _MARGIN), np.array([width, height]) - _MARGIN - box
         low[1] += scale * _FOOT
-        corners, costs = [], []
-        for k, (distance, direction) in enumerate(_PLACES):
-            centre = at + (scale * distance + 0.5 * box) * direction
-            corner = np.clip(centre - 0.5 * box, low, np.maximum(low, high))
-            middle, reach = corner + 0.5 * box, 0.5 * box + size / 4
-            inside = (np.abs(across - middle[0]) < reach[0]) & (np.abs(up - middle[1]) < reach[1])
-            hides_point = (np.abs(at - corner - 0.5 * box) < 0.5 * box + 0.5 * size).all()
-            cost = _POINT * np.count_nonzero(inside) + _FARTHER * (distance == _FAR)
-            cost += _CORNER * (corner + box > [width - _CUBE, height - _CUBE]).all()
-            cost += _OTHER * (self._last not in (None, k)) + (1e6 if hides_point else 0.0)
-            corners.append(corner)
-            costs.append(cost)
-        best = self._last = int(np.argmin(costs))
-        x, y = corners[best]
+        centres = at + (scale * _DISTANCES[:, None] + 0.5 * box) * _DIRECTIONS
+        corners = np.clip(centres - 0.5 * box, low, np.maximum(low, high))
+        middles, reach = corners + 0.5 * box, 0.5 * box + size / 4
+        hidden = np.abs(across - middles[:, :1]) < reach[0]
+        hidden &= np.abs(up - middles[:, 1:]) < reach[1]
+        hides_point = (np.abs(at - middles) < 0.5 * (box + size)).all(axis=1)
+        is_corner = (corners + box > [width - _CUBE, height - _CUBE]).all(axis=1)
+        costs = _POINT * hidden.sum(axis=1) + _FARTHER * (_DISTANCES == _FAR)
+        costs += _CORNER * is_corner + 1e6 * hides_point
+        if self._last is not None:
+            costs += _OTHER * (np.arange(len(costs)) != self._last)
+        self._last = int(costs.argmin())
+        x, y = corners[self._last]
         self._box = float(x), float(y), float(box[0]), float(box[1])
         self._plate.place(*self._box)
         self._words.place(x + 0.5 * size, y + 0.5 * box[1])

@@ -112,13 +112,13 @@ class Markers:
                 ("fill", 1.2 * rim, scale * size, _BLACK, 1.0),
                 ("through", 0.0, scale * size, _BLACK, _THROUGH),
             ):
-                self._dots[is_pin, part].draw(
-                    self._view.lifted(places, lift), colour, width, opacity
-                )
-        chosen = [] if self._highlighted is None else [self._vertices[self._highlighted]]
-        place = self._surface.points[np.array(chosen, dtype=np.int64)]
-        size = _PULLED if self._highlighted in pulls else _PIN
-        self._bright.draw(self._view.lifted(place, 2.0 * scale * size), _HIGHLIGHT, scale * size)
+                lifted = self._view.lifted(places, lift) if ids else places
+                self._dots[is_pin, part].draw(lifted, colour, width, opacity)
+        place, size = np.empty((0, 3)), _PULLED if self._highlighted in pulls else _PIN
+        if self._highlighted is not None:
+            vertex = self._surface.points[[self._vertices[self._highlighted]]]
+            place = self._view.lifted(vertex, 2.0 * scale * size)
+        self._bright.draw(place, _HIGHLIGHT, scale * size)
 
 
 def marked_vertices(session: Session) -> dict[str, int]:
@@ -151,14 +151,16 @@ class _Dots:
         self._actor.SetVisibility(len(places) > 0)
         if not len(places):
             return
-        points, cells = vtkPoints(), vtkCellArray()
+        points = vtkPoints()
         points.SetData(numpy_to_vtk(np.ascontiguousarray(places), deep=True))
-        ids = np.arange(len(places) + 1, dtype=np.int64)
-        cells.SetData(
-            numpy_to_vtkIdTypeArray(ids, deep=True), numpy_to_vtkIdTypeArray(ids[:-1], deep=True)
-        )
+        if len(places) != self._data.GetNumberOfPoints():
+            cells, ids = vtkCellArray(), np.arange(len(places) + 1, dtype=np.int64)
+            cells.SetData(
+                numpy_to_vtkIdTypeArray(ids, deep=True),
+                numpy_to_vtkIdTypeArray(ids[:-1], deep=True),
+            )
+            self._data.SetVerts(cells)
         self._data.SetPoints(points)
-        self._data.SetVerts(cells)
         style = self._actor.GetProperty()
         style.SetColor(*(rgb(colour) / 255.0))
         style.SetPointSize(size)
