@@ -185,6 +185,45 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
 
 
+@pytest.mark.parametrize("size", [5, 6, 7, 24])
+@pytest.mark.parametrize("height", [0.0, 0.05])
+def test_convex_polygons_are_cut_along_their_shortest_diagonals(monkeypatch, size, height):
+    monkeypatch.setattr(polygons, "_clipped", None)  # ears are not clipped
+    rng = np.random.default_rng(size)
+    angle = 2.0 * np.pi * (np.arange(size) + 0.6 * rng.random((30, size))) / size
+    x = np.stack([np.cos(angle), 0.7 * np.sin(angle), height * rng.normal(size=angle.shape)], 2)
+    points, counts = x.reshape(-1, 3) @ TURN, np.full(30, size)
+    corners = np.arange(len(points)).reshape(30, size)
+    corners[::2] = corners[::2, ::-1]
+    faces, owner = cut_into_triangles(points, counts, corners.ravel())
+    assert_array_equal(np.bincount(owner), counts - 2)
+    for k in range(30):
+        own, given = faces[owner == k], points[corners[k]]
+        spoke = given - given[0]
+        total = 0.5 * np.cross(spoke[1:-1], spoke[2:]).sum(axis=0)
+        up = area_vectors(points, own)
+        assert_allclose(up.sum(axis=0), total, atol=1e-14)
+        assert (up @ total > 0.0).all()
+        ends = [points[corners[k][(i + 1) % size]] - points[corners[k][i - 1]] for i in range(size)]
+        shortest = int(np.linalg.norm(ends, axis=1).argmin())
+        cut = corners[k][[shortest - 1, shortest, (shortest + 1) % size]]
+        assert set(cut.tolist()) in [set(face) for face in own.tolist()]
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_others_than_convex_polygons_are_left_to_ear_clipping(name):
+    points = SHAPES[name] @ TURN
+    for corners in (np.arange(len(points)), np.arange(len(points))[::-1]):
+        faces = np.zeros((len(points) - 2, 3), dtype=np.int64)
+        assert not polygons._convex_cuts(faces, points, np.array([len(points)]), corners).any()
+    pentagram = 2 * np.arange(5) % 5
+    ring = 0.4 * np.pi * np.arange(5)
+    round_ = flat(*zip(np.cos(ring), np.sin(ring), strict=True))
+    faces = np.zeros((3, 3), dtype=np.int64)
+    assert polygons._convex_cuts(faces, round_, np.array([5]), np.arange(5)).all()
+    assert not polygons._convex_cuts(faces, round_, np.array([5]), pentagram).any()
+
+
 def test_the_same_corners_in_another_order_are_another_polygon():
     square = flat((0, 0), (1, 0), (1, 1), (0, 1))
     triangles, owner = cut(square, [0, 1, 3, 2], [0, 1, 2, 3])  # the first one crosses itself

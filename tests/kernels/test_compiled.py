@@ -30,6 +30,7 @@ from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gr
 from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import (
     _clipped_ears,
+    _convex_cuts,
     _failed,
     _quad_cuts,
     cut_into_triangles,
@@ -590,6 +591,31 @@ def test_quads_are_cut_alike(twin, monkeypatch, kind):
     )
     assert_array_equal(faces, others)
     assert set(quick.tolist()) >= ({-1, 0, 1, 2} if kind == "whole numbers" else {-1, 0, 1})
+
+
+@pytest.mark.parametrize("kind", ["flat", "bent", "whole numbers", "not finite"])
+def test_convex_polygons_are_cut_alike(twin, monkeypatch, kind):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    rng = np.random.default_rng(4)
+    counts = rng.integers(3, 9, 400)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    angle = 2.0 * np.pi * (number + 0.9 * rng.random(len(number))) / np.repeat(counts, counts)
+    height = (0.2 if kind == "bent" else 0.0) * rng.normal(size=len(angle))
+    points = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
+    if kind == "whole numbers":
+        points = (2.0 * points).round()
+    if kind == "not finite":
+        points[::9] = np.nan, np.inf, 1e200
+
+    def cuts():
+        faces = np.full((int((counts - 2).sum()), 3), -1)
+        return faces, _convex_cuts(faces, points, counts, order)
+
+    order = np.arange(len(points))
+    (quick, some), (slow, others) = twin(cuts)
+    assert_array_equal(quick, slow)
+    assert_array_equal(some, others)
+    assert 20 < some.sum() < 380
 
 
 def test_first_members_are_equal(twin, monkeypatch):

@@ -14,7 +14,7 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
 from ..freezing import read_only
 from ..kernels import compiled_checks, inputs
@@ -26,6 +26,8 @@ _DOWN = -1e-9  # cosine of the normal of a triangle that is upside down, times i
 _NO_COUNTS: IntArray = np.empty(0, dtype=np.int64)
 # Of quads: VTK's filter takes a corner so near the diagonal beside it for one on it, at 1e-6.
 _LEAST_HEIGHT = 1e-5  # in the unit of the points
+_LEAST_SINE = 1e-3  # of the corners of a convex polygon
+_MOST_CORNERS = 24
 _NOT_CUT, _OF_EQUAL_LENGTH = -1, 2
 _CORNERS_OF_CUTS = np.array([[0, 1, 2, 0, 2, 3], *[[0, 1, 3, 1, 2, 3]] * 2])
 
@@ -166,7 +168,7 @@ def cut_into_triangles(
 ) -> tuple[IntArray, IntArray]:
     """Return triangles (m, 3), and the polygon of each, (m,) int, in the order of polygons.
 
-    Convex quads are cut along their shorter diagonal, other polygons by ear clipping, planar ones
+    Convex polygons are cut along their shortest diagonals, others by ear clipping, planar ones
     without overlaps.  Where that fails, as for one that touches or crosses itself, the
     triangulation has the least area.  A polygon that is given again, in either direction, is cut
     like the first one.
@@ -182,7 +184,7 @@ def cut_into_triangles(
     n_triangles[triangles], n_triangles[quads] = 1, np.where(cut == _NOT_CUT, 0, 2)
     is_other = n_triangles == 0
     others = np.flatnonzero(is_other)
-    clipped, owner = _clipped(points, counts[others], corners[np.repeat(is_other, counts)])
+    clipped, owner = _polygon_cuts(points, counts[others], corners[np.repeat(is_other, counts)])
     n_triangles[others] = np.bincount(owner, minlength=len(others))
     polygon, first = np.repeat(number, n_triangles), np.cumsum(n_triangles) - n_triangles
     faces = np.empty((len(polygon), 3), dtype=np.int64)
@@ -248,6 +250,103 @@ def _put_halves(faces: IntArray, first: IntArray, quads: IntArray, cut: NDArray[
 def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
     """Return the dot products of the rows of *u* and *v*, (k,) float."""
     x, y, z = (u * v).T
+    return np.asarray((x + y) + z)
+
+
+def _polygon_cuts(
+    points: FloatArray, counts: IntArray, corners: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return the triangles of polygons, and the polygon of each, in their order."""
+    faces, owner = np.empty((int((counts - 2).sum()), 3), dtype=np.int64), np.arange(len(counts))
+    is_cut = _convex_cuts(faces, points, counts, corners)
+    owner = np.repeat(owner, counts - 2)
+    if is_cut.all():
+        return faces, owner
+    others, kept = np.flatnonzero(~is_cut), is_cut[owner]
+    clipped, polygon = _clipped(points, counts[others], corners[np.repeat(~is_cut, counts)])
+    if len(others) == len(counts):
+        return clipped, polygon
+    faces = np.concatenate([faces[kept], clipped])
+    owner = np.concatenate([owner[kept], others[polygon]])
+    order = np.argsort(owner, kind="stable")
+    return faces[order], owner[order]
+
+
+def _convex_cuts(
+    faces: IntArray, points: FloatArray, counts: IntArray, corners: IntArray
+) -> BoolArray:
+    """Return which polygons are convex, and put their triangles into *faces*.
+
+    Polygon q has ``counts[q] - 2`` rows there.  The ear with the shortest diagonal is cut first.
+    Quads are none, see `_quad_cuts`, and neither are polygons of many corners.
+    """
+    is_cut = np.zeros(len(counts), dtype=bool)
+    some = np.flatnonzero((counts > 4) & (counts <= _MOST_CORNERS))
+    starts, first = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
+    if len(some) and (kernels := compiled_checks(len(corners))):
+        found = np.zeros(len(some), dtype=bool)
+        given = inputs(points, first[some], starts[some], counts[some], corners)
+        kernels.convex_cuts(faces, found, _LEAST_SINE**2, *given)
+        is_cut[some] = found
+        return is_cut
+    for size in np.unique(counts[some]):
+        alike = np.flatnonzero(counts == size)
+        polygons = corners[starts[alike, None] + np.arange(size)]
+        with np.errstate(invalid="ignore", over="ignore"):
+            spokes = np.ascontiguousarray((points[polygons] - points[polygons[:, :1]]).T)
+            is_convex = _are_convex(spokes)
+        alike = alike[is_convex]
+        cut = _ears_of_convex(spokes[:, :, is_convex])
+        at = first[alike][:, None] + np.arange(size - 2)
+        faces[at] = np.take_along_axis(polygons[is_convex], cut, axis=1).reshape(-1, size - 2, 3)
+        is_cut[alike] = True
+    return is_cut
+
+
+def _are_convex(spokes: FloatArray) -> BoolArray:
+    """Return which polygons are convex, with no corner nearly flat.
+
+    *spokes* (3, s, q) are their corners relative to the first ones.
+    """
+    size = spokes.shape[1]
+    corner = [spokes[:, k] for k in range(size)]
+    fan = [_cross(corner[k], corner[k + 1]) for k in range(1, size - 1)]
+    up = sum(fan[1:], fan[0])
+    convex = np.ones(spokes.shape[2], dtype=bool)
+    for each in fan:
+        convex &= _inner(each, up) > 0.0
+    square = _inner(up, up)
+    for k in range(size):
+        after, before = corner[(k + 1) % size] - corner[k], corner[k - 1] - corner[k]
+        height = _inner(_cross(after, before), up)
+        lengths = _inner(after, after) * _inner(before, before)
+        convex &= (height > 0.0) & (height * height >= _LEAST_SINE**2 * (square * lengths))
+    return convex
+
+
+def _ears_of_convex(spokes: FloatArray) -> IntArray:
+    """Return the corners (q, 3 (s - 2)) of the triangles of convex polygons, 0 to s - 1."""
+    places = list(spokes.transpose(1, 0, 2))
+    ring = list(np.indices(spokes.shape[1:])[0])
+    cut = []
+    while (left := len(ring)) > 3:
+        ends = [places[(k + 1) % left] - places[k - 1] for k in range(left)]
+        ear = np.argmin([_inner(step, step) for step in ends], axis=0)
+        cut += [np.choose((ear + k) % left, ring) for k in (-1, 0, 1)]
+        for kept in range(left - 1):
+            is_after = ear <= kept
+            ring[kept] = np.where(is_after, ring[kept + 1], ring[kept])
+            places[kept] = np.where(is_after, places[kept + 1], places[kept])
+        del ring[-1], places[-1]
+    return np.column_stack([*cut, *ring])
+
+
+def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
+    return np.stack([u[k - 2] * v[k - 1] - u[k - 1] * v[k - 2] for k in range(3)])
+
+
+def _inner(u: FloatArray, v: FloatArray) -> FloatArray:
+    x, y, z = u * v
     return np.asarray((x + y) + z)
 
 

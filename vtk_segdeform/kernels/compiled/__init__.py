@@ -51,6 +51,7 @@ from .text import (
     rows_of_lists,
 )
 from .triangles import (
+    convex_cuts,
     face_areas,
     first_equal_points,
     flat_faces,
@@ -78,6 +79,7 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "convex_cuts",
     "corners_of_lines",
     "determinants",
     "distances_inside",

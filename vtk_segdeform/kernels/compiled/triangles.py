@@ -148,6 +148,65 @@ def quad_cuts(cut, square, points, quads):
 
 
 @_compile
+def convex_cuts(faces, is_cut, least, points, first, starts, counts, corners):
+    """Put into *is_cut* (q,) which polygons are convex, and into *faces* (k, 3) their triangles.
+
+    Polygon q has the corners from ``starts[q]`` and the rows from ``first[q]``; those of polygons
+    that are not convex are not changed.  The ear with the shortest diagonal is cut first, of equal
+    ones the first.  *least* is the square of the least sine of a corner.
+    """
+    spoke = np.empty((counts.max() if len(counts) else 0, 3))
+    ring = np.empty(len(spoke), dtype=np.int64)
+    for q in range(len(counts)):
+        n, start, row = counts[q], starts[q], first[q]
+        ux = uy = uz = 0.0
+        for k in range(n):
+            ring[k] = k
+            for d in range(3):
+                spoke[k, d] = points[corners[start + k], d] - points[corners[start], d]
+        for k in range(1, n - 1):
+            a, b = spoke[k], spoke[k + 1]
+            ux += a[1] * b[2] - a[2] * b[1]
+            uy += a[2] * b[0] - a[0] * b[2]
+            uz += a[0] * b[1] - a[1] * b[0]
+        size = (ux * ux + uy * uy) + uz * uz
+        convex = True
+        for k in range(1, n - 1):
+            a, b = spoke[k], spoke[k + 1]
+            x, y = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2]
+            z = a[0] * b[1] - a[1] * b[0]
+            convex &= (x * ux + y * uy) + z * uz > 0.0
+        for k in range(n):
+            here, after, before = spoke[k], spoke[(k + 1) % n], spoke[k - 1 if k else n - 1]
+            ax, ay, az = after[0] - here[0], after[1] - here[1], after[2] - here[2]
+            bx, by, bz = before[0] - here[0], before[1] - here[1], before[2] - here[2]
+            x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+            up = (x * ux + y * uy) + z * uz
+            lengths = ((ax * ax + ay * ay) + az * az) * ((bx * bx + by * by) + bz * bz)
+            convex &= up > 0.0 and up * up >= least * (size * lengths)
+        is_cut[q] = convex
+        left = n if convex else 0
+        while left > 3:
+            shortest, ear = np.inf, 0
+            for k in range(left):
+                a, b = spoke[ring[k - 1 if k else left - 1]], spoke[ring[(k + 1) % left]]
+                x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+                length = (x * x + y * y) + z * z
+                if length < shortest:
+                    shortest, ear = length, k
+            faces[row, 0] = corners[start + ring[ear - 1 if ear else left - 1]]
+            faces[row, 1] = corners[start + ring[ear]]
+            faces[row, 2] = corners[start + ring[(ear + 1) % left]]
+            row += 1
+            left -= 1
+            for k in range(ear, left):
+                ring[k] = ring[k + 1]
+        if convex:
+            for k in range(3):
+                faces[row, k] = corners[start + ring[k]]
+
+
+@_compile
 def quad_halves(faces, first, quads, cut):
     """Put the two triangles of each of *quads* (q, 4) into *faces*, at *first* (q,) and after it.
 
