@@ -2,6 +2,8 @@
 
 counts[k] is the number of corners of polygon k; corners has the vertex indices of one polygon after
 another.  Triangles are polygons with counts of 3.
+
+Long because the compiled passes that cut polygons have their equivalents in numpy beside them.
 """
 
 from __future__ import annotations
