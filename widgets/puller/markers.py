@@ -148,6 +148,7 @@ class _Dots:
         renderer.AddActor(self._actor)
 
     def draw(self, places: FloatArray, colour: str, size: float, opacity: float = 1.0) -> None:
+        """Show discs of *size* pixels at *places* (k, 3); none hides them."""
         self._actor.SetVisibility(len(places) > 0)
         if not len(places):
             return
