@@ -19,6 +19,14 @@ from solids import OCTAHEDRON, icosphere, together, torus
 from vtk_segdeform import Mesh, Surface, models, sizes
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.cages.mean_value import mean_value_coordinates
+from vtk_segdeform.cages.simplify import (
+    _NO_EDGES,
+    _accumulated,
+    _costs,
+    _independent,
+    _valid,
+    simplify,
+)
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
 from vtk_segdeform.errors import Cancelled, MeshError
@@ -616,6 +624,37 @@ def test_convex_polygons_are_cut_alike(twin, monkeypatch, kind):
     assert_array_equal(quick, slow)
     assert_array_equal(some, others)
     assert 20 < some.sum() < 380
+
+
+@pytest.mark.parametrize("density", [None, 2.0])
+@pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
+def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, density):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    ball, ball_faces = icosphere(2)
+    vertices, faces = together(torus(24, 12), (ball + [4.0, 0.0, 0.0], ball_faces))
+    vertices = vertices * [1.0, 1.0, length]
+    vertices += 0.05 * np.random.default_rng(3).normal(size=vertices.shape)
+    weights = None if density is None else density ** vertices[:, 0]
+    quick, slow = twin(lambda: simplify(vertices, faces, n, density=weights))
+    for one, other in zip(quick, slow, strict=True):
+        assert_array_equal(one, other)
+    assert len(quick[0]) == n if n > 20 else 8 < len(quick[0]) < 40
+
+
+def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    vertices, faces = icosphere(3)
+    surface = _accumulated(vertices, faces, None)
+    edges, cost = _costs(surface, _NO_EDGES, np.ones(len(vertices), dtype=bool))
+    chosen = edges.taken(_independent(edges, cost, len(vertices)))
+    last = dict(zip(faces.ravel().tolist(), np.arange(faces.size), strict=True))
+    face, corner = np.divmod([last[v] for v in chosen.i.tolist()], 3)
+    p, q = (vertices[faces[face, (corner + k) % 3]] for k in (1, 2))
+    height = np.geomspace(1e-4, 1.0, len(face))[:, None]  # over the opposite edge of a face
+    to = chosen._replace(place=0.5 * (p + q) + height * (vertices[chosen.i] - 0.5 * (p + q)))
+    quick, slow = twin(lambda: _valid(surface, to))
+    assert_array_equal(quick, slow)
+    assert 0 < quick.sum() < len(quick)
 
 
 def test_first_members_are_equal(twin, monkeypatch):

@@ -30,11 +30,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..kernels import compiled_checks, inputs, scratch
 from ..mesh import cross_rows
 from ..progress import Progress, tell
 
@@ -50,12 +51,9 @@ _TURN = 0.3  # cosine of the largest rotation of a face
 class _Surface:
     points: FloatArray
     faces: IntArray
-    area: FloatArray
-    need: FloatArray  # integral of the relative density over the accumulated area
-    # Q(p) = p'A p - 2 b'p + c, accumulated in each vertex
-    A: FloatArray
-    b: FloatArray
-    c: FloatArray
+    # (n, 12), accumulated in each vertex: xx, xy, xz, yy, yz, zz of A, then b and c of
+    # Q(p) = p'A p - 2 b'p + c, the area a, and the integral of the relative density over it
+    sums: FloatArray
 
 
 class _Edges(NamedTuple):
@@ -70,6 +68,10 @@ class _Edges(NamedTuple):
     def taken(self, at: IntArray | BoolArray) -> _Edges:
         """Return some of them."""
         return _Edges(self.i[at], self.j[at], self.key[at], self.cost[at], self.place[at])
+
+
+_NONE: IntArray = np.empty(0, dtype=np.int64)
+_NO_EDGES = _Edges(_NONE, _NONE, _NONE, np.empty(0), np.empty((0, 3)))
 
 
 def simplify(
@@ -108,10 +110,10 @@ def simplify(
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     rejected = np.empty(0, dtype=np.int64)
     collapsed = 0
-    known = None
+    known, is_moved = _NO_EDGES, np.ones(len(vertices), dtype=bool)
     while left > n_vertices:
         tell(progress, math.log(len(vertices) / left) / reduction, message)
-        edges, cost = _costs(surface, known)
+        edges, cost = _costs(surface, known, is_moved)
         at = np.searchsorted(edges.key, rejected).clip(max=len(cost) - 1)
         cost[at[edges.key[at] == rejected]] = np.inf
         chosen = edges.taken(_independent(edges, cost, len(vertices))[: left - n_vertices])
@@ -122,7 +124,7 @@ def simplify(
             rejected = np.concatenate([rejected, chosen.key[~done]])
             is_moved = np.zeros(len(vertices), dtype=bool)
             is_moved[chosen.i[done]] = is_moved[chosen.j[done]] = True
-            known = edges.taken(~(is_moved[edges.i] | is_moved[edges.j])), is_moved
+            known = edges
         elif collapsed:  # rejected edges may be valid now that their neighbourhoods changed
             rejected, collapsed = rejected[:0], 0
         else:
@@ -142,61 +144,68 @@ def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | No
     normal = cross_rows(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     twice_area = np.linalg.norm(normal, axis=1)
     normal /= np.maximum(twice_area, np.finfo(float).tiny)[:, None]
-    level = np.einsum("fi,fi->f", normal, corners[:, 0])
+    (x, y, z), d = normal.T, _dot(normal, corners[:, 0])
+    terms = x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d, np.ones_like(d)
     share, at = np.repeat(twice_area / 6.0, 3), faces.ravel()
-    n, d = np.repeat(normal, 3, axis=0), np.repeat(level, 3)
-    terms = np.concatenate(
-        [[np.ones_like(d), d * d], n.T * d, np.einsum("ki,kj->ijk", n, n).reshape(9, -1)]
-    )
-    area, c, *rest = (
-        np.asarray(np.bincount(at, share * term, minlength=len(vertices)), dtype=np.float64)
-        for term in terms
-    )
-    b, A = np.stack(rest[:3], axis=1), np.stack(rest[3:], axis=1).reshape(-1, 3, 3)
-    need = area.copy() if density is None else area * density
-    return _Surface(vertices.copy(), faces.copy(), area, need, A, b, c)
+    sums = np.empty((len(vertices), 12))
+    for k, term in enumerate(terms):
+        sums[:, k] = np.bincount(at, share * np.repeat(term, 3), minlength=len(vertices))
+    sums[:, 11] = sums[:, 10] if density is None else sums[:, 10] * density
+    return _Surface(vertices.copy(), faces.copy(), sums)
 
 
-def _costs(s: _Surface, known: tuple[_Edges, BoolArray] | None) -> tuple[_Edges, FloatArray]:
+def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, FloatArray]:
     """Return all edges, and their costs or infinity where a collapse is invalid.
 
-    *known* are the edges between vertices that have not moved since, and which vertices have.
+    *known* are those of the round before, *is_moved* which vertices have moved since.
     """
-    tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
-    up = tail < head
-    n = len(s.points)
-    key = tail[up] * n + head[up]
-    order = np.argsort(key)
-    reverse = np.argsort(head[~up] * n + tail[~up])
-    key, i, j = key[order], tail[up][order], head[up][order]
-    edges = _Edges(i, j, key, np.empty(len(i)), np.empty((len(i), 3)))
-    fresh: Any = slice(None)
-    if known is not None:
-        old, is_moved = known
+    n, m = len(s.points), 3 * len(s.faces) // 2
+    edges = _Edges(*np.empty((3, m), dtype=np.int64), np.empty(m), np.empty((m, 3)))
+    i, j, key, cost, place = edges
+    kernels = compiled_checks(len(s.faces))
+    if kernels:
+        ends = np.empty((m, 2), dtype=np.int64)
+        kernels.sorted_edges(i, j, ends, *scratch(np.int64, n + 2, 2 * m, 2 * m), *inputs(s.faces))
+        read = inputs(i, j, known.i, known.j, known.cost, known.place, is_moved)
+        kernels.collapse_costs(cost, place, *read, _STIFFNESS, _LAMBDA, *inputs(s.points, s.sums))
+    else:
+        tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
+        up = tail < head
+        order = np.argsort(tail[up] * n + head[up], kind="stable")
+        reverse = np.argsort(head[~up] * n + tail[~up], kind="stable")
+        i[:], j[:] = tail[up][order], head[up][order]
+        ends = np.stack([apex[up][order], apex[~up][reverse]], axis=1)
         fresh = is_moved[i] | is_moved[j]
-        edges.cost[~fresh], edges.place[~fresh] = old.cost, old.place
-    edges.cost[fresh], edges.place[fresh] = _cost(s, i[fresh], j[fresh])
-    valence = np.bincount(s.faces.ravel())
-    ends = np.minimum(valence[apex[up][order]], valence[apex[~up][reverse]])
-    return edges, np.where(ends <= 3, np.inf, edges.cost)
+        left = ~(is_moved[known.i] | is_moved[known.j])
+        cost[~fresh], place[~fresh] = known.cost[left], known.place[left]
+        cost[fresh], place[fresh] = _cost(s, i[fresh], j[fresh])
+    key[:] = i * n + j
+    few = np.bincount(s.faces.ravel()) <= 3
+    return edges, np.where(few[ends[:, 0]] | few[ends[:, 1]], np.inf, cost)
 
 
 def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
-    middle = 0.5 * (s.points[i] + s.points[j])
-    A, b, c = s.A[i] + s.A[j], s.b[i] + s.b[j], s.c[i] + s.c[j]
-    stiffness = _STIFFNESS * (A[:, 0, 0] + A[:, 1, 1] + A[:, 2, 2])
+    xx, xy, xz, yy, yz, zz, bx, by, bz, c, area, need = (s.sums[i] + s.sums[j]).T
+    x, y, z = (0.5 * (s.points[i] + s.points[j])).T
+    more = _STIFFNESS * ((xx + yy) + zz)
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
-    pull = b - np.einsum("eij,ej->ei", A, middle)
-    x, y, z = (A + stiffness[:, None, None] * np.eye(3)).transpose(1, 0, 2)
-    yz = cross_rows(y, z)
-    inverse = np.stack([yz, cross_rows(z, x), cross_rows(x, y)], axis=1)
-    place = middle + np.einsum("eij,ej->ei", inverse, pull) / np.einsum("ei,ei->e", x, yz)[:, None]
-    error = np.einsum("eij,ei,ej->e", A, place, place) - 2 * np.einsum("ei,ei->e", b, place) + c
-    area = s.area[i] + s.area[j]
-    cost = error + _LAMBDA * area * _squared(s.points[i] - s.points[j])
-    cost *= ((s.need[i] + s.need[j]) / area) ** 2
-    return cost, place
+    pull_x = bx - ((xx * x + xy * y) + xz * z)
+    pull_y = by - ((xy * x + yy * y) + yz * z)
+    pull_z = bz - ((xz * x + yz * y) + zz * z)
+    p, q, r = xx + more, yy + more, zz + more
+    a00, a01, a02 = q * r - yz * yz, yz * xz - xy * r, xy * yz - q * xz
+    a11, a12, a22 = r * p - xz * xz, xz * xy - yz * p, p * q - xy * xy
+    volume = (p * a00 + xy * a01) + xz * a02
+    x = x + ((a00 * pull_x + a01 * pull_y) + a02 * pull_z) / volume
+    y = y + ((a01 * pull_x + a11 * pull_y) + a12 * pull_z) / volume
+    z = z + ((a02 * pull_x + a12 * pull_y) + a22 * pull_z) / volume
+    quadratic = ((xx * x + xy * y) + xz * z) * x + ((xy * x + yy * y) + yz * z) * y
+    quadratic += ((xz * x + yz * y) + zz * z) * z
+    error = (quadratic - 2.0 * ((bx * x + by * y) + bz * z)) + c
+    d = s.points[i] - s.points[j]
+    cost = (error + _LAMBDA * area * _dot(d, d)) * (need / area) ** 2
+    return cost, np.stack([x, y, z], axis=1)
 
 
 def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
@@ -210,6 +219,11 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     if len(cheapest) > most:
         cheapest = cheapest[cost[cheapest] <= np.partition(cost[cheapest], most - 1)[most - 1]]
     cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]
+    if kernels := compiled_checks(len(cost)):
+        found = np.empty(len(cheapest), dtype=np.int64)
+        room = (*scratch(np.int64, n, n), *np.empty((2, n), dtype=bool))
+        count = kernels.independent_edges(found, *inputs(cheapest), _PASSES, *room, *inputs(i, j))
+        return np.asarray(found[:count])
     chosen = [cheapest[:0]]
     taken = np.zeros(n, dtype=bool)
     for _ in range(_PASSES):
@@ -236,9 +250,30 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
 
 def _collapse(s: _Surface, edges: _Edges) -> BoolArray:
     """Collapse the valid ones of *edges*, and return which were, (k,) bool."""
+    good = _valid(s, edges)
+    i, j = edges.i[good], edges.j[good]
+    s.points[i] = edges.place[good]
+    s.sums[i] += s.sums[j]
+    number = np.arange(len(s.points))
+    number[j] = i
+    faces = number[s.faces]
+    a, b, c = faces.T
+    s.faces = faces[(a != b) & (b != c) & (c != a)]
+    return good
+
+
+def _valid(s: _Surface, edges: _Edges) -> BoolArray:
+    """Return which of *edges* can be collapsed, (k,) bool."""
     i, j, place = edges.i, edges.j, edges.place
     owner = np.full(len(s.points), -1)
     owner[i] = owner[j] = np.arange(len(i))
+    if kernels := compiled_checks(len(s.faces)):
+        good, common = np.empty(len(i), dtype=bool), np.zeros(len(i), dtype=np.int64)
+        count, of = np.zeros_like(owner), np.empty_like(owner)
+        least = np.full(len(i), np.inf), np.full(len(i), _ROUNDNESS)
+        read = inputs(place, s.points, s.faces)
+        kernels.valid_collapses(good, *inputs(owner), count, of, common, *least, _TURN, *read)
+        return good
     moved = s.points.copy()
     moved[i] = moved[j] = place
 
@@ -263,19 +298,9 @@ def _collapse(s: _Surface, edges: _Edges) -> BoolArray:
     of_face = of_corner[kept].max(axis=1)
     worst = np.full(len(i), _ROUNDNESS)
     np.minimum.at(worst, of_face, old_roundness)
-    fine = np.einsum("fi,fi->f", before, after) > _TURN
+    fine = _dot(before, after) > _TURN
     fine &= new_roundness >= worst[of_face]
     good[of_face[~fine]] = False
-
-    i, j = i[good], j[good]
-    s.points[i] = place[good]
-    for accumulated in (s.A, s.b, s.c, s.area, s.need):
-        accumulated[i] += accumulated[j]
-    number = np.arange(len(owner))
-    number[j] = i
-    faces = number[s.faces]
-    a, b, c = faces.T
-    s.faces = faces[(a != b) & (b != c) & (c != a)]
     return np.asarray(good)
 
 
@@ -283,13 +308,13 @@ def _normals(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the unit normals of triangles and their roundness."""
     a, b, c = corners.transpose(1, 0, 2)
     normal = cross_rows(b - a, c - a)
-    twice_area = np.linalg.norm(normal, axis=1)
+    twice_area = np.sqrt(_dot(normal, normal))
     x, y, z = ((b - a) ** 2 + (c - b) ** 2 + (a - c) ** 2).T
     normal /= np.maximum(twice_area, np.finfo(float).tiny)[:, None]
     return normal, 2.0 * np.sqrt(3.0) * twice_area / np.maximum((x + y) + z, np.finfo(float).tiny)
 
 
-def _squared(a: FloatArray) -> FloatArray:
-    """Return the squared lengths of (n, 3) vectors."""
-    x, y, z = (a**2).T
+def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the dot products of (n, 3) vectors."""
+    x, y, z = (a * b).T
     return np.asarray((x + y) + z)

@@ -8,6 +8,7 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`
     factor          `hessian.Factor`
+    collapses       `simplify.simplify`
     half_edges      `topology.HalfEdges`, `grouping.connected`,
                     `grouping.first_members`, `Mesh.adjacency`
     pairs           `contact.Contact`
@@ -23,6 +24,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .beams import beam_meets, beyond_sides
+from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .factor import solve_factored
 from .half_edges import (
     border_half_edges,
@@ -79,6 +81,7 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "collapse_costs",
     "convex_cuts",
     "corners_of_lines",
     "determinants",
@@ -91,6 +94,7 @@ __all__ = [
     "first_equal_points",
     "first_members",
     "flat_faces",
+    "independent_edges",
     "interpolated_rows",
     "link",
     "link_corners",
@@ -111,7 +115,9 @@ __all__ = [
     "shell_boxes",
     "shell_sums",
     "solve_factored",
+    "sorted_edges",
     "used_vertices",
+    "valid_collapses",
     "volume_along_sums",
     "volume_gradient",
     "volume_sums",
