@@ -160,8 +160,9 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
     *known* are those of the round before, *is_moved* which vertices have moved since.
     """
     n, m = len(s.points), 3 * len(s.faces) // 2
-    edges = _Edges(*np.empty((3, m), dtype=np.int64), np.empty(m), np.empty((m, 3)))
-    i, j, key, cost, place = edges
+    i, j, key = np.empty((3, m), dtype=np.int64)
+    cost, place = np.empty(m), np.empty((m, 3))
+    edges = _Edges(i, j, key, cost, place)
     kernels = compiled_checks(len(s.faces))
     if kernels:
         ends = np.empty((m, 2), dtype=np.int64)
@@ -222,7 +223,7 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     if kernels := compiled_checks(len(cost)):
         found = np.empty(len(cheapest), dtype=np.int64)
         room = (*scratch(np.int64, n, n), *np.empty((2, n), dtype=bool))
-        count = kernels.independent_edges(found, *inputs(cheapest), _PASSES, *room, *inputs(i, j))
+        count = kernels.independent_edges(found, cheapest, _PASSES, *room, *inputs(i, j))
         return np.asarray(found[:count])
     chosen = [cheapest[:0]]
     taken = np.zeros(n, dtype=bool)

@@ -128,44 +128,47 @@ def collapse_costs(
 def independent_edges(chosen, cheap, passes, least, near, reach, beyond, i, j):
     """Put edges of *cheap* (c,), in ascending order of cost, into *chosen*; return how many.
 
-    *least*, *near* (n,) int64 and *reach*, *beyond* (n,) bool are of any values.
+    *cheap* is overwritten; *least*, *near* (n,) int64 and *reach*, *beyond* (n,) bool are of any
+    values.
     """
-    most, count = len(i), 0
-    reach[:] = False
-    left = np.arange(len(cheap))
+    n, most, count, left = len(least), len(i), 0, len(cheap)
     for _ in range(passes):
-        least[:] = most
-        for rank in range(len(left)):
-            e = cheap[left[rank]]
+        for v in range(n):
+            least[v], reach[v] = most, False
+        for rank in range(left):
+            e = cheap[rank]
             least[i[e]] = min(least[i[e]], rank)
             least[j[e]] = min(least[j[e]], rank)
         for _ in range(2):
-            near[:] = least
+            for v in range(n):
+                near[v] = least[v]
             for e in range(most):
                 near[i[e]] = min(near[i[e]], least[j[e]])
                 near[j[e]] = min(near[j[e]], least[i[e]])
-            least[:] = near
-        for rank in range(len(left)):
-            e = cheap[left[rank]]
+            for v in range(n):
+                least[v] = near[v]
+        for rank in range(left):
+            e = cheap[rank]
             if min(least[i[e]], least[j[e]]) == rank:
                 chosen[count] = e
                 count += 1
-        reach[:] = False
         for k in range(count):
             reach[i[chosen[k]]] = reach[j[chosen[k]]] = True
         for _ in range(2):
-            beyond[:] = reach
+            for v in range(n):
+                beyond[v] = reach[v]
             for e in range(most):
                 if reach[i[e]] or reach[j[e]]:
                     beyond[i[e]] = beyond[j[e]] = True
-            reach[:] = beyond
+            for v in range(n):
+                reach[v] = beyond[v]
         kept = 0
-        for rank in range(len(left)):
-            e = cheap[left[rank]]
+        for rank in range(left):
+            e = cheap[rank]
             if not (reach[i[e]] or reach[j[e]]):
-                left[kept] = left[rank]
+                cheap[kept] = e
                 kept += 1
-        left = left[:kept]
+        left = kept
     return count
 
 
