@@ -95,6 +95,7 @@ def test_a_frame_ends_where_the_next_step_moves_hardly_anything(task, deformer):
     ]
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("steady")
 def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, deformer):
     before = GaussNewton.minimise
@@ -150,6 +151,7 @@ def test_the_segmentation_study_has_a_row_for_each_number_of_regions():
     assert all("n_regions=None" in words for words in section.text)
 
 
+@pytest.mark.campaign
 def test_only_the_case_that_lets_the_volume_go_changes_it(monkeypatch, task):
     cases = {"preserved": (3, {}), "not preserved": (3, {"preserve_volume": False})}
     monkeypatch.setattr(experiments, "figures_of", lambda _: {"figure 7": (task, cases)})
@@ -162,6 +164,7 @@ def test_only_the_case_that_lets_the_volume_go_changes_it(monkeypatch, task):
     assert len(section.figures) == len(section.tables) == 1
 
 
+@pytest.mark.campaign
 def test_peers_that_are_absent_are_named_with_a_reason():
     section = peers.run(TINY)
     (table,) = section.tables
@@ -197,6 +200,7 @@ def test_libigl_is_asked_until_it_rests(monkeypatch, task):
     assert np.abs(answer.vertices[task.handle] - task.targets).max() < 1e-12
 
 
+@pytest.mark.campaign
 def test_cages_are_judged_and_vtk_agrees_on_the_coordinates():
     section = cage_making.run(TINY)
     cages, coordinates = section.tables
@@ -358,6 +362,7 @@ def test_the_history_is_plotted_by_ratio_and_machine(tmp_path, monkeypatch):
         history.plot_history([], tmp_path / "history.png")
 
 
+@pytest.mark.campaign
 def test_small_multiples_have_a_panel_for_each_quantity(tmp_path, monkeypatch):
     figures = []
     pytest.importorskip("matplotlib")

@@ -198,6 +198,7 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
     assert (bent.vertices - rest.vertices)[tip, 0].mean() > 0.3 * rest.vertices[:, 2].max()
 
 
+@pytest.mark.campaign
 def test_the_bench_of_pulls_reports_their_frames_and_errors():
     from vtk_segdeform.cli.live_pulls import pull_table
 
@@ -209,6 +210,7 @@ def test_the_bench_of_pulls_reports_their_frames_and_errors():
     assert 0.0 <= float(row["lag %"]) < 0.5
 
 
+@pytest.mark.campaign
 def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event():
     pytest.importorskip("pyvista")
     from vtk_segdeform.cli.interactive import interactive_table

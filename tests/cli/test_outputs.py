@@ -6,6 +6,7 @@ import os
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models, read_mesh
@@ -146,7 +147,7 @@ def test_a_name_that_is_too_long_is_an_error_that_names_it(capsys, words):
 
 
 @posix
-@pytest.mark.parametrize("stem", [b"n" * 251, b"\xff\xfe", "Körper 身体".encode()])
+@pytest.mark.parametrize("stem", every(2, [b"n" * 251, b"\xff\xfe", "Körper 身体".encode()]))
 def test_every_name_that_the_system_allows_can_be_read_and_written(folder, capsys, stem):
     name, out = (os.fsdecode(stem[: 251 - len(end)] + end) for end in (b"", b"2"))
     os.rename("bar.ply", f"{name}.ply")

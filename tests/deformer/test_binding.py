@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from solids import icosphere, together
@@ -88,7 +89,8 @@ def test_options_that_binding_does_not_depend_on_find_the_same(tmp_path, counted
 
 
 @pytest.mark.parametrize(
-    "damage", ["cut", "empty", "other", "flipped", "an array", "encrypted", "compressed", "header"]
+    "damage",
+    every(2, ["cut", "empty", "flipped", "other", "an array", "encrypted", "header", "compressed"]),
 )
 def test_a_damaged_file_is_ignored(tmp_path, counted, damage):
     sound = SCENE.deformer(cache=tmp_path).solve(TARGETS)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import exact_volume_change, icosphere, rotation
@@ -39,7 +40,7 @@ def test_without_fixed_vertices_a_rigid_motion_of_the_handle_moves_the_mesh_rigi
     assert_allclose(solution.vertices, VERTICES @ turn.T + [0.5, 0, 0], atol=1e-4)
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("scale", every(2, [1e-3, 1.0, 1e3]))
 def test_rotating_and_scaling_the_scene_rotates_and_scales_the_pose(scale):
     turn = rotation([1, 2, 3], 1.2)
     targets = SCENE.turned(50)
@@ -60,7 +61,7 @@ def test_far_from_the_origin_a_pose_is_rounded_to_the_coordinates_only():
     assert abs(moved.volume_change) < 1e-12
 
 
-@pytest.mark.parametrize("diagonals", [0.0, 10.0, 1e3, 1e5, 1e7])
+@pytest.mark.parametrize("diagonals", every(3, [0.0, 10.0, 1e3, 1e5, 1e7]))
 def test_the_volume_change_is_that_of_the_returned_vertices_at_any_distance(diagonals):
     shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
     scene = SCENE.transformed(shift=shift)
@@ -278,7 +279,7 @@ def test_a_target_in_another_unit_is_refused():
         SCENE.held().solve(REST + 1e200)
 
 
-@pytest.mark.parametrize("way", [(1.0, 0.9, -0.8), (0.0, 1.0, 0.0)])
+@pytest.mark.parametrize("way", every(2, [((1.0, 0.9, -0.8),), ((0.0, 1.0, 0.0),)]))
 def test_the_volume_is_exact_for_targets_as_far_apart_as_allowed(way):
     coarse = sausage(2, is_coarse=True)
     both = np.concatenate([coarse.fixed, coarse.handle])
@@ -295,6 +296,7 @@ def test_the_volume_is_exact_for_targets_as_far_apart_as_allowed(way):
         deformer.solve(rest + 10.5 * far)
 
 
+@pytest.mark.campaign
 def test_a_whole_mesh_may_move_far():
     scene = replace(SCENE, fixed=SCENE.fixed[:0])
     away = np.array([0.0, 100.0, 0.0]) * SCENE.mesh.diagonal

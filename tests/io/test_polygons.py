@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
@@ -55,7 +56,7 @@ def area_vectors(points, triangles):
 
 
 @pytest.mark.parametrize("name", SHAPES)
-@pytest.mark.parametrize("scale", [1.0, 1e-6, 1e6])
+@pytest.mark.parametrize("scale", every(3, [1.0, 1e-6, 1e6]))
 def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, scale):
     points = scale * SHAPES[name] @ TURN
     n = len(points)

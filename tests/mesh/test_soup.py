@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
@@ -257,7 +258,7 @@ def hostile(rng):
     return vertices, rng.permutation(faces)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", every(2, range(4)))
 def test_any_triangles_with_a_face_that_is_not_flat_become_a_mesh(seed):
     rng = np.random.default_rng(seed)
     for _ in range(40):

@@ -13,7 +13,8 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.models.implicit import Limb, implicit_surface
 
 BODIES = [
-    (models.cactus, 500), (models.cactus, 5430), (models.dinosaur, 1000),
+    (models.cactus, 500), (models.dinosaur, 1000),
+    pytest.param((models.cactus, 5430), marks=pytest.mark.campaign),
     pytest.param((models.cactus, 20_003), marks=pytest.mark.campaign),
     pytest.param((models.dinosaur, 4000), marks=pytest.mark.campaign),
 ]  # fmt: skip
@@ -85,6 +86,7 @@ def test_more_vertices_give_the_same_body():
     assert volumes[0] == pytest.approx(volumes[1], rel=0.01)
 
 
+@pytest.mark.campaign
 def test_the_ribs_run_along_the_trunk():
     mesh = models.cactus(5430)
     belt = mesh.vertices[(mesh.vertices[:, 2] > 0.15) & (mesh.vertices[:, 2] < 0.25)]

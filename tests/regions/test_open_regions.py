@@ -20,7 +20,7 @@ def pieces(mesh, members):
     return csgraph.connected_components(graph, directed=False)[0]
 
 
-@pytest.mark.parametrize("name", every(2, SHEETS))
+@pytest.mark.parametrize("name", every(4, SHEETS))
 def test_any_surface_is_segmented_into_connected_regions(name):
     mesh = mesh_of(name)
     components = mesh.components.max() + 1

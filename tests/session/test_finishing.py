@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from sheets import plate
@@ -85,7 +86,7 @@ def open_sheet() -> Session:
     return session
 
 
-@pytest.mark.parametrize("make", [ready, two_parts, open_sheet])
+@pytest.mark.parametrize("make", every(2, [ready, two_parts, open_sheet]))
 def test_a_drag_goes_on_from_a_finished_pose_without_a_jump(make):
     session = dragged(make(), -0.6)
     other = dragged(make(), -0.6)
@@ -243,6 +244,7 @@ def pulled(session: Session, vertex: int, by: float, **options: float) -> None:
     session.commit()
 
 
+@pytest.mark.campaign
 def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     session = ready()
     session.remove_handle("tip")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
@@ -73,7 +74,7 @@ BEFORE: dict[str, Callable[[Session], object]] = {
 
 
 @pytest.mark.parametrize("locality", [None, 1.0])
-@pytest.mark.parametrize("before", BEFORE)
+@pytest.mark.parametrize("before", every(2, BEFORE))
 def test_nothing_moves_at_the_press(before, locality):
     session = pulled()
     BEFORE[before](session)
@@ -246,7 +247,7 @@ def test_a_matrix_turns_the_surface_around_the_point():
     assert not session.can_undo
 
 
-@pytest.mark.parametrize("share", [0.35, 0.7])
+@pytest.mark.parametrize("share", every(2, [0.7, 0.35]))
 def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
     radius = 0.3 * D
     session = pulled(TIP, 2.0 * UP)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import bottle
 from scenes import sausage
@@ -131,7 +132,7 @@ def test_the_coarse_surface_of_a_closed_mesh_is_closed():
 
 
 @pytest.mark.usefixtures("coarse")
-@pytest.mark.parametrize("option", ["preserve_volume", "preserve_region_volumes"])
+@pytest.mark.parametrize("option", every(2, ["preserve_region_volumes", "preserve_volume"]))
 def test_the_pose_is_near_that_with_the_whole_mesh_and_its_volume_exact(monkeypatch, option):
     targets = SCENE.turned(40)
     rough = SCENE.deformer(**{option: True}).solve(targets)

@@ -77,6 +77,7 @@ def test_acceleration_and_the_exact_hessian_each_save_steps_and_find_the_same_po
         assert solution.steps < 0.5 * plain.steps
 
 
+@pytest.mark.campaign
 def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
     options = {"rotation_groups": None, "tolerance": 1e-8, "max_steps": 5000}
     targets = SCENE.turned(30)

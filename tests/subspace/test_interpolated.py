@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from scipy import sparse
@@ -74,6 +75,7 @@ def test_products_are_those_of_the_rows_compiled_or_not(monkeypatch, subspace, c
     assert_allclose(averaged.at(np.arange(7)), mean @ rows, atol=1e-10)
 
 
+@pytest.mark.campaign
 def test_a_cage_too_close_for_a_coarse_grid_gets_a_finer_one_or_none(monkeypatch, exact, subspace):
     pairs = zip(subspace.blocks, exact.blocks, strict=True)
     error = max(np.abs(block[:] - exact).sum(axis=1).max() for block, exact in pairs)
@@ -85,7 +87,7 @@ def test_a_cage_too_close_for_a_coarse_grid_gets_a_finer_one_or_none(monkeypatch
     assert not any(isinstance(b, InterpolatedBlock) for b in SCENE.deformer().subspace.blocks)
 
 
-@pytest.mark.parametrize("region_volumes", [False, True])
+@pytest.mark.parametrize("region_volumes", every(2, [True, False]))
 def test_poses_keep_their_volume_and_nearly_the_shape_of_exact_rows(
     tmp_path, monkeypatch, region_volumes
 ):

@@ -76,10 +76,9 @@ def drag(session: sd.Session, fixed, handle, targets) -> None:
     session.commit()
 
 
-# Cages are fitted to nine of them, and to the others in the campaign.
+# Cages are fitted to five of them, and to the others in the campaign.
 FITTED = {
-    "triangle soup", "a part of flat faces only", "half a body", "flat sheet", "tube",
-    "several parts, some open", "Moebius strip", "row of fins", "soup of everything, flipped",
+    "triangle soup", "half a body", "flat sheet", "Moebius strip", "soup of everything, flipped",
 }  # fmt: skip
 BENT = pytest.mark.parametrize(
     ("specimen", "session_of"),

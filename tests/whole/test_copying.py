@@ -8,6 +8,7 @@ from dataclasses import fields
 
 import public_calls
 import pytest
+from campaign import every
 from numpy.testing import assert_array_equal
 from scenes import sausage
 from shared_arrays import CLASSES, writable_shared_arrays
@@ -104,7 +105,7 @@ def test_a_copied_session_is_independent_and_has_no_listeners(way):
     assert other.undo_label == "remove handle 1"
 
 
-@pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
+@pytest.mark.parametrize("way", every(2, WAYS))
 def test_a_copied_deformer_solves_the_same_bits_from_the_same_pose(way):
     untouched, deformer = SCENE.held(), SCENE.held()
     for one in (untouched, deformer):

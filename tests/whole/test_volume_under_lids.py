@@ -69,7 +69,7 @@ def held(deformer, **options):
 
 @pytest.mark.parametrize(
     ("name", "n_regions"),
-    every(2, [*((name, 3) for name in BODIES), ("bottle", 1), ("bottle", 6)]),
+    every(4, [*((name, 3) for name in BODIES), ("bottle", 1), ("bottle", 6)]),
 )
 def test_every_pose_has_the_volume_of_the_rest_shape(name, n_regions):
     deformer = bound(name, n_regions)
@@ -92,7 +92,7 @@ def test_every_pose_has_the_volume_of_the_rest_shape(name, n_regions):
         assert abs(volume.relative(each.vertices)) < EXACT
 
 
-@pytest.mark.parametrize("way", ["coarse", "scaled", "interpolated", "gpu"])
+@pytest.mark.parametrize("way", every(2, ["coarse", "gpu", "scaled", "interpolated"]))
 @pytest.mark.parametrize("per_region", [False, True])
 def test_the_volume_is_exact_at_every_size(monkeypatch, way, per_region):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 200)

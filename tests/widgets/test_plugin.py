@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+from campaign import every
 from given_surfaces import GIVEN, holed, require_only_moved, tube
 from hands import Hand, picture
 from numpy.testing import assert_allclose, assert_array_equal
@@ -81,7 +82,7 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["tube", "soup"])
+@pytest.mark.parametrize("name", every(2, ["soup", "tube"]))
 def test_any_surface_is_deformed_by_its_own_points(name):
     given = GIVEN[name]()
     height = given.points[:, 2]
@@ -106,7 +107,7 @@ def test_points_at_a_seam_with_different_targets_go_to_the_mean():
     assert np.allclose(ends[0] - given.points[seam], [0.15, 0.05, 0.05])
 
 
-@pytest.mark.parametrize("kind", ["polydata", "surface", "mesh", "session"])
+@pytest.mark.parametrize("kind", every(2, ["polydata", "mesh", "surface", "session"]))
 def test_the_editor_takes_any_surface(kind, plotter):
     given = holed()
     surface = sd.Surface(given)
@@ -205,6 +206,7 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
         assert importlib.import_module(module) is plugin
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("imports", "there"),
     [

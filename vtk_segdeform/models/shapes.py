@@ -35,8 +35,8 @@ def cactus(n_vertices: int = 5430) -> Mesh:
 
     Examples
     --------
-    >>> cactus().n_vertices
-    5430
+    >>> cactus(1000).n_vertices
+    1000
     """
     trunk = Limb(
         [(0, 0, -0.1), (0, 0, 0.3), (0, 0, 0.6), (0, 0, 0.9)],

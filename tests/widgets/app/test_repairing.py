@@ -125,6 +125,7 @@ def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name
     assert ("Repair ..." in notices._offers) is (name in ("bottle.ply", "sheet.obj"))
 
 
+@pytest.mark.campaign
 def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
     opened(hand, bottle(), tmp_path / "bottle.ply")
     editor, plotter = hand.window.editor, hand.window.editor_widget.plotter
@@ -197,6 +198,7 @@ def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, 
     assert len(hand.window.session.mesh.borders) == 3
 
 
+@pytest.mark.campaign
 def test_a_saved_repaired_copy_is_no_longer_new(hand, tmp_path, monkeypatch):
     opened(hand, bottle(2), tmp_path / "bottle.ply")
     repair(hand, lambda dialog: click(dialog.accepting))
@@ -213,6 +215,7 @@ def test_a_saved_repaired_copy_is_no_longer_new(hand, tmp_path, monkeypatch):
     assert load_session(proposals[0]).mesh.is_closed
 
 
+@pytest.mark.campaign
 def test_cancelling_changes_nothing(hand, tmp_path):
     path = opened(hand, bottle(2), tmp_path / "bottle.ply")
     before = hand.window.session
@@ -221,6 +224,7 @@ def test_cancelling_changes_nothing(hand, tmp_path):
     assert hand.title == f"{path.name} - segdeform"
 
 
+@pytest.mark.campaign
 def test_settings_start_the_repair_again_without_blocking(hand, tmp_path):
     opened(hand, bottle(3), tmp_path / "bottle.ply")
 
@@ -290,6 +294,7 @@ def with_invalid_points():
     return ball
 
 
+@pytest.mark.campaign
 def test_a_file_with_invalid_points_is_repaired_and_opened(hand, boxes, tmp_path):
     with_invalid_points().save(tmp_path / "ball.ply")
     boxes.answers.append("Repair and open ...")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from app_hands import AppHand, Boxes, Window, delete, drop, settings_in
+from campaign import every
 from gltf_files import Gltf
 from qt_hands import application
 from solids import icosphere
@@ -70,7 +71,7 @@ def hand(tmp_path):
     pv.global_theme.anti_aliasing = smooth
 
 
-@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+@pytest.mark.parametrize("suffix", every(2, [".glb", ".gltf"]))
 def test_a_dropped_file_is_bent_by_the_mouse_and_saved_with_only_its_shape_changed(
     hand, suffix, tmp_path, monkeypatch
 ):

@@ -288,6 +288,7 @@ def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     assert "no folder" in boxes.seen[-1]
 
 
+@pytest.mark.campaign
 def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
     start, ball_file, tmp_path, monkeypatch
 ):
@@ -357,6 +358,7 @@ def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, 
 # View and help.
 
 
+@pytest.mark.campaign
 def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     hand = start(arm_file)
     hand.view_hand()
@@ -508,6 +510,7 @@ def test_a_picture_shows_the_view_without_status_line_and_gizmo(
 # Autosave.
 
 
+@pytest.mark.campaign
 def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
     hand = start(arm_file)
     mouse = hand.view_hand()
@@ -586,6 +589,7 @@ def test_recovering_work_later_or_never(start, arm, ball_file, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
+@pytest.mark.campaign
 def test_recovering_one_of_several_autosaves_keeps_the_others(start, ball_file, tmp_path, boxes):
     for name in "abc":
         left(tmp_path, Session(BALL), About(name))

@@ -19,6 +19,7 @@ from vtk_segdeform.widgets.region_selector.region_selector import Tool
 pytestmark = pytest.mark.usefixtures("unprepared")
 
 
+@pytest.mark.campaign
 def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type("3", "t", "v", "4")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from hands import picture, plain_view
 from solids import rotation
 
@@ -108,7 +109,7 @@ def test_the_mesh_does_not_hide_it(view):
 
 
 @pytest.mark.parametrize("axes", [np.eye(3), TURNED], ids=["world", "turned"])
-@pytest.mark.parametrize("place", LOOKS)
+@pytest.mark.parametrize("place", every(2, [(look,) for look in LOOKS]))
 def test_parts_are_hit_where_they_are_drawn(view, place, axes):
     view.camera.SetParallelProjection(place == LOOKS[1])
     look_from(view, place)
@@ -171,7 +172,7 @@ def test_where_a_ring_crosses_an_arrow_the_arrow_is_hit(view):
     assert crossings > 0
 
 
-@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("axis", every(2, range(3)))
 def test_parts_seen_end_on_are_not_hit(view, axis):
     view.camera.SetParallelProjection(axis == 1)
     place = 9.0 * np.eye(3)[axis]

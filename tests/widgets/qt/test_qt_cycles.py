@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from campaign import every
 from qt_hands import (
     ONE_SCREEN,
     Qt,
@@ -286,7 +287,9 @@ def test_a_window_that_qt_deletes_without_closing_it_leaves_the_others_as_they_a
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs Linux's /proc")
-@pytest.mark.parametrize(("kind", "times"), [(Widget, 1), (Dock, 1), fifty(Widget), fifty(Dock)])
+@pytest.mark.parametrize(
+    ("kind", "times"), [*every(2, [(Dock, 1), (Widget, 1)]), fifty(Widget), fifty(Dock)]
+)
 def test_nothing_is_left(kind, times):
     watch_cycles(kind, times)
 

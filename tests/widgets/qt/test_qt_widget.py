@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bad_values import BAD
+from campaign import every
 from given_surfaces import GIVEN, require_only_moved
 from hands import plain_view
 from numpy.testing import assert_array_equal
@@ -312,6 +313,7 @@ def rename(tree, name):
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
 
+@pytest.mark.campaign
 def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
     tree, session = seen.panel.controls["regions.list"], seen.session
     assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
@@ -376,6 +378,7 @@ def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
     assert list(session.handles) == ["pin 1"]
 
 
+@pytest.mark.campaign
 def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
     seen.mode(Mode.HANDLES)
     tree = seen.panel.controls["handles.list"]
@@ -408,6 +411,7 @@ def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     assert not seen.session.handles
 
 
+@pytest.mark.campaign
 def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen = make(models.sphere(300))
     seen.mode(Mode.CAGES)
@@ -628,6 +632,7 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
     again.widget.close()
 
 
+@pytest.mark.campaign
 def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)
     part, overlay = seen.panel.controls, lambda: seen.editor.widgets.overlay
@@ -730,6 +735,7 @@ def with_arrays():
     return surface
 
 
+@pytest.mark.campaign
 def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypatch):
     surface, (mesh, state) = with_arrays(), small()
     seen = make(surface)
@@ -771,7 +777,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
 
 
-@pytest.mark.parametrize("name", ["holed", "soup"])
+@pytest.mark.parametrize("name", every(2, ["soup", "holed"]))
 def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, monkeypatch):
     given = GIVEN[name]()
     seen = make(given)
@@ -874,7 +880,7 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
 # Accessibility.
 
 
-@pytest.mark.parametrize("mode", list(Mode))
+@pytest.mark.parametrize("mode", every(2, Mode))
 def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     seen.mode(mode)
     kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)

@@ -195,6 +195,7 @@ def test_a_huge_file_a_pipe_and_a_device_are_refused_at_once(tmp_path):
                 replay(view, path)
 
 
+@pytest.mark.campaign
 def test_the_command_writes_only_to_the_given_folder(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     sd.write_mesh("ball.ply", MESH)

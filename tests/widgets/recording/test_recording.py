@@ -153,6 +153,7 @@ def test_a_camera_moved_by_a_program_is_recorded_before_the_next_press():
     assert same(desk, again)
 
 
+@pytest.mark.campaign
 def test_the_size_of_the_window_is_recorded():
     desk, again = Desk(plain_view((300, 260))), Desk(plain_view((500, 500)))
     recorder = Recorder(desk.view)
@@ -252,6 +253,7 @@ class Dragging:
         hand.tick(2)
 
 
+@pytest.mark.campaign
 def test_a_drag_is_replayed_bit_by_bit_on_a_slower_machine(monkeypatch):
     fast = Dragging(monkeypatch, 0.001)
     hand, recorder = Hand(fast.view), Recorder(fast.view)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from hands import plain_view
 
 from vtk_segdeform import Session, models
@@ -13,7 +14,7 @@ from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 
-@pytest.mark.parametrize("radius", [0.1, 0.2])
+@pytest.mark.parametrize("radius", every(2, [0.1, 0.2]))
 def test_one_fast_move_of_the_brush_reaches_all_that_a_slow_one_does(radius):
     """The brush reaches at least 95 % of its radius on both sides of the line, everywhere."""
     view = plain_view()

@@ -156,6 +156,7 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     assert overlap(before, drawn.body()) > 0.99
 
 
+@pytest.mark.campaign
 def test_the_layer_of_a_drag_is_opaque_and_its_texts_take_little_room(drawn: Drawn) -> None:
     end = drawn.drag((70.0, 20.0))
     drawn.hold(end)
@@ -295,6 +296,7 @@ def test_of_two_pages_none_draws(drawn: Drawn) -> None:
     drawn.await_surface()
 
 
+@pytest.mark.campaign
 def test_slow_software_draws_a_quarter_of_the_pixels_in_the_same_place(drawn: Drawn) -> None:
     page, session = drawn.page, drawn.web.session
     drawn.rest()

@@ -123,6 +123,7 @@ def test_a_client_ends_some_time_after_its_page(do, tmp_path):
     do(story())
 
 
+@pytest.mark.campaign
 @ON_LINUX
 def test_the_address_continues_the_work_of_a_page_that_has_gone_on_this_machine_only(do, tmp_path):
     async def story():
@@ -152,6 +153,7 @@ def test_the_address_continues_the_work_of_a_page_that_has_gone_on_this_machine_
     do(story())
 
 
+@pytest.mark.campaign
 @ON_LINUX
 def test_a_process_that_takes_too_much_memory_is_ended_by_name(do, tmp_path):
     async def story():

@@ -215,6 +215,7 @@ def test_stories_of_other_meshes(
     tell_a_story(served, page, tmp_path / "other.ply", tmp_path / "down")
 
 
+@pytest.mark.campaign
 def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     served: Served, page: Page
 ) -> None:
@@ -247,6 +248,7 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     assert surface is not None
 
 
+@pytest.mark.campaign
 def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> None:
     page, web = served.page(browser, touch=True, size=(390, 700)), served.web
     hint = page.evaluate("document.querySelector('.sd-hint').textContent")
