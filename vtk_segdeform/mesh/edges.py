@@ -25,6 +25,13 @@ def repeats_vertex(faces: IntArray) -> BoolArray:
     return repeats
 
 
+def flipped_faces(faces: IntArray, flip: BoolArray) -> IntArray:
+    """Return *faces* (m, 3) with the second and third corner of those to *flip* (m,) exchanged."""
+    flipped, some = faces.copy(), np.flatnonzero(flip)
+    flipped[some, 1], flipped[some, 2] = faces[some, 2], faces[some, 1]
+    return flipped
+
+
 def components(n_points: int, faces: IntArray) -> IntArray:
     """Return the component of each vertex, (n,) int, numbered from 0."""
     return connected(n_points, faces.ravel(), faces[:, [1, 2, 0]].ravel())
