@@ -15,7 +15,8 @@ def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
 
 def next_half_edge(half_edges: IntArray) -> IntArray:
     """Return the next half-edge, or corner, of the same face."""
-    return np.where(half_edges % 3 == 2, half_edges - 2, half_edges + 1)
+    after = half_edges + 1
+    return after - 3 * (after // 3 - half_edges // 3)
 
 
 def repeats_vertex(faces: IntArray) -> BoolArray:

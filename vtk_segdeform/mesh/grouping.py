@@ -112,7 +112,7 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
         table[:] = -1
         kernels.first_equal_points(found, *inputs(rows), table)
         return found
-    hashes = _hashes(rows)
+    hashes = row_hashes(rows)
     ordered = np.sort(hashes)  # faster than to find the order, and usually all that is needed
     if not (ordered[1:] == ordered[:-1]).any():
         return np.arange(len(rows))
@@ -164,7 +164,7 @@ def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
 
 
-def _hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:
+def row_hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:
     """Return a hash of each row, (n,), the same for equal rows."""
     mixed = np.zeros(len(rows), dtype=np.uint64)
     for column in rows.T:

@@ -76,12 +76,7 @@ class HalfEdges:
     @cached_property
     def order(self) -> IntArray:
         """(3m,) int: the half-edges sorted by edge, and by number within an edge."""
-        count = len(self.tail)
-        if self.n_vertices**2 * count < _LARGEST:  # both numbers in one: far quicker to sort
-            numbered = self.keys * count + np.arange(count)
-            numbered.sort()
-            return numbered % count
-        return np.argsort(self.keys, kind="stable")
+        return self._by_edge(np.arange(len(self.tail)), self.keys)
 
     @cached_property
     def _alone(self) -> IntArray | None:
@@ -224,9 +219,15 @@ class HalfEdges:
             return _NONE
         return self._by_edge(self.neighbours[self._parallel, 0])
 
-    def _by_edge(self, half_edges: IntArray) -> IntArray:
-        """Return *half_edges* in the order of `order`."""
-        ordered: IntArray = half_edges[np.lexsort((half_edges, self.keys_of(half_edges)))]
+    def _by_edge(self, half_edges: IntArray, keys: IntArray | None = None) -> IntArray:
+        """Return *half_edges* in the order of `order`; *keys* are theirs, if known."""
+        keys = self.keys_of(half_edges) if keys is None else keys
+        bits = len(self.tail).bit_length()
+        if self.n_vertices**2 << bits < _LARGEST:  # both numbers in one: far quicker to sort
+            numbered = (keys << bits) | half_edges
+            numbered.sort()
+            return numbered & ((1 << bits) - 1)
+        ordered: IntArray = half_edges[np.lexsort((half_edges, keys))]
         return ordered
 
     @property
