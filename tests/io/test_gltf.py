@@ -15,6 +15,7 @@ from solids import CUBE, OCTAHEDRON, icosphere
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.convert import read_polydata
+from vtk_segdeform.io.gltf import scene as shown
 from vtk_segdeform.io.gltf.buffers import Document
 from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.io.surface import read_mesh
@@ -402,3 +403,12 @@ def test_a_data_uri_with_too_few_bytes_is_an_error(tmp_path, uri):
     document.head["buffers"][0]["uri"] = uri
     with pytest.raises(MeshError, match=r"a\.gltf: "):
         read_polydata(document.save(tmp_path / "a.gltf"))
+
+
+def test_products_of_many_rows_are_those_of_each(monkeypatch):
+    monkeypatch.setattr(shown, "_PIECE", 3)
+    rng = np.random.default_rng(1)
+    vectors, each = rng.normal(size=(8, 3)).astype("f4"), rng.normal(size=(8, 3, 3))
+    for matrices in (each, each[0]):
+        expected = (matrices @ vectors.astype(float)[..., None])[..., 0]
+        assert_allclose(shown.products(matrices, vectors), expected, rtol=1e-14, atol=1e-14)

@@ -7,7 +7,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
@@ -438,21 +437,3 @@ def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
     row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
     _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
     assert (stops <= starts).all()
-
-
-def test_the_volumes_of_flipped_shells_are_those_computed_anew(monkeypatch):
-    pytest.importorskip("numba")
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    vertices, faces = together(icosphere(1), torus(9, 6), (3.3 * SPHERE[0], SPHERE[1]))
-    found = search.Search(vertices + [0.1, -0.2, 0.3], faces)
-    assert len(found.shell_sums[0]) == 3
-    flipped = found.flipped(found.half_edges.shells == 1)
-    assert "shell_sums" in vars(flipped)
-    again = search.Search(flipped.points, flipped.triangles)
-    for known, fresh in zip(flipped.shell_sums, again.shell_sums, strict=True):
-        assert_array_equal(known, fresh)
-    assert (np.sign(flipped.shell_sums[0]) == np.sign(found.shell_sums[0]) * [1, -1, 1]).all()
-    assert [str(fault) for fault in flipped.faults] == [str(fault) for fault in again.faults]
-    part = found.flipped(np.arange(len(faces)) < 3)
-    assert "shell_sums" not in vars(part)
-    assert part.faults[0].kind is Kind.TURNED_EDGE

@@ -7,11 +7,17 @@ import itertools
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from open_surfaces import moebius
 from solids import CUBE, icosphere, rotation, together, torus
 
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.mesh import find_faults, mesh_of, winding_number
+from vtk_segdeform.mesh.faults import Search
+from vtk_segdeform.mesh.orientation import faces_to_flip
 from vtk_segdeform.mesh.shells import shell_depths
+from vtk_segdeform.mesh.topology import HalfEdges
 
 SPHERE = icosphere(2)
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -180,3 +186,25 @@ def test_many_shells_are_found_inside_a_surface_by_columns_as_by_winding_numbers
     assert_array_equal(depth[1:], (number > 0.5).all(axis=1))
     assert depth[0] == 0
     assert 20 < depth.sum() < 70
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_volumes_known_after_flipping_are_those_of_the_flipped_shells(compiled, monkeypatch):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0 if compiled else 10**9)
+    band = np.asarray(moebius().points, float), triangles_of(moebius())
+    x, faces = together(SPHERE, torus(9, 6), (0.3 * SPHERE[0], SPHERE[1]), band, box([(0, 1)]))
+    some = np.random.default_rng(3).random(len(faces)) < 0.1
+    turned = (faces, faces[:, ::-1], flipped(faces, some))
+    for given in (*turned, flipped(faces, np.arange(len(faces)) < len(SPHERE[1]))):
+        half_edges = HalfEdges(given, len(x))
+        flip, sums = faces_to_flip(x, half_edges)
+        found = Search.known(x, half_edges.flipped(flip), sums)
+        fresh = Search(x, flipped(given, flip))
+        for one, other in zip(sums, fresh.shell_sums, strict=True):
+            assert_array_equal(one, other)
+        assert len(sums[0]) == 5
+        assert not flip[-len(box([(0, 1)])[1]) - len(band[1]) :][: len(band[1])].any()  # one-sided
+        assert found.report == fresh.report
+    fin = np.append(faces, [[*faces[0, :2], len(x)]], axis=0)
+    half_edges = HalfEdges(fin, len(x) + 1)
+    assert faces_to_flip(np.append(x, [[9.0, 9, 9]], axis=0), half_edges)[1] is None  # it branches

@@ -119,10 +119,16 @@ def test_flipped_half_edges_are_those_of_the_flipped_faces(whole):
         flip = np.arange(len(faces)) < (8 if whole else 3)
         known = HalfEdges(faces, int(faces.max()) + 1)
         assert len(known.boundary)
+        assert len(known.shells)
+        assert len(known.order)
         found = known.flipped(flip)
+        assert {"order", "shells"} <= vars(found).keys()
         fresh = HalfEdges(np.where(flip[:, None], faces[:, [0, 2, 1]], faces), known.n_vertices)
         assert known.flipped(np.zeros(len(faces), dtype=bool)) is known
-        for name in ("faces", "boundary", "shells", "turned", "net_boundary", "all_twins"):
+        for name in (
+            "faces", "order", "boundary", "shells", "turned", "pinched", "net_boundary",
+            "all_twins",
+        ):  # fmt: skip
             assert_array_equal(getattr(found, name), getattr(fresh, name))
 
 

@@ -61,7 +61,7 @@ class VertexNormals:
         if not opposite.any():
             return np.empty(0, dtype=np.int64)
         corners, across = edges.fan_links(edges.pairs)
-        _, turned = two_sides(self._faces.size, corners, across, np.tile(opposite, 2))
+        _, turned, _ = two_sides(self._faces.size, corners, across, np.tile(opposite, 2))
         return np.flatnonzero(turned)
 
     def of(self, x: FloatArray, out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:

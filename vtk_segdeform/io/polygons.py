@@ -20,7 +20,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
 from ..freezing import read_only
 from ..kernels import compiled_checks, inputs
-from ..mesh import cross_rows, first_equal_row, normals, repeats_vertex
+from ..mesh import cross_rows, first_equal_row, normals, repeats_vertex, row_hashes
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
@@ -178,25 +178,33 @@ def cut_into_triangles(
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
-    starts = np.cumsum(counts) - counts
-    triangles, quads = np.flatnonzero(counts == 3), np.flatnonzero(counts == 4)
+    n_triangles, starts = counts - 2, np.cumsum(counts) - counts
+    faces, first = np.empty((int(n_triangles.sum()), 3), np.int64), np.cumsum(n_triangles)
+    first -= n_triangles
+    is_cut = counts == 3
+    faces[first[is_cut]] = _rows(corners, starts[is_cut], 3)
+    quads = np.flatnonzero(counts == 4)
     of_quads = _rows(corners, starts[quads], 4)
     cut = _quad_cuts(points, of_quads)
-    n_triangles = np.zeros(len(counts), dtype=np.int64)
-    n_triangles[triangles], n_triangles[quads] = 1, np.where(cut == _NOT_CUT, 0, 2)
-    is_other = n_triangles == 0
-    others = np.flatnonzero(is_other)
-    clipped, owner = _polygon_cuts(points, counts[others], corners[np.repeat(is_other, counts)])
-    n_triangles[others] = np.bincount(owner, minlength=len(others))
-    polygon, first = np.repeat(number, n_triangles), np.cumsum(n_triangles) - n_triangles
-    faces = np.empty((len(polygon), 3), dtype=np.int64)
-    faces[first[triangles]] = _rows(corners, starts[triangles], 3)
-    if len(clipped):
-        faces[is_other[polygon]] = clipped
     _put_halves(faces, first[quads], of_quads, cut)
-    is_other[quads[cut == _OF_EQUAL_LENGTH]] = True
+    is_cut[quads] = cut != _NOT_CUT
+    is_cut |= _convex_cuts(faces, points, counts, corners)
+    polygon, others = np.repeat(number, n_triangles), np.flatnonzero(~is_cut)
+    if len(others):
+        clipped, owner = _clipped(points, counts[others], corners[np.repeat(~is_cut, counts)])
+        kept = faces[is_cut[polygon]]
+        n_triangles[others] = np.bincount(owner, minlength=len(others))
+        polygon = np.repeat(number, n_triangles)
+        faces, is_kept = np.empty((len(polygon), 3), dtype=np.int64), is_cut[polygon]
+        faces[is_kept], faces[~is_kept] = kept, clipped
+    is_other = counts > 3
+    is_other[quads] = (cut == _NOT_CUT) | (cut == _OF_EQUAL_LENGTH)
     some = np.flatnonzero(is_other & (n_triangles == counts - 2))
     if len(some):  # other quads have the same shorter diagonal in any case
+        sums = np.add.reduceat(row_hashes(points)[corners], starts)[some]
+        ordered = np.sort(sums)
+        some = some[np.isin(sums, ordered[1:][ordered[1:] == ordered[:-1]])]  # few, if any
+    if len(some):
         place = first_equal_row(points)
         for size in np.unique(counts[some]):
             alike = some[counts[some] == size]
@@ -253,25 +261,6 @@ def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
     """Return the dot products of the rows of *u* and *v*, (k,) float."""
     x, y, z = (u * v).T
     return np.asarray((x + y) + z)
-
-
-def _polygon_cuts(
-    points: FloatArray, counts: IntArray, corners: IntArray
-) -> tuple[IntArray, IntArray]:
-    """Return the triangles of polygons, and the polygon of each, in their order."""
-    faces, owner = np.empty((int((counts - 2).sum()), 3), dtype=np.int64), np.arange(len(counts))
-    is_cut = _convex_cuts(faces, points, counts, corners)
-    owner = np.repeat(owner, counts - 2)
-    if is_cut.all():
-        return faces, owner
-    others, kept = np.flatnonzero(~is_cut), is_cut[owner]
-    clipped, polygon = _clipped(points, counts[others], corners[np.repeat(~is_cut, counts)])
-    if len(others) == len(counts):
-        return clipped, polygon
-    faces = np.concatenate([faces[kept], clipped])
-    owner = np.concatenate([owner[kept], others[polygon]])
-    order = np.argsort(owner, kind="stable")
-    return faces[order], owner[order]
 
 
 def _convex_cuts(

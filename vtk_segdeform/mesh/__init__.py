@@ -19,7 +19,14 @@ The files, in reading order:
 
 from .edges import components, edge_keys, face_edges, next_half_edge, repeats_vertex
 from .faults import UNREPAIRABLE, as_soup, connectivity_faults, find_faults
-from .grouping import connected, first_equal_row, first_of_group, ragged_arange, two_sides
+from .grouping import (
+    connected,
+    first_equal_row,
+    first_of_group,
+    ragged_arange,
+    row_hashes,
+    two_sides,
+)
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import (
     flat_faces,
@@ -68,6 +75,7 @@ __all__ = [
     "ragged_arange",
     "repeats_vertex",
     "require_mesh",
+    "row_hashes",
     "self_intersections",
     "two_sides",
     "winding_number",

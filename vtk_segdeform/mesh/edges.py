@@ -15,7 +15,8 @@ def edge_keys(one: IntArray, other: IntArray, n_vertices: int) -> IntArray:
 
 def next_half_edge(half_edges: IntArray) -> IntArray:
     """Return the next half-edge, or corner, of the same face."""
-    return np.where(half_edges % 3 == 2, half_edges - 2, half_edges + 1)
+    after = half_edges + 1
+    return after - 3 * (after // 3 - half_edges // 3)
 
 
 def repeats_vertex(faces: IntArray) -> BoolArray:
@@ -23,6 +24,13 @@ def repeats_vertex(faces: IntArray) -> BoolArray:
     a, b, c = faces.T
     repeats: BoolArray = (a == b) | (b == c) | (c == a)
     return repeats
+
+
+def flipped_faces(faces: IntArray, flip: BoolArray) -> IntArray:
+    """Return *faces* (m, 3) with the second and third corner of those to *flip* (m,) exchanged."""
+    flipped, some = faces.copy(), np.flatnonzero(flip)
+    flipped[some, 1], flipped[some, 2] = faces[some, 2], faces[some, 1]
+    return flipped
 
 
 def components(n_points: int, faces: IntArray) -> IntArray:

@@ -76,26 +76,22 @@ class Search:
     triangles: IntArray
 
     @classmethod
-    def known(cls, points: FloatArray, half_edges: HalfEdges) -> Search:
-        """Return the search of the faces of *half_edges*, none degenerate or duplicate."""
+    def known(cls, points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None) -> Search:
+        """Return the search of the faces of *half_edges*, none degenerate or duplicate.
+
+        All *points* are in faces; *sums* are those of the shells, if known.
+        """
         search, none = cls(points, half_edges.faces), np.zeros(len(half_edges.faces), dtype=bool)
+        search.__dict__["_corners"] = np.ones(len(points), dtype=bool), 0
         search.__dict__["_distinct"] = none, none, half_edges
+        if sums is not None:
+            search.__dict__["shell_sums"] = sums
         return search
 
     def at(self, points: FloatArray) -> Search:
         """Return the search of the same triangles over other *points* (n, 3)."""
         search = Search(points, self.triangles)
         search.__dict__["_corners"] = self._corners
-        return search
-
-    def flipped(self, flip: BoolArray) -> Search:
-        """Return the search of the faces of `half_edges`, with *flip* (m,) of them flipped."""
-        half_edges = self.half_edges.flipped(flip)
-        search = Search.known(self.points, half_edges)
-        if "shell_sums" in vars(self) and "shells" in vars(half_edges):  # whole shells
-            volume, area, size = self.shell_sums
-            sign = np.where(flip[first_members(half_edges.shells)], -1.0, 1.0)
-            vars(search)["shell_sums"] = sign * volume, area, size
         return search
 
     @cached_property

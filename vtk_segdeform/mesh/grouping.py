@@ -66,22 +66,27 @@ def renumbered_by_first(labels: NDArray[np.integer]) -> IntArray:
 
 def two_sides(
     n: int, one: IntArray, other: IntArray, opposite: BoolArray
-) -> tuple[IntArray, BoolArray]:
-    """Return the group of each of *n* items, (n,) int, and whether to flip it for all to agree.
+) -> tuple[IntArray, BoolArray, BoolArray]:
+    """Return the group of each of *n* items, whether to flip it, and which groups have one side.
 
-    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  A graph has
-    two nodes for each item, unchanged and flipped, and links between nodes of neighbours that
-    agree.  If both nodes of an item are connected, its group is one-sided, and none is flipped.
+    Items one[i] and other[i] are neighbours, of different orientation if opposite[i].  After the
+    flips all neighbours agree, except in a one-sided group, in which none is flipped.  Groups are
+    numbered from 0 in the order of their first members.
+
+    >>> two_sides(3, np.array([0]), np.array([2]), np.array([True]))
+    (array([0, 1, 0]), array([False, False,  True]), array([False, False]))
     """
-    across = np.where(opposite, other + n, other)
-    group = connected(
-        2 * n,
-        np.concatenate([one, one + n]),
-        np.concatenate([across, (across + n) % max(2 * n, 1)]),
-    )
-    unchanged, flipped = group[:n], group[n:]
-    side = np.minimum(unchanged, flipped)
-    return side, (flipped == side) & (unchanged != flipped)
+    # Items that agree are one node of a graph, and one more if they are flipped; links are between
+    # nodes that agree.  If both nodes of items are connected, their group is one-sided.
+    alike = connected(n, one[~opposite], other[~opposite])
+    k = int(alike.max(initial=-1)) + 1
+    one, other = alike[one[opposite]], alike[other[opposite]]
+    node = connected(2 * k, np.append(one, one + k), np.append(other + k, other))
+    unchanged, flipped = node[:k], node[k:]
+    first, group = np.unique(np.minimum(unchanged, flipped), return_inverse=True)
+    one_sided = np.zeros(len(first), dtype=bool)
+    one_sided[group[unchanged == flipped]] = True
+    return group[alike], (flipped < unchanged)[alike], one_sided
 
 
 def first_of_group(group: IntArray) -> IntArray:
@@ -107,7 +112,7 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
         table[:] = -1
         kernels.first_equal_points(found, *inputs(rows), table)
         return found
-    hashes = _hashes(rows)
+    hashes = row_hashes(rows)
     ordered = np.sort(hashes)  # faster than to find the order, and usually all that is needed
     if not (ordered[1:] == ordered[:-1]).any():
         return np.arange(len(rows))
@@ -159,7 +164,7 @@ def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
 
 
-def _hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:
+def row_hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:
     """Return a hash of each row, (n,), the same for equal rows."""
     mixed = np.zeros(len(rows), dtype=np.uint64)
     for column in rows.T:

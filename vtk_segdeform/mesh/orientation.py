@@ -20,6 +20,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from .edges import flipped_faces
 from .grouping import begins, connected, first_members, two_sides
 from .shells import NO_VOLUME, ShellSums, outward_signs, shell_depths, shell_volumes
 from .topology import HalfEdges
@@ -29,11 +30,12 @@ _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to 
 
 def faces_to_flip(
     points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None = None
-) -> BoolArray:
+) -> tuple[BoolArray, ShellSums | None]:
     """Return which faces (m,) to flip; those of a second call are none.
 
     Afterwards all pairs agree, except on one-sided patches, and no closed shell is inside-out.
-    *sums* are those of the shells, if known and if all pairs agree before.
+    *sums* are those of the shells, if known and if all pairs agree before.  Those after the flips
+    are returned, too, unless shells branch.
     """
     patch, flip, two_sided = _patches(half_edges)
     unit = patch
@@ -47,8 +49,13 @@ def faces_to_flip(
         flip ^= minority[unit] & two_sided[patch]
     if not two_sided.all():
         one_sided[unit[~two_sided[patch]]] = True
-    wrong = _inside_out(points, half_edges, flip, unit, one_sided, sums)
-    return np.asarray(flip ^ wrong[unit]) if wrong.any() else flip
+    faces = flipped_faces(half_edges.faces, flip) if flip.any() else half_edges.faces
+    sums = sums or shell_volumes(points, faces, unit)
+    wrong = _inside_out(points, half_edges, faces, flip, unit, one_sided, sums)
+    if wrong.any():
+        flip = flip ^ wrong[unit]
+        sums = np.where(wrong, -sums[0], sums[0]), *sums[1:]
+    return flip, None if len(half_edges.crowded) else sums  # of units, which are shells then
 
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
@@ -57,14 +64,8 @@ def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
         patch = half_edges.shells
         flip = np.zeros(len(patch), dtype=bool)
         return patch, flip, np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
-    side, flip = half_edges.sides
-    patch = np.unique(side, return_inverse=True)[1]
-    one, other = half_edges.neighbours.T
-    parallel = half_edges.tail[one] == half_edges.tail[other]
-    left = (flip[one // 3] ^ flip[other // 3]) != parallel
-    two_sided = np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)
-    two_sided[patch[one[left] // 3]] = False
-    return patch, flip, two_sided
+    patch, flip, one_sided = half_edges.sides
+    return patch, flip, ~one_sided
 
 
 def _linked(
@@ -110,8 +111,7 @@ def _linked(
         links = csgraph.minimum_spanning_tree(graph).tocoo()
         tree = links.row.astype(np.int64) * q + links.col
     agree = total[np.searchsorted(keys, tree)] >= 0.0
-    group, turned = two_sides(q, *np.divmod(tree, q), ~agree)
-    return np.unique(group, return_inverse=True)[1], turned
+    return two_sides(q, *np.divmod(tree, q), ~agree)[:2]
 
 
 def _angles(
@@ -134,10 +134,11 @@ def _angles(
 def _inside_out(
     points: FloatArray,
     half_edges: HalfEdges,
+    faces: IntArray,
     flip: BoolArray,
     unit: IntArray,
     one_sided: BoolArray,
-    sums: ShellSums | None,
+    sums: ShellSums,
 ) -> BoolArray:
     """Return which units enclose a volume of the wrong sign, (u,) bool, with faces flipped."""
     shells = half_edges.shells
@@ -146,26 +147,19 @@ def _inside_out(
     alone[shells[half_edges.crowded // 3]] = False
     closed = alone & ~one_sided[of_shell]
     closed[shells[half_edges.boundary // 3]] = False
-    faces = _flipped(half_edges.faces, flip)
-    volume, area, size = sums or shell_volumes(points, faces, unit)
+    volume, area, size = sums
     under_lids, lids = _lids(points, half_edges, flip, unit)
     volume = volume + under_lids
     encloses = (lids <= _MOST_LIDS * area) & ~one_sided
     tiny = NO_VOLUME * (area * size)
     wrong = encloses & (volume < -tiny)
     wrong[of_shell[alone]] = False  # first those on which the winding numbers of shells depend
-    faces = _flipped(faces, wrong[unit]) if wrong.any() else faces
+    faces = flipped_faces(faces, wrong[unit]) if wrong.any() else faces
     depth = shell_depths(points, faces, shells, alone & encloses[of_shell])
     outward = outward_signs(volume[of_shell], depth, closed)[alone]
     of_shell = of_shell[alone]
     wrong[of_shell] = encloses[of_shell] & (outward * volume[of_shell] < -tiny[of_shell])
     return np.asarray(wrong)
-
-
-def _flipped(faces: IntArray, flip: BoolArray) -> IntArray:
-    if not flip.any():
-        return faces
-    return np.where(flip[:, None], faces[:, [0, 2, 1]], faces)
 
 
 def _lids(

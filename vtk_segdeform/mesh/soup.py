@@ -155,20 +155,18 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     sums = None
     if half_edges is found.half_edges and not len(half_edges.turned) + len(half_edges.crowded):
         sums = found.shell_sums
-    flip = faces_to_flip(valid, half_edges, sums)
+    flip, sums = faces_to_flip(valid, half_edges, sums)
     left = found.used
     if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
         left = np.zeros(len(points), dtype=bool)
         left[half_edges.faces] = True
-    vertex_of, loose = target, _NONE
-    if same and left.all() and not flip.any():
-        mesh = Mesh.of(found)
-    elif same and left.all():
-        mesh = Mesh.of(found.flipped(flip))
+    vertex_of, loose, flipped = target, _NONE, half_edges.flipped(flip)
+    if left.all():
+        mesh = Mesh.of(found if same and not flip.any() else Search.known(points, flipped, sums))
     else:
         number = np.cumsum(left) - 1
-        flipped = half_edges.flipped(flip)
-        mesh = Mesh.of(Search.known(points[left], flipped.renumbered(number, int(left.sum()))))
+        flipped = flipped.renumbered(number, int(left.sum()))
+        mesh = Mesh.of(Search.known(points[left], flipped, sums))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)

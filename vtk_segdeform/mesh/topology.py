@@ -28,7 +28,7 @@ import numpy as np
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs, scratch
-from .edges import edge_keys, next_half_edge
+from .edges import edge_keys, flipped_faces, next_half_edge
 from .grouping import (
     begins,
     connected,
@@ -40,8 +40,10 @@ from .grouping import (
 
 _NAMELESS = (
     "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
-    "repeated", "shells", "sides", "one_sided", "crowded", "turned", "_alone", "_paired",
+    "repeated", "shells", "sides", "one_sided", "crowded", "turned", "neighbours", "_parallel",
+    "_alone", "_paired",
 )  # fmt: skip
+_UNDIRECTED = ("first", "counts", "shells")  # the same if faces are flipped
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
 _LARGEST = 2**63  # of 64-bit integers
 _LARGE = 200_000  # faces for which another thread is worth waking
@@ -74,12 +76,7 @@ class HalfEdges:
     @cached_property
     def order(self) -> IntArray:
         """(3m,) int: the half-edges sorted by edge, and by number within an edge."""
-        count = len(self.tail)
-        if self.n_vertices**2 * count < _LARGEST:  # both numbers in one: far quicker to sort
-            numbered = self.keys * count + np.arange(count)
-            numbered.sort()
-            return numbered % count
-        return np.argsort(self.keys, kind="stable")
+        return self._by_edge(np.arange(len(self.tail)), self.keys)
 
     @cached_property
     def _alone(self) -> IntArray | None:
@@ -101,16 +98,18 @@ class HalfEdges:
             for task in range(start, stop):
                 if task == 0:
                     found[0] = kernels.one_fan_each(border, starts, *after, links, faces)
-                else:  # for `shells`, which are needed too
+                elif found[0] >= 0:  # for `shells`, which are needed too
                     found[1] = kernels.link_corners(tree, faces)
 
-        in_parallel(work, 2, 1 if m >= _LARGE else 2)
+        has_shells = "shells" in self.__dict__
+        in_parallel(work, 1 if has_shells else 2, 1 if m >= _LARGE else 2)
         count, n_trees = found
         if count < 0:
             return None
-        if n_trees == 1:
+        n_loose = np.count_nonzero(starts[:n] == starts[1 : n + 1])  # vertices in no face
+        if not has_shells and n_trees - n_loose == 1:
             self.__dict__["shells"] = np.broadcast_to(np.int64(0), m)  # without memory
-        else:
+        elif not has_shells:
             kernels.number_trees(tree)
             self.__dict__["shells"] = renumbered_by_first(tree[faces[:, 0]])
         alone = np.empty(count, dtype=np.int64)
@@ -218,15 +217,17 @@ class HalfEdges:
         """(t,) int: the first half-edges of inconsistent pairs, in the order of edges."""
         if self._only_alone:
             return _NONE
-        if self._paired is not None:
-            one, other = self.neighbours.T
-            return self._by_edge(one[self.tail[one] == self.tail[other]])
-        turned: IntArray = self.pairs[self.inconsistent, 0]
-        return turned
+        return self._by_edge(self.neighbours[self._parallel, 0])
 
-    def _by_edge(self, half_edges: IntArray) -> IntArray:
-        """Return *half_edges* in the order of `order`."""
-        ordered: IntArray = half_edges[np.lexsort((half_edges, self.keys_of(half_edges)))]
+    def _by_edge(self, half_edges: IntArray, keys: IntArray | None = None) -> IntArray:
+        """Return *half_edges* in the order of `order`; *keys* are theirs, if known."""
+        keys = self.keys_of(half_edges) if keys is None else keys
+        bits = len(self.tail).bit_length()
+        if self.n_vertices**2 << bits < _LARGEST:  # both numbers in one: far quicker to sort
+            numbered = (keys << bits) | half_edges
+            numbered.sort()
+            return numbered & ((1 << bits) - 1)
+        ordered: IntArray = half_edges[np.lexsort((half_edges, keys))]
         return ordered
 
     @property
@@ -251,13 +252,20 @@ class HalfEdges:
         pairs: IntArray = self.order[start[:, None] + [0, 1]]
         return pairs
 
-    @property
+    @cached_property
     def neighbours(self) -> IntArray:
         """(p, 2) int: `pairs`, in any order."""
         if self._paired is None:
             return self.pairs
         one = np.flatnonzero(self.opposite > np.arange(len(self.opposite)))
-        return np.stack([one, self.opposite[one]], axis=1)
+        return np.stack([one, self.opposite[one]]).T
+
+    @cached_property
+    def _parallel(self) -> BoolArray:
+        """(p,) bool: which `neighbours` have the same direction."""
+        one, other = self.neighbours.T
+        parallel: BoolArray = self.tail[one] == self.tail[other]
+        return parallel
 
     @cached_property
     def non_manifold(self) -> list[IntArray]:
@@ -328,16 +336,19 @@ class HalfEdges:
         """
         if not flip.any():
             return self
-        faces = np.empty_like(self.faces)
-        faces[:, 0] = self.faces[:, 0]
-        for corner in (1, 2):
-            faces[:, corner] = np.where(flip, self.faces[:, 3 - corner], self.faces[:, corner])
-        turned = HalfEdges(faces, self.n_vertices)
-        alone = self.__dict__.get("_alone")
+        turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
+        known = self.__dict__
+        turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
+
+        def renamed(half_edges: IntArray) -> IntArray:
+            face, corner = np.divmod(half_edges, 3)
+            return np.where(flip[face], half_edges + 2 - 2 * corner, half_edges)
+
+        if "order" in known:
+            turned.__dict__["order"] = renamed(self.order)
+        alone = known.get("_alone")
         if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
-            face, corner = np.divmod(alone, 3)
-            turned.__dict__["_alone"] = 3 * face + np.where(flip[face], 2 - corner, corner)
-            turned.__dict__["shells"] = self.shells
+            turned.__dict__["_alone"] = renamed(alone)
         return turned
 
     @cached_property
@@ -346,36 +357,26 @@ class HalfEdges:
         if self._alone is not None:  # each vertex is in one shell, so that vertices were linked
             shells: IntArray = self.__dict__["shells"]
             return shells
-        m = len(self.faces)
-        if self._paired is not None:
-            one, other = self.neighbours.T
-            following = np.flatnonzero(~begins(self.keys_of(self.crowded)))
-            one = np.append(one, self.crowded[following - 1])
-            other = np.append(other, self.crowded[following])
-            return connected(m, one // 3, other // 3)
-        later = np.ones(len(self.order), dtype=bool)  # on an edge, than its first half-edge
-        later[self.first] = False
-        at = np.flatnonzero(later)
-        return connected(m, self.order[at - 1] // 3, self.order[at] // 3)
+        patch, half = self.sides[0], self.crowded
+        at = np.flatnonzero(~begins(self.keys_of(half)))  # on the edge of the one before
+        links = (patch[half[each] // 3] for each in (at - 1, at))
+        return connected(int(patch.max(initial=-1)) + 1, *links)[patch]
 
     @cached_property
-    def sides(self) -> tuple[IntArray, BoolArray]:
-        """The side that each face shares with its neighbours, (m,) int, and whether to flip it.
+    def sides(self) -> tuple[IntArray, BoolArray, BoolArray]:
+        """The patch of each face, (m,) int, whether to flip it, and which patches have one side.
 
-        Neighbours are those across pairs; see `two_sides`.
+        A patch is connected across pairs, and its faces agree after the flips; see `two_sides`.
         """
         one, other = self.neighbours.T
-        parallel = self.tail[one] == self.tail[other]
-        return two_sides(len(self.faces), one // 3, other // 3, parallel)
+        return two_sides(len(self.faces), one // 3, other // 3, self._parallel)
 
     @cached_property
     def one_sided(self) -> BoolArray:
         """(k,) bool: for each shell, whether it contains a surface that has one side only."""
-        one, other = self.neighbours.T
-        _, flip = self.sides
-        left = (flip[one // 3] ^ flip[other // 3]) != (self.tail[one] == self.tail[other])
+        patch, _, one_sided = self.sides
         found = np.zeros(int(self.shells.max(initial=-1)) + 1, dtype=bool)
-        found[self.shells[one[left] // 3]] = True
+        found[self.shells[one_sided[patch]]] = True
         return found
 
     def fans(self, pairs: IntArray) -> IntArray:

@@ -220,7 +220,7 @@ def orient(draft: Draft) -> tuple[Draft, str]:
     One-sided surfaces remain unchanged.
     """
     half_edges, m = draft.half_edges, len(draft.faces)
-    side, other_side = half_edges.sides
+    side, other_side, _ = half_edges.sides
     n_other = np.bincount(side, other_side, minlength=2 * m)
     is_minority = n_other > np.bincount(side, minlength=2 * m) - n_other
     flip = other_side != is_minority[side]

@@ -21,7 +21,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import unique_edges, voronoi_cells
-from ..mesh import Mesh, ragged_arange
+from ..mesh import Mesh, connected, ragged_arange
 from ..progress import Progress
 
 _LOOPS, _ENDS = 4, 12  # earlier cuts, and points, that distances are computed from
@@ -83,11 +83,8 @@ class Surface:
         Both sides are then connected if the surface is.
         """
         i, j = self.lines
-        uncut = np.append(0, np.cumsum(inside[i] == inside[j]))[self.graph.indptr]
-        kept = self.graph.indices[inside[i] == inside[j]]
-        links = sparse.csr_array((np.ones(len(kept)), kept, uncut), shape=self.graph.shape)
-        count, _ = csgraph.connected_components(links, directed=False)
-        if count == 2:
+        uncut = inside[i] == inside[j]
+        if connected(len(inside), i[uncut], j[uncut]).max() == 1:
             return inside
         outside = np.zeros_like(inside)
         outside[self.pieces(~inside)[0]] = True
@@ -116,15 +113,18 @@ class Surface:
 
     def level_lengths(self, faces: IntArray, d: FloatArray, levels: FloatArray) -> FloatArray:
         """Return the length of each level set {d = level} within *faces*; *levels* increase."""
-        order = np.argsort(d[faces], axis=1)
-        corners = np.take_along_axis(faces, order, axis=1)
+        x, y, z = d[faces].T
+        low, high = np.minimum(np.minimum(x, y), z), np.maximum(np.maximum(x, y), z)
+        first, end = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
+        some = np.flatnonzero(end > first)  # faces with a level in between
+        first, end, faces = first[some], end[some], faces[some]
+        corners = np.take_along_axis(faces, np.argsort(d[faces], axis=1), axis=1)
         low, middle, high = d[corners].T
         a, b, c = (self.vertices[column] for column in corners.T)
         least = max(1e-12 * float(np.max(levels, initial=0.0)), float(np.finfo(float).tiny))
         opposite = a + ((middle - low) / np.maximum(high - low, least))[:, None] * (c - a)
         longest = np.linalg.norm(b - opposite, axis=1)
-        first, end = np.searchsorted(levels, low, "right"), np.searchsorted(levels, high)
-        f, k = ragged_arange(end - np.minimum(first, end))
+        f, k = ragged_arange(end - first)
         k += first[f]
         rise = (levels[k] - low[f]) / np.maximum(middle - low, least)[f]
         fall = (high[f] - levels[k]) / np.maximum(high - middle, least)[f]
