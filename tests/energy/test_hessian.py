@@ -9,7 +9,7 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.energy.hessian import _rotation_term, full_factor, quadratic_factor
+from vtk_segdeform.energy.hessian import full_factor, quadratic_factor, rotation_term
 from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import cage_subspace
 
@@ -33,7 +33,7 @@ def bent(p):
 
 def hessian_times(energy, p, dp):
     """Return half the Hessian of E at *p* times *dp*, from the two terms that the solver adds."""
-    lower = np.tril(_rotation_term(energy, p))
+    lower = np.tril(rotation_term(energy, p))
     part = lower + np.tril(lower, -1).T
     return energy.quadratic @ dp - (part @ dp.T.ravel()).reshape(3, -1).T
 
@@ -94,7 +94,7 @@ def test_both_forms_of_the_factor_solve():
     y = RNG.normal(size=p.shape)
     plain = quadratic_factor(held)
     assert_allclose(held @ plain.solve(y), y, atol=1e-9)
-    curved = full_factor(held, energy, p)
+    curved = full_factor(held, rotation_term(energy, p))
     h = curved.solve(y)
     back = hessian_times(energy, p, h) + (held - energy.quadratic) @ h
     assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the term is left out
@@ -105,7 +105,7 @@ def test_the_hessian_of_the_volumes_is_added():
     held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
     g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
     g -= np.swapaxes(g, 1, 2)
-    with_it, without = (full_factor(held, energy, p, volumes=of) for of in (g, None))
+    with_it, without = (full_factor(held, rotation_term(energy, p), volumes=of) for of in (g, None))
     added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T
     blocks = added.reshape(3, m, 3, m)
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -117,12 +117,12 @@ def test_the_hessian_of_the_volumes_is_added():
 def test_a_hessian_that_is_not_convex_has_no_factor():
     assert quadratic_factor(-np.eye(4)) is None
     energy = energy_of(40)
-    assert full_factor(-energy.quadratic, energy, REST) is None
+    assert full_factor(-energy.quadratic, rotation_term(energy, REST)) is None
 
 
 def test_a_mirrored_pose_still_has_a_factor():
     energy = energy_of(40)
     mirrored = REST * [1.0, 1.0, -1.0]
     held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
-    factor = full_factor(held, energy, mirrored)
+    factor = full_factor(held, rotation_term(energy, mirrored))
     assert factor is None or np.isfinite(factor.solve(mirrored)).all()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scenes import sausage
 
+from vtk_segdeform.solver import gauss_newton
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage()  # its cages are so coarse that the handle needs more weight at most targets
@@ -141,3 +142,57 @@ def test_a_copy_continues_a_drag_whose_weights_have_just_been_raised():
     other = deformer.copy()
     assert strength(other) == strength(deformer)
     assert away(deformer.solve(FAR, max_steps=8), other.solve(FAR, max_steps=8)) == 0.0
+
+
+@pytest.fixture(scope="module")
+def bend():
+    """Return the poses of a steady bend with raised weights, and counts of each frame."""
+    counts, frames = {"rotations": 0, "factors": 0}, []
+    with pytest.MonkeyPatch.context() as counting:
+        for name, key in (("rotation_term", "rotations"), ("full_factor", "factors")):
+            counting.setattr(gauss_newton, name, _counted(getattr(gauss_newton, name), counts, key))
+        deformer = SCENE.held()
+        for degrees in np.arange(10.0, 25.0):
+            before = dict(counts)
+            solution = deformer.solve(bent(degrees))
+            made = {key: counts[key] - before[key] for key in counts}
+            frames.append((degrees, solution, strength(deformer), made))
+    return frames
+
+
+def _counted(function, counts, key):
+    def counting(*args, **options):
+        counts[key] += 1
+        return function(*args, **options)
+
+    return counting
+
+
+def test_a_frame_with_raised_weights_takes_few_steps(bend):
+    assert all(weight > 1.0 for _, _, weight, _ in bend)
+    steps = [solution.steps for _, solution, _, _ in bend[2:]]
+    print(f"steps {steps}")
+    assert np.median(steps) <= 4
+
+
+def test_a_pose_of_a_bend_is_that_of_a_solve_from_rest(bend):
+    for degrees, solution, _, _ in bend[::4]:
+        assert abs(solution.volume_change) <= 1e-12
+        assert away(solution, SCENE.held().solve(bent(degrees))) < 1e-5
+
+
+def test_solvers_with_other_weights_share_the_curvature(bend):
+    factors, rotations = (sum(made[key] for *_, made in bend) for key in ("factors", "rotations"))
+    print(f"{factors} factors, {rotations} terms of rotations")
+    assert rotations <= 0.75 * factors
+
+
+def test_errors_are_those_of_the_minimum_before_it_is_reached():
+    solver = SCENE.held()._continuation.solver
+    targets = SCENE.held()._constraints.places(SCENE.held()._frame.inward(NEAR))
+    start = SCENE.held()._p
+    options = gauss_newton.SolverOptions()
+    minimum = solver.minimise(start, targets, options).p
+    solver.forget()
+    loose = solver.minimise(start, targets, gauss_newton.SolverOptions(tolerance=1e-3))
+    assert solver._length(loose.ahead - minimum) < 0.2 * solver._length(loose.p - minimum)

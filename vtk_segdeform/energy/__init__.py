@@ -10,7 +10,7 @@ The files, in reading order:
 """
 
 from .energy import Energy, shape_energy, with_cage_stiffness, with_rotating_rows
-from .hessian import Factor, full_factor, quadratic_factor
+from .hessian import Factor, full_factor, quadratic_factor, rotation_term
 from .operators import reduced_operators, surface_operators
 from .rotation_clusters import join_rotations
 
@@ -21,6 +21,7 @@ __all__ = [
     "join_rotations",
     "quadratic_factor",
     "reduced_operators",
+    "rotation_term",
     "shape_energy",
     "surface_operators",
     "with_cage_stiffness",

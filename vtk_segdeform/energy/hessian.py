@@ -82,22 +82,21 @@ def quadratic_factor(hessian: FloatArray) -> Factor | None:
 
 def full_factor(
     hessian: FloatArray,
-    energy: Energy | None,
-    p: FloatArray,
+    rotations: FloatArray | None,
     *,
     volumes: FloatArray | None = None,
     added: FloatArray | None = None,
 ) -> Factor | None:
-    """Return the factor of *hessian* (m, m) minus the rotations' term of *energy* at *p* (m, 3).
+    """Return the factor of *hessian* (m, m) minus the term of the *rotations*, `rotation_term`.
 
     The Hessian of the preserved *volumes*, G (3, m, m) of `volume_constraints.Volumes`, is added,
     and so is *added* (3m, 3m), which is positive semi-definite.  None if no share of the rotations'
-    term leaves the sum convex; with *added*, or without *energy*, no share at all is tried as well.
+    term leaves the sum convex; with *added*, or without *rotations*, no share at all is tried, too.
     """
-    m = len(p)
-    term = np.zeros((3 * m, 3 * m)) if energy is None else _rotation_term(energy, p)
-    shares = (_SHARES if energy is not None else ()) + (0.0,) * (
-        energy is None or added is not None
+    m = len(hessian)
+    term = np.zeros((3 * m, 3 * m)) if rotations is None else rotations
+    shares = (_SHARES if rotations is not None else ()) + (0.0,) * (
+        rotations is None or added is not None
     )
     for share in shares:
         full = -share * term
@@ -120,7 +119,7 @@ def full_factor(
     return None
 
 
-def _rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
+def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
     """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis."""
     m = len(p)
     total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order

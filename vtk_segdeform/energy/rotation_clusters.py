@@ -45,7 +45,7 @@ from ..arrays import FloatArray, IntArray
 from ..geometry import cluster_within_parts, farthest_points
 from ..progress import Progress, tell
 from .energy import Energy
-from .hessian import full_factor
+from .hessian import full_factor, rotation_term
 
 _PULLS = 12  # places
 _ANCHOR = 1e-9  # of the stiffness, against motion of a free body
@@ -137,7 +137,9 @@ def _pulls(energy: Energy, rest: FloatArray, progress: Progress | None) -> Float
     0 if the Hessian at rest is not convex.
     """
     m, mass, anchor = len(rest), energy.mass, _ANCHOR * np.trace(energy.quadratic)
-    factor = full_factor(energy.quadratic + anchor / np.trace(mass) * mass, energy, rest)
+    factor = full_factor(
+        energy.quadratic + anchor / np.trace(mass) * mass, rotation_term(energy, rest)
+    )
     if factor is None:
         return np.zeros((m, 0, 3))
     tell(progress, 0.2, _MESSAGE)

@@ -60,7 +60,7 @@ class Way:
         return Way((*ends[-_HIGHEST - 1 :], end))
 
     def ahead(self, targets: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]] | None:
-        """Return the extrapolated motion of the cages (m, 3) for *targets*, and the directions Z.
+        """Return the extrapolated cages (m, 3) for *targets*, and the directions Z.
 
         None if there are fewer than two ends, or the targets turn back or move far.
         """
@@ -79,7 +79,7 @@ class Way:
         p = [end.p for end in self.ends]
         degree = _best_degree(p, t)
         there = _extrapolated(p, t, t[-1] + share * lengths[-1], degree)
-        return there - last.p, last.directions
+        return there, last.directions
 
 
 def _best_degree(p: Sequence[FloatArray], t: FloatArray) -> int:

@@ -28,6 +28,7 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
 2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
    needed, and a small step does not mean that the minimum is near.  With the derivatives of the
    rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
+   They are computed again after 6 steps, and shared by solvers with other weights.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
@@ -57,7 +58,7 @@ import numpy as np
 
 from ..arrays import FloatArray, is_number, is_whole
 from ..checks import as_flag, shown
-from ..energy import Energy, Factor, full_factor, quadratic_factor
+from ..energy import Energy, Factor, full_factor, quadratic_factor, rotation_term
 from ..errors import ArgumentError, CageError
 from ..progress import Progress, tell
 from .anderson import Anderson
@@ -76,8 +77,10 @@ _SHORTEST_ACTIVE = 1.0 / 4096.0  # the same while a term is active
 _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
-_OLD = 20  # steps after which H is computed again
+_OLD = 6  # steps after which H is computed again
+_OLDISH = 2  # the same if a solver with other weights has just computed most of it
 _OLD_ACTIVE = 3  # the same while a term is active
+_SIMILAR = 2.0  # ratio of weights up to which a factor of H serves for both
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
 
 
@@ -105,12 +108,17 @@ class SolverOptions:
         as_flag(self.exact_hessian, "exact_hessian")
         as_flag(self.exact_volume, "exact_volume")
 
+    def is_same_iteration(self, other: SolverOptions) -> bool:
+        """Tell whether both take the same steps, up to where they stop."""
+        return replace(self, tolerance=other.tolerance, max_steps=other.max_steps) == other
+
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
     """The last iterate, and how it was reached."""
 
     p: FloatArray  # (m, 3), cage vertices
+    ahead: FloatArray  # (m, 3), p and the next step, which is not taken: nearer to the minimum
     multipliers: FloatArray
     directions: tuple[FloatArray, ...]  # Z with the H of (21), (m, 3) for each constraint
     status: Status
@@ -140,6 +148,19 @@ class _Iterate:
         return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
 
 
+@dataclass(frozen=True, eq=False)
+class _Curvature:
+    """The part of H that takes long to compute, at a pose.
+
+    It hardly depends on the weights, so that solvers for the same targets share it.
+    """
+
+    p: FloatArray  # (m, 3)
+    targets: FloatArray
+    rotations: FloatArray  # (3m, 3m)
+    volumes: FloatArray | None  # (3, m, m)
+
+
 @dataclass(eq=False)
 class _State:
     """The running state of an iteration, from which a later call continues."""
@@ -149,6 +170,7 @@ class _State:
     age: int = _OLD  # of the factor, in steps
     step_size: float = math.inf  # of the last step
     has_terms: bool = False  # whether the factor is with those terms that were active
+    curvature: _Curvature | None = None  # in the factor
     _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
 
     def needs_factor(self, here: _Iterate) -> bool:
@@ -165,19 +187,28 @@ class _State:
     @property
     def step_is_doubtful(self) -> bool:
         """Whether the step just computed is too long for a factor from another pose."""
-        return self.age > 1 and self.step_size > _LONG
+        return self.age > 0 and self.step_size > _LONG
 
     def renew_factor(self, factor: Factor, here: _Iterate) -> None:
         """Use a factor of H at this pose."""
-        self.factor, self.age, self.has_terms = factor, 0, here.is_active
+        is_own = self.curvature is None or self.curvature.p is here.p
+        self.factor, self.age, self.has_terms = factor, 0 if is_own else 1, here.is_active
 
     def drop_factor(self) -> None:
         """Have H computed again before the next step."""
         self.age = _OLD
 
-    def for_other_targets(self, options: SolverOptions) -> _State:
+    def for_other_targets(self, acceleration: int) -> _State:
         """Return the state with which a solve for other targets begins."""
-        return _State(Anderson(options.acceleration), self.factor, self.age, 0.0, self.has_terms)
+        other = _State(Anderson(acceleration), self.factor, max(self.age, 1), 0.0, self.has_terms)
+        other.curvature = self.curvature
+        return other
+
+    def copy(self) -> _State:
+        """Return a state from which another solver continues."""
+        other = copy.copy(self)
+        other.acceleration = copy.deepcopy(self.acceleration)
+        return other
 
     def ended_at(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Remember where the call ended; return itself."""
@@ -186,7 +217,7 @@ class _State:
 
     def continues(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> bool:
         """Tell whether a call with these arguments begins where the last one ended."""
-        if self._end is None or replace(options, max_steps=1) != replace(self._end[2], max_steps=1):
+        if self._end is None or not options.is_same_iteration(self._end[2]):
             return False
         return np.array_equal(p, self._end[0]) and np.array_equal(targets, self._end[1])
 
@@ -205,6 +236,7 @@ class GaussNewton:
     _state: _State | None = field(init=False, repr=False, default=None)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
     _way: Way = field(init=False, repr=False, default=Way())
+    _shared: list[_Curvature] = field(init=False, repr=False, default_factory=list)  # the last one
     _begun: tuple[Term, ...] = field(init=False, repr=False, default=())  # the terms of this call
 
     def __post_init__(self) -> None:
@@ -228,13 +260,33 @@ class GaussNewton:
     def copy(self) -> GaussNewton:
         """Return a solver that continues from here independently."""
         other = copy.copy(self)
-        other._state = copy.deepcopy(self._state)
+        other._state = None if self._state is None else self._state.copy()
+        other._shared = [*self._shared]
         return other
 
     def forget(self) -> None:
         """Discard the running state: the next call begins like the first."""
         self._state = self._last = None
         self._way = Way()
+        self._shared.clear()
+
+    def share_with(self, other: GaussNewton) -> None:
+        """Share the curvature with another solver, for the same energy."""
+        self._shared = other._shared
+
+    def with_strength(self, strength: FloatArray) -> GaussNewton:
+        """Return a solver with other weights of the positions.
+
+        If they differ little, it continues with the factor of H and on the way of this one.
+        """
+        other = replace(self, positions=self.positions.with_strength(strength))
+        other.share_with(self)
+        ratio = strength / self.positions.strength
+        if max(ratio.max(initial=1.0), 1.0 / ratio.min(initial=1.0)) <= _SIMILAR:
+            if self._state is not None:
+                other._state = self._state.for_other_targets(self._state.acceleration.window)
+            other._last, other._way, other._begun = self._last, self._way, self._begun
+        return other
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
@@ -247,6 +299,7 @@ class GaussNewton:
         merits = [here.merit]
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
+        step = np.zeros_like(p)
         newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
         remaining = math.inf
@@ -254,10 +307,10 @@ class GaussNewton:
         while len(merits) <= last:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
             is_coupled = newton or here.is_active or state.has_terms
-            if is_coupled and state.needs_factor(here):
-                factor = self._full_factor(here, state, newton) or self._factor
+            is_cheap = newton and state.age >= _OLDISH and self._is_known(here, state, targets)
+            if is_coupled and (is_cheap or state.needs_factor(here)):
+                factor = self._full_factor(here, state, targets, newton) or self._factor
                 state.renew_factor(factor, here)
-            state.age += 1
             step, multipliers, directions = self._step(here, state.factor)
             state.step_size = self._length(step)
             if is_coupled and state.step_is_doubtful:
@@ -282,7 +335,7 @@ class GaussNewton:
                 if not self._improves(ahead, here):
                     state.acceleration.forget()
                     ahead = None
-            is_renewable = is_coupled and state.age > 1  # H is of an earlier pose
+            is_renewable = is_coupled and state.age > 0  # H is of an earlier pose
             if ahead is None and not (is_renewable and options.acceleration):
                 ahead = self._shortened(here, step, directions, term, options)
             if ahead is None and is_renewable:
@@ -294,16 +347,18 @@ class GaussNewton:
                 if ahead is not None and ahead.merit >= here.merit - self._rounding(here):
                     ahead = None
             if ahead is None:
-                status, remaining = Status.STALLED, 0.0
+                status, remaining, step = Status.STALLED, 0.0, np.zeros_like(step)
                 break
-            here = ahead
+            here, step = ahead, np.zeros_like(step)
             merits.append(here.merit)
+            state.age += 1
         if directions:  # not those of a factor from another pose: the result would depend on it
             directions = self._factor.solve_all([np.zeros_like(here.p), *here.rows])[1:]
         self._state, self._last = state.ended_at(here.p, targets, options), here
-        self._way = self._way.on_to(End(here.p, targets, tuple(directions)))
+        self._way = self._way.on_to(End(here.p + step, targets, tuple(directions)))
         return SolverResult(
             p=here.p,
+            ahead=here.p + step,
             multipliers=multipliers,
             directions=tuple(directions),
             status=status,
@@ -366,21 +421,33 @@ class GaussNewton:
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
         return self._evaluate(p, moved_along(paths, t), term)
 
-    def _full_factor(self, here: _Iterate, state: _State, newton: bool) -> Factor | None:
+    def _full_factor(
+        self, here: _Iterate, state: _State, targets: FloatArray, newton: bool
+    ) -> Factor | None:
         """Return the factor of the exact Hessian; None if it is not convex.
 
         Unless *newton*, it is that of (21) with the further terms; None without them.
         """
         of_terms = hessian_of(self._begun, here.p, here.x) if here.is_active else None
         if not newton:
-            return (
-                full_factor(self._hessian, None, here.p, added=of_terms) if here.is_active else None
-            )
-        of_volumes = None
-        step, multipliers, _ = self._step(here, self._factor)
-        if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
-            of_volumes = self.volumes.hessian(here.p, multipliers)
-        return full_factor(self._hessian, self.energy, here.p, volumes=of_volumes, added=of_terms)
+            return full_factor(self._hessian, None, added=of_terms) if here.is_active else None
+        if not self._is_known(here, state, targets):
+            of_volumes = None
+            step, multipliers, _ = self._step(here, self._factor)
+            if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
+                of_volumes = self.volumes.hessian(here.p, multipliers)
+            rotations = rotation_term(self.energy, here.p)
+            self._shared[:] = [_Curvature(here.p, targets, rotations, of_volumes)]
+        known = state.curvature = self._shared[0]
+        return full_factor(self._hessian, known.rotations, volumes=known.volumes, added=of_terms)
+
+    def _is_known(self, here: _Iterate, state: _State, targets: FloatArray) -> bool:
+        """Tell whether a solver with other weights has computed H near here."""
+        if not self._shared or here.is_active or self._shared[0] is state.curvature:
+            return False
+        known = self._shared[0]
+        is_same = np.array_equal(known.targets, targets)
+        return is_same and self._length(here.p - known.p) < _CLOSE
 
     def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Return the state from which a call with these arguments begins."""
@@ -389,7 +456,7 @@ class GaussNewton:
             return _State(Anderson(options.acceleration), self._factor)
         if state.continues(p, targets, options):
             return state
-        return state.for_other_targets(options)
+        return state.for_other_targets(options.acceleration)
 
     def _surface(self, p: FloatArray) -> FloatArray:
         needed = self.volumes.constraints or self.energy.has_vertex_rotations
@@ -428,7 +495,7 @@ class GaussNewton:
         found = self._way.ahead(targets) if options.acceleration else None
         if found is None or len(found[1]) != len(self.volumes.constraints):
             return here
-        ahead = self._retract(here.p + found[0], found[1], term, options)
+        ahead = self._retract(found[0], found[1], term, options)
         return ahead if ahead.merit < here.merit else here
 
     def _shortened(

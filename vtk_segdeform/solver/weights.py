@@ -6,6 +6,9 @@ weight that it needs, and excess weight distorts the mesh, so the second pass in
 the last weight that was too low and the first that was not.  The errors end just below the
 tolerance, and the pose changes smoothly with the targets.
 
+Both passes only ask whether weights suffice, which a loose solve and the step after it tell: only
+the last solver is iterated to the tolerance.  They share the curvature of the energy.
+
 A pose is final when the continuation began with the initial weights, so that the weights, and with
 them the pose, depend on the targets and not on the poses before.  The solver of each combination
 of weights starts from its own last pose.  During a drag the weights stay the same until the targets
@@ -31,6 +34,7 @@ _FEWEST, _MOST = 0.5, 1.1  # of the tolerance: errors at which a drag keeps its 
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _TRIES = 3
 _ALL = 0.98  # share of the higher weights beyond which these are used
+_LOOSE = 1e-5  # tolerance of poses that only show whether their weights suffice
 _SAME = 1e-6  # relative difference of weights that are equal but for rounding
 
 
@@ -41,10 +45,11 @@ class _Weighted:
     solver: GaussNewton
     p: FloatArray  # (m, 3)
     settled: FloatArray = field(init=False)  # (m, 3), the last pose of `follow`
-    near: tuple[FloatArray, SolverResult] | None = None  # places (k, 3), and a pose near a minimum
+    ahead: FloatArray = field(init=False)  # (m, 3), `SolverResult.ahead`
+    known: tuple[FloatArray, SolverOptions, SolverResult] | None = None
 
     def __post_init__(self) -> None:
-        self.settled = self.p
+        self.settled = self.ahead = self.p
 
     @property
     def strength(self) -> FloatArray:
@@ -52,33 +57,45 @@ class _Weighted:
         return self.solver.positions.strength
 
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
-        """Minimise from the last pose, and keep the new one."""
+        """Minimise from the last pose, and keep the new one.
+
+        In a live drag a pose near the minimum counts as converged, and is not improved.
+        """
         result = self.solver.minimise(self.p, places, options)
-        self.p = result.p
+        if options.within is not None and result.remaining <= options.within:
+            result = replace(result, status=Status.CONVERGED)
+        self.p, self.ahead = result.p, result.ahead
+        self.known = None if result.status is Status.STEP_LIMIT else (places, options, result)
         return result
 
-    def near_at(self, places: FloatArray) -> SolverResult | None:
-        """Return the result of the last live solve, if it was near the minimum at *places*."""
-        if self.near is None or self.near[1].p is not self.p:
+    def known_at(self, places: FloatArray, options: SolverOptions) -> SolverResult | None:
+        """Return the last result, if it is that of a solve with these arguments."""
+        if self.known is None or self.known[2].p is not self.p:
             return None
-        return self.near[1] if np.array_equal(self.near[0], places) else None
+        is_same = np.array_equal(self.known[0], places) and (
+            (options.tolerance, options.within) == (self.known[1].tolerance, self.known[1].within)
+        )
+        return self.known[2] if is_same else None
 
     def copy(self) -> _Weighted:
         other = _Weighted(self.solver.copy(), self.p)
-        other.settled = self.settled
+        other.settled, other.ahead = self.settled, self.ahead
         return other
 
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """The largest errors of each set, (s,): at its places, and at checked vertices between them."""
+    """The largest errors of each set, (s,): at its places, and at checked vertices between them.
+
+    They are those of the pose after the next step, which is more accurate than the pose itself.
+    """
 
     places: FloatArray
     checks: FloatArray
 
     @classmethod
     def of(cls, weighted: _Weighted, places: FloatArray) -> _Errors:
-        return cls(*weighted.solver.positions.errors(weighted.p, places))
+        return cls(*weighted.solver.positions.errors(weighted.ahead, places))
 
     @property
     def both(self) -> FloatArray:
@@ -140,27 +157,29 @@ class _Run:
     def __init__(self, places: FloatArray, options: SolverOptions) -> None:
         self.places = places
         self.used: list[_Weighted] = []
+        self.tries: list[_Weighted] = []  # those with weights between two of the first pass
         self.steps = 0
         self.is_live = options.within is not None
         self._options = options
 
-    def solve(self, weighted: _Weighted) -> SolverResult:
-        """Solve with *weighted*, and count its steps.
-
-        In a live drag a pose near the minimum counts as converged, and is not improved.
-        """
+    def solve(self, weighted: _Weighted, options: SolverOptions | None = None) -> SolverResult:
+        """Solve with *weighted* to the tolerance of *options*, or to `_LOOSE`; count its steps."""
         self.used.append(weighted)
-        if self._options.within is None:
-            result = weighted.solve(self.places, self._options)
-        elif (known := weighted.near_at(self.places)) is not None:
+        if options is None:
+            tolerance = max(self._options.tolerance, _LOOSE)
+            options = replace(self._options, tolerance=tolerance)
+        known = weighted.known_at(self.places, options)
+        if known is not None:
             return known
-        else:
-            result = weighted.solve(self.places, self._options)
-            if result.remaining <= self._options.within:
-                result = replace(result, status=Status.CONVERGED)
-                weighted.near = self.places, result
+        result = weighted.solve(self.places, options)
         self.steps += result.steps
         return result
+
+    def finish(self, weighted: _Weighted, result: SolverResult) -> SolverResult:
+        """Return the *result* of *weighted*, continued to the tolerance of the options."""
+        finished = self.solve(weighted, self._options)
+        further = () if finished.p is result.p else finished.merits[1:]
+        return replace(finished, merits=(*result.merits, *further))
 
 
 class WeightContinuation:
@@ -181,6 +200,7 @@ class WeightContinuation:
         self._initial = _Weighted(solver, p)
         self._raised: list[_Weighted] = []  # with higher weights, used for the last pose
         self._current = self._initial  # the solver of the last pose
+        self._tries: list[_Weighted] = []  # `_Run.tries` of the last pose with any
         self._only_current = False  # whether only that solver has followed the last targets
         self._tolerance = tolerance
 
@@ -188,11 +208,18 @@ class WeightContinuation:
         """Return a continuation that proceeds from here independently."""
         initial = self._initial
         other = WeightContinuation(initial.solver.copy(), initial.p, self._tolerance)
-        copies = {each: each.copy() for each in (initial, *self._raised, self._current)}
+        copies = {each: each.copy() for each in self._all}
+        for each in copies.values():
+            each.solver.share_with(copies[initial].solver)
         other._initial, other._current = copies[initial], copies[self._current]
         other._raised = [copies[each] for each in self._raised]
+        other._tries = [copies[each] for each in self._tries]
         other._only_current = self._only_current
         return other
+
+    @property
+    def _all(self) -> set[_Weighted]:
+        return {self._initial, *self._raised, *self._tries, self._current}
 
     @property
     def solver(self) -> GaussNewton:
@@ -211,15 +238,15 @@ class WeightContinuation:
 
     def continue_from(self, p: FloatArray) -> None:
         """Continue from cage vertices *p* (m, 3), and preserve the volumes of that pose."""
-        self._current.p = self._current.settled = p
+        self._current.p = self._current.ahead = self._current.settled = p
         volumes = self._current.solver.volumes.preserved_at(p)
-        for weighted in (self._initial, *self._raised):
+        for weighted in self._all:
             weighted.solver.volumes = volumes
 
     def restart(self) -> None:
         """Begin the next solve where the last successful `follow` ended."""
-        for weighted in (self._initial, *self._raised):
-            weighted.p = weighted.settled
+        for weighted in self._all:
+            weighted.p = weighted.ahead = weighted.settled
             weighted.solver.forget()
 
     def solve_at_current_weights(self, places: FloatArray, options: SolverOptions) -> SolverResult:
@@ -241,6 +268,7 @@ class WeightContinuation:
         if result.status is Status.STEP_LIMIT:
             return replace(result, steps=run.steps, remaining=np.inf)
         self._current, self._raised = found, list(dict.fromkeys(run.used[1:]))
+        self._tries = run.tries or self._tries
         for weighted in (self._initial, *self._raised):
             weighted.settled = weighted.p
         return replace(result, steps=run.steps, status=Status.STEP_LIMIT)
@@ -248,16 +276,20 @@ class WeightContinuation:
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Return the final pose for *places* (k, 3); its steps are those at all weights."""
         if self._only_current:
-            self._initial.p, self._raised = self._current.p, [self._current]
+            self._initial.p = self._initial.ahead = self._current.p
+            self._raised = [self._current]
             self._only_current = False
         run = _Run(places, options)
         found, result = self._raise(run)
+        if result.status is not Status.STEP_LIMIT:
+            result = run.finish(found, result)
         if result.status is Status.STEP_LIMIT and self.has_raised_weights:
             # The pose on the screen keeps its weights until a final one is known.
-            result = replace(run.solve(self._current), status=Status.STEP_LIMIT)
+            result = replace(run.solve(self._current, options), status=Status.STEP_LIMIT)
             self._raised = list(dict.fromkeys([*run.used[1:], *self._raised]))
         else:
-            self._current, self._raised = found, run.used[1:]
+            self._current, self._raised = found, list(dict.fromkeys(run.used[1:]))
+            self._tries = run.tries or self._tries
         return replace(result, steps=run.steps)
 
     def _raise(self, run: _Run) -> tuple[_Weighted, SolverResult]:
@@ -270,7 +302,9 @@ class WeightContinuation:
             is_off = (errors.places > self._tolerance) & (here.strength < _HIGHEST)
             if not is_off.any():
                 break
-            ahead = self._at(np.where(is_off, _FACTOR * here.strength, here.strength), near=here)
+            ahead = self._at(
+                np.where(is_off, _FACTOR * here.strength, here.strength), near=here, start=here.p
+            )
             attempt = run.solve(ahead)
             reached = _Errors.of(ahead, run.places)
             # If the cages cannot put a vertex in place, more weight only distorts the rest.
@@ -298,12 +332,16 @@ class WeightContinuation:
                 errors[inside] >= _FEWEST * self._tolerance
             ).all():
                 return last, attempt
-        for _ in range(_TRIES):
+        start = here.p
+        for k in range(_TRIES):
             strength = bracket.at(_AIM * self._tolerance)
             if strength is None or result.status is Status.STEP_LIMIT:
                 break
-            between = self._at(strength, near=here)
+            near = self._tries[k] if k < len(self._tries) else self._current
+            between = self._at(strength, near=near, start=start)
+            run.tries.append(between)
             attempt = run.solve(between)
+            start = between.p
             if attempt.status is Status.STEP_LIMIT:
                 return here, replace(result, status=attempt.status)
             errors = _Errors.of(between, run.places).both
@@ -312,10 +350,9 @@ class WeightContinuation:
             bracket = bracket.narrowed(strength, errors, allowed)
         return here, result
 
-    def _at(self, strength: FloatArray, *, near: _Weighted) -> _Weighted:
-        """Return the solver with these weights, in its last pose or else in that of *near*."""
+    def _at(self, strength: FloatArray, *, near: _Weighted, start: FloatArray) -> _Weighted:
+        """Return the solver with these weights, in its last pose or else made from *near*."""
         for weighted in self._raised:
             if np.allclose(weighted.strength, strength, rtol=_SAME, atol=0.0):
                 return weighted
-        positions = near.solver.positions.with_strength(strength)
-        return _Weighted(replace(near.solver, positions=positions), near.p)
+        return _Weighted(near.solver.with_strength(strength), start)

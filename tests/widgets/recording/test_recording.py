@@ -244,10 +244,10 @@ class Dragging:
         x, y = hand.at(self.session.vertices[SCENE.handle].mean(axis=0))
         hand.press((x, y))
         for k in range(1, 5):
-            hand.move((x - 4 * k, y + 11 * k))
+            hand.move((x - 16 * k, y + 24 * k))
         hand.tick(3)
-        hand.move((x - 22, y + 60))
-        hand.release((x - 22, y + 60))
+        hand.move((x - 30, y + 130))
+        hand.release((x - 30, y + 130))
         hand.tick(2)
         hand.drag([(20, 380), (35, 370)])
         hand.tick(2)
