@@ -22,9 +22,10 @@ import vtk_segdeform as sd
 def blas():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
-def drag(n):
-    mesh = sd.models.cactus(n)
-    height = mesh.vertices[:, 2]
+mesh = sd.models.cactus(500)
+height = mesh.vertices[:, 2]
+
+def drag():
     tip = np.flatnonzero(height > 0.92)
     regions = sd.segment(mesh, 2)
     cages = sd.fit_cages(mesh, regions, 24)
@@ -32,10 +33,10 @@ def drag(n):
     poses = [deformer.solve(mesh.vertices[tip] + [0.1 * k, 0.0, 0.0]).vertices for k in (1, 2)]
     return [*poses, deformer.carry(mesh.vertices[::5])]
 
-before, alone = blas(), drag(500)
+before, alone = blas(), drag()
 for _ in range(int(sys.argv[1])):
     together = []
-    workers = [threading.Thread(target=lambda: together.append(drag(500))) for _ in range(3)]
+    workers = [threading.Thread(target=lambda: together.append(drag())) for _ in range(3)]
     for worker in workers:
         worker.start()
     for worker in workers:
