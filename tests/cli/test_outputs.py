@@ -15,10 +15,12 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.io import convert
+from vtk_segdeform.pictures import canvas
 
 BAR = models.bar(divisions=(3, 3, 9))
 LONG = "n" * 256
-POSE = ["--fixed", "z<10%", "--handle", "z>90%", "--translate", "0,0,0.1", "--regions", "1"]
+POSE = ["--fixed", "z<10%", "--handle", "z>90%", "--translate", "0,0,0.1"]
+POSE += ["--regions", "1", "--cage-vertices", "40"]
 posix = pytest.mark.skipif(os.name != "posix", reason="names of any bytes, pipes")
 
 
@@ -67,6 +69,7 @@ def test_a_picture_that_fails_after_the_solve_is_an_error_too(folder, monkeypatc
         real(draft, target)
 
     monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(canvas, "_HEIGHT", 100)
     assert main(["deform", "bar.ply", "-o", "out.ply", *POSE, "--picture", "a.png"]) == 1
     assert "a.png: cannot be written (No space left" in capsys.readouterr().err
     assert sorted(os.listdir(folder)) == ["bar.ply", "out.ply"]

@@ -20,7 +20,7 @@ from vtk_segdeform.io.convert import to_polydata
 
 pytestmark = pytest.mark.usefixtures("bound_once", "fitted_once")
 
-MESH = sd.models.cactus(500)
+MESH = sd.models.bar(divisions=(4, 4, 14))
 HEIGHT = MESH.vertices[:, 2]
 FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)
 SHIFT = np.array([0.25, 0.0, -0.05])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import shutil
 import subprocess
 import sys
@@ -108,10 +109,11 @@ def test_a_scipy_that_is_too_old_is_an_error(tmp_path):
     assert "has scipy 1.10.1, vtk_segdeform needs 1.13" in done.stdout + done.stderr
 
 
-def test_the_plugin_prints_its_path():
-    done = subprocess.run(
-        [sys.executable, "-m", "vtk_segdeform.filters.paraview_plugin", "--path"],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert Path(done.stdout.strip()).samefile(PLUGIN)
-    assert done.returncode == 0
+def test_the_plugin_prints_its_path(monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["paraview_plugin", "--path"])
+    with pytest.raises(SystemExit) as end:  # as python -m does
+        runpy.run_module(
+            "vtk_segdeform.filters.paraview_plugin", run_name="__main__", alter_sys=True
+        )
+    assert end.value.code == 0
+    assert Path(capsys.readouterr().out.strip()).samefile(PLUGIN)

@@ -218,7 +218,7 @@ def test_quadrangles_are_cut_and_other_types_are_errors():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-@pytest.mark.parametrize("suffix", every(4, sorted(meshlab.WRITES)))
+@pytest.mark.parametrize("suffix", every(8, sorted(meshlab.WRITES)))
 def test_files_in_formats_of_pymeshlab_are_written_and_read(tmp_path, suffix):
     mesh = Mesh(*icosphere(2))
     write_mesh(tmp_path / f"a{suffix}", mesh)

@@ -128,14 +128,14 @@ def test_projects_with_too_many_or_too_large_layers_are_errors_at_once(tmp_path,
         raise AssertionError(f"{name} was read")
 
     monkeypatch.setattr("vtk_segdeform.io.meshlab_project.read_polydata", read)
-    for count in (1001, 100_000):
+    for count in (1001, 20_000):
         group = f"<MeshGroup>{one * count}</MeshGroup>"
         path.write_text(f"<MeshLabProject>{group}</MeshLabProject>")
         with pytest.raises(
             sd.errors.MeshError, match=rf"work\.mlp: has {count} layers; the limit is 1000"
         ):
             read_project(path)
-    path.write_text("<MeshLabProject>" + "<a>" * 1_000_000)
+    path.write_text("<MeshLabProject>" + "<a>" * 100_000)
     with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*nested more than 32 deep"):
         read_project(path)
     os.truncate(layer, 45_000_000_000)

@@ -66,12 +66,13 @@ def test_the_triangles_of_a_body_are_well_shaped(body):
     assert length.max() < 4.0 * length.min() ** 0.5 * np.median(length) ** 0.5
 
 
+@pytest.mark.usefixtures("cached_models")
 def test_the_default_cactus_is_as_large_as_the_papers():
     assert models.cactus().n_vertices == 5430
 
 
 def test_models_are_deterministic():
-    one, two = models.cactus(700), models.cactus(700)
+    one, two = models.cactus(500), models.cactus(500)
     assert one is not two
     assert_array_equal(one.vertices, two.vertices)
     assert_array_equal(one.faces, two.faces)

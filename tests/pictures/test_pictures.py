@@ -31,6 +31,9 @@ def renderer():
         canvas.require_offscreen()
     except MissingDependencyError as error:
         pytest.skip(str(error))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(canvas, "_HEIGHT", 400)  # half as high as those of users
+        yield
 
 
 def pixels(path) -> np.ndarray:
@@ -63,7 +66,7 @@ def test_the_handle_is_red_at_the_top_at_rest_and_at_the_right_when_deformed(tmp
     image = pixels(tmp_path / "a.png")
     half = image.shape[1] // 2
     rest, after = red(image[:, :half]), red(image[:, half:])
-    assert min(rest.sum(), after.sum()) > 300
+    assert min(rest.sum(), after.sum()) > 75
     assert middle(rest)[0] < 0.35
     assert middle(after)[1] > middle(rest)[1] + 0.2
     assert middle(after)[0] == pytest.approx(middle(rest)[0], abs=0.1)  # one camera, one scale
@@ -71,7 +74,8 @@ def test_the_handle_is_red_at_the_top_at_rest_and_at_the_right_when_deformed(tmp
     assert middle(dark[image.shape[0] // 2 :, :half])[0] > 0.5  # the fixed foot is grey, below
 
 
-def test_the_background_is_white_and_the_model_is_inside_the_picture(tmp_path):
+def test_the_background_is_white_and_the_model_is_inside_the_picture(tmp_path, monkeypatch):
+    monkeypatch.setattr(canvas, "_HEIGHT", 800)  # titles have the same size in small pictures
     picture_before_after(tmp_path / "a.png", BAR, BAR.vertices, fixed=[], handle=[])
     image = pixels(tmp_path / "a.png")
     frame = np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]])
@@ -90,7 +94,7 @@ def test_expansion_is_red_and_compression_blue_at_their_places(tmp_path):
 
 def test_no_change_at_all_is_drawn_without_dividing_by_zero(tmp_path):
     picture_volume_change(tmp_path / "a.png", BAR, BAR.vertices, np.zeros(BAR.n_vertices))
-    model = pixels(tmp_path / "a.png")[:600]
+    model = pixels(tmp_path / "a.png")[:300]
     assert np.ptp(model, axis=-1).max() < 25  # no colour anywhere
     picture_distortion(tmp_path / "b.png", BAR, BAR.vertices, np.zeros(BAR.n_faces))
 

@@ -76,21 +76,27 @@ def drag(session: sd.Session, fixed, handle, targets) -> None:
     session.commit()
 
 
-# Cages are fitted to five of them, and to the others in the campaign.
-FITTED = {
-    "triangle soup", "half a body", "flat sheet", "Moebius strip", "soup of everything, flipped",
-}  # fmt: skip
+# Bent in `make test`: those that are written to files as well, and every third of the others.
+FILED = [
+    "triangle soup", "concave polygons", "12 holes", "row of fins", "several parts, some open",
+    "seam, flipped patch, holes and quadrilaterals",
+]  # fmt: skip
+FITTED = {"half a body", "Moebius strip", "soup of everything, flipped"}
+OFTEN = {*FILED, *FITTED, *list(NAMED)[::3]}
+
+
+def bent_often(specimen: Specimen, session_of=bent_session, often=OFTEN):
+    """Return a row of `parametrize`: the specimen and its session; the rare in the campaign."""
+    fitted = ", fitted" if session_of is fitted_session else ""
+    marks = () if specimen.name in often else pytest.mark.campaign
+    return pytest.param(specimen, session_of, id=specimen.name + fitted, marks=marks)
+
+
 BENT = pytest.mark.parametrize(
     ("specimen", "session_of"),
-    [pytest.param(each, bent_session, id=each.name) for each in SPECIMENS]
-    + [
-        pytest.param(
-            each, fitted_session, id=f"{each.name}, fitted",
-            marks=() if each.name in FITTED else pytest.mark.campaign,
-        )
-        for each in SPECIMENS
-    ],
-)  # fmt: skip
+    [bent_often(each) for each in SPECIMENS]
+    + [bent_often(each, fitted_session, FITTED) for each in SPECIMENS],
+)
 
 
 # Comparison of what was given and what comes back.
@@ -241,9 +247,9 @@ def bent_original(clean) -> sd.Session:
     return bent_in_a_box(sd.Mesh(*clean()))
 
 
-@pytest.mark.parametrize("specimen", CLEAN, ids=[each.name for each in CLEAN])
-def test_the_pose_is_that_of_the_clean_original_to_rounding(specimen: Specimen):
-    session, original = bent_session(specimen.name), bent_original(specimen.clean)
+@pytest.mark.parametrize(("specimen", "session_of"), [bent_often(each) for each in CLEAN])
+def test_the_pose_is_that_of_the_clean_original_to_rounding(specimen: Specimen, session_of):
+    session, original = session_of(specimen.name), bent_original(specimen.clean)
     mesh = session.mesh
     order, other = (np.lexsort((m.vertices + 0.0).T) for m in (mesh, original.mesh))
     far = np.abs(mesh.vertices).max() / mesh.diagonal
@@ -312,10 +318,6 @@ def test_workarounds_are_sentences_about_points_of_what_was_given(specimen: Spec
 
 OWN = [".ply", ".obj", ".off"]
 OF_VTK = [".vtp", ".vtk", ".vtkhdf"]
-FILED = [
-    "triangle soup", "concave polygons", "12 holes", "row of fins", "several parts, some open",
-    "seam, flipped patch, holes and quadrilaterals",
-]  # fmt: skip
 # Points in no cell, NaN, strips and lines cannot be stored by every format.
 NOT_FILED = {
     "strips", "lines and vertices", "NaN in unused points", "polygons, strips, lines and vertices",

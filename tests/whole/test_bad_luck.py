@@ -45,8 +45,8 @@ def killed(folder, count, seed):
 
 @posix
 def test_a_save_that_is_killed_leaves_the_old_file_or_the_new(tmp_path):
-    found = killed(tmp_path, 40, seed=1)
-    assert found["old"] + found["new"] == 40
+    found = killed(tmp_path, 20, seed=1)
+    assert found["old"] + found["new"] == 20
     assert found["killed while writing"] > 0  # otherwise nothing was tested
 
 

@@ -10,6 +10,8 @@ from types import ModuleType
 
 import pytest
 
+from vtk_segdeform import models
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "vtk_segdeform"
 WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
@@ -43,7 +45,12 @@ def test_the_examples_of_a_module_are_right(name, monkeypatch, tmp_path, cached_
     monkeypatch.chdir(tmp_path)  # for examples that write files
     module = imported(name)
     linecache.clearcache()  # otherwise doctest checks every cached file before each docstring
-    failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    cached = {"cactus": models.cactus, "dinosaur": models.dinosaur}
+    failed, attempted = doctest.testmod(
+        module,
+        extraglobs=cached if name == "vtk_segdeform.models.shapes" else None,
+        optionflags=doctest.NORMALIZE_WHITESPACE,
+    )
     assert attempted
     assert not failed
 

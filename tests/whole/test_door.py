@@ -143,18 +143,21 @@ def test_every_parameter_has_a_valid_value_and_the_call_returns(modules):
 @pytest.mark.parametrize("modules", [CORE, WIDGETS], ids=["core", "widgets"])
 def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     cheap = [call for call in _all(modules) if not public_calls.expensive(call)]
-    _check_errors(cheap, 1, 2, bounded)
+    _check_errors(cheap, 1, 1, bounded)
 
 
+@pytest.mark.parametrize(
+    ("step", "most"), [(3, 8), pytest.param(1, 21, marks=pytest.mark.campaign)]
+)
 @pytest.mark.parametrize("cls", [State, Pose, Locality], ids=lambda cls: cls.__name__)
-def test_a_session_rejects_a_state_with_bad_parts(cls, bounded):
-    """Each field of a state, or of its pose, in turn holds each bad value."""
+def test_a_session_rejects_a_state_with_bad_parts(cls, step, most, bounded):
+    """Each field of a state, or of its pose, in turn holds each *step*-th bad value."""
     state = public_calls.session().state
     last = Locality(100, 0.5, 0.3, 0.5, state.pose.cage_vertices)
     thing = {State: state, Pose: state.pose, Locality: last}[cls]
     accepted = 0
-    for each in fields(cls):
-        for kind in BAD:
+    for number, each in enumerate(fields(cls)):
+        for kind in [*BAD][number % step :: step]:
             bad = replace(thing, **{each.name: BAD[kind]()})
             if cls is not State:
                 bad = replace(state, **{cls.__name__.lower(): bad})
@@ -169,7 +172,8 @@ def test_a_session_rejects_a_state_with_bad_parts(cls, bounded):
                 message = ""
                 accepted += 1
             assert len(message) < LONGEST, (each.name, kind)
-    assert accepted < 22  # pivots may be any mapping: names of no handle do not count
+    print(f"{cls.__name__}: {accepted} accepted")
+    assert accepted <= most  # pivots may be any mapping: names of no handle do not count
 
 
 def _paths() -> list[tuple[Call, str]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import configparser
 import importlib
 import re
@@ -13,6 +12,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from test_architecture import FILES, imports  # parsed once for both
 
 import vtk_segdeform
 
@@ -41,15 +41,9 @@ def names_in(text: str) -> set[str]:
     return {re.split(r"[^\w.-]", line.strip())[0] for line in text.splitlines() if line.strip()}
 
 
-def imported_by(folder: str) -> set[str]:
-    """Return the top-level names that the sources of a folder import from elsewhere."""
-    found = set()
-    for path in (ROOT / folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Import):
-                found |= {alias.name.partition(".")[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and not node.level:
-                found.add(str(node.module).partition(".")[0])
+def imported() -> set[str]:
+    """Return the top-level names that the sources import from elsewhere."""
+    found = {what.module for name in FILES for what in imports(name) if not what.ours}
     return found - set(sys.stdlib_module_names) - {"vtk_segdeform"}
 
 
@@ -57,7 +51,7 @@ def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
     for extra in ("meshlab", "qt", "web", "jupyter", "bench"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
-    used = imported_by("vtk_segdeform") | imported_by("widgets")
+    used = imported()
     assert {"numba", "qtpy"} <= used  # the sources of all folders are read
     assert {LIBRARY_OF.get(name, name) for name in used - UNDECLARED} <= declared
 

@@ -22,7 +22,7 @@ BODIES = {
     "cup": lambda: revolved([0.02, 1.0, 1.0], [0.0, 0.0, 2.0], 20, 20),
     "bottle": lambda: bottle(20, 24),
     "tube": lambda: tube(8.0, 16, 30),
-    "body with 12 holes": lambda: with_holes(models.cactus(600), 12, 0.03),
+    "body with 12 holes": lambda: with_holes(models.cactus(500), 12, 0.03),
     "open box": lambda: open_box(5),
 }
 
