@@ -37,15 +37,15 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.solver.gauss_newton import GaussNewton
 
 TINY = Scale(
-    "tiny", paper_size=700, n_cage_vertices=60, drag_sizes=(700,), frames=2, repeats=1,
-    regions=(2,), study_vertices=60, study_each=30, peer_sizes=(700,), most_iterations=3,
-    cage_sizes=(700,), own_process=False,
+    "tiny", paper_size=500, n_cage_vertices=60, drag_sizes=(500,), frames=2, repeats=1,
+    regions=(2,), study_vertices=60, study_each=30, peer_sizes=(500,), most_iterations=3,
+    cage_sizes=(500,), own_process=False,
 )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def task():
-    return bent_cactus(700)
+    return bent_cactus(500)
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +113,7 @@ def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, d
 def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     section = drag_profile.run(TINY)
     frame, set_up = section.tables
-    assert frame.column("vertices") == set_up.column("vertices") == [700]
+    assert frame.column("vertices") == set_up.column("vertices") == [500]
     for name in ("frame", "other", "map", "volume", "read W"):
         assert math.isfinite(frame.column(name)[0])
     assert frame.column("volume change")[0] <= 1e-12
@@ -130,7 +130,7 @@ def test_table_one_splits_a_step_in_both_formulations():
     for table in tables:
         one, three = (dict(zip(table.column("quantity"), table.column(name), strict=True))
                       for name in ("one cage", "three regions"))  # fmt: skip
-        assert one["non-zeros of W"] == 700 * 60 > three["non-zeros of W"]
+        assert one["non-zeros of W"] == 500 * 60 > three["non-zeros of W"]
         assert min(one["- products with W, ms"], one["- rotations, ms"]) > 0.0
     assert changes.column("formulation") == ["paper", "ours"]
     paper, ours = map(abs, changes.column("three regions"))
@@ -211,7 +211,7 @@ def test_cages_are_judged_and_vtk_agrees_on_the_coordinates():
     assert {line.partition(",")[0] for line in section.skipped} == {
         "libigl progressive hulls", "gpytoolbox lazy_cage",
     }  # fmt: skip
-    mesh = bent_cactus(700).mesh
+    mesh = bent_cactus(500).mesh
     shrunk = (0.5 * mesh.vertices, mesh.faces)
     assert "does not enclose" in cage_making.cage_row("shrunk", mesh, shrunk, 1.0)[4]
 
@@ -263,13 +263,13 @@ def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
 @pytest.mark.parametrize("drawn", ["in process", pytest.param("page", marks=pytest.mark.campaign)])
 def test_a_drag_is_followed(monkeypatch, drawn):
     pytest.importorskip("trame")
-    monkeypatch.setattr(browser, "_WARM_UP", 6)
-    monkeypatch.setattr(browser, "_MOVES", 120 if drawn == "page" else 30)
+    monkeypatch.setattr(browser, "_WARM_UP", 6 if drawn == "page" else 2)
+    monkeypatch.setattr(browser, "_MOVES", 120 if drawn == "page" else 12)
     if drawn == "in process":
-        drag = browser.in_process(700, TINY, (300, 200))
+        drag = browser.in_process(500, TINY, (300, 200))
     else:
         try:
-            drag = browser._in_browser(700, TINY, draws=True)
+            drag = browser._in_browser(500, TINY, draws=True)
         except MissingDependencyError as missing:
             pytest.skip(str(missing))
         assert drag.size > 500.0

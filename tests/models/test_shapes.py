@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -20,10 +23,15 @@ BODIES = [
 ]  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=BODIES, ids=lambda body: f"{body[0].__name__}-{body[1]}")
+@functools.cache
+def made(make: Callable[[int], Mesh], n: int) -> Mesh:
+    return make(n)
+
+
+@pytest.fixture(params=BODIES, ids=lambda body: f"{body[0].__name__}-{body[1]}")
 def body(request) -> tuple[Mesh, int]:
     make, n = request.param
-    return make(n), n
+    return made(make, n), n
 
 
 def euler(mesh: Mesh) -> int:
@@ -72,7 +80,7 @@ def test_the_default_cactus_is_as_large_as_the_papers():
 
 
 def test_models_are_deterministic():
-    one, two = models.cactus(500), models.cactus(500)
+    one, two = made(models.cactus, 500), models.cactus(500)
     assert one is not two
     assert_array_equal(one.vertices, two.vertices)
     assert_array_equal(one.faces, two.faces)

@@ -81,7 +81,7 @@ FILED = [
     "triangle soup", "concave polygons", "12 holes", "row of fins", "several parts, some open",
     "seam, flipped patch, holes and quadrilaterals",
 ]  # fmt: skip
-FITTED = {"half a body", "Moebius strip", "soup of everything, flipped"}
+FITTED = {"Moebius strip", "soup of everything, flipped"}
 OFTEN = {*FILED, *FITTED, *list(NAMED)[::3]}
 
 

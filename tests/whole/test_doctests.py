@@ -10,8 +10,6 @@ from types import ModuleType
 
 import pytest
 
-from vtk_segdeform import models
-
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "vtk_segdeform"
 WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
@@ -31,7 +29,12 @@ def modules() -> dict[str, Path]:
 
 
 MODULES = modules()
-WITH_EXAMPLES = [name for name, path in MODULES.items() if ">>> " in path.read_text("utf-8")]
+LONG = {"vtk_segdeform.models.shapes"}  # makes bodies like those of its tests; in the campaign
+WITH_EXAMPLES = [
+    pytest.param(name, marks=pytest.mark.campaign if name in LONG else ())
+    for name, path in MODULES.items()
+    if ">>> " in path.read_text("utf-8")
+]
 
 
 def imported(name: str) -> ModuleType:
@@ -45,12 +48,7 @@ def test_the_examples_of_a_module_are_right(name, monkeypatch, tmp_path, cached_
     monkeypatch.chdir(tmp_path)  # for examples that write files
     module = imported(name)
     linecache.clearcache()  # otherwise doctest checks every cached file before each docstring
-    cached = {"cactus": models.cactus, "dinosaur": models.dinosaur}
-    failed, attempted = doctest.testmod(
-        module,
-        extraglobs=cached if name == "vtk_segdeform.models.shapes" else None,
-        optionflags=doctest.NORMALIZE_WHITESPACE,
-    )
+    failed, attempted = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert attempted
     assert not failed
 
