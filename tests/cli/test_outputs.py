@@ -10,7 +10,7 @@ from campaign import every
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models, read_mesh
-from vtk_segdeform.cli import commands
+from vtk_segdeform.cli import commands, selection
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError, MeshError
@@ -93,10 +93,11 @@ def test_a_long_invalid_selection_is_named_and_truncated(text):
     assert len(str(error.value)) < 700
 
 
-def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder):
+def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder, monkeypatch):
+    monkeypatch.setattr(selection, "_LARGEST_FILE", 1 << 20)  # of 1 << 28, which are read
     with open("ids.txt", "wb") as file:
         file.truncate(45_000_000_000)
-    with pytest.raises(ConstraintError, match=r"ids\.txt .*more than 268,435,456 bytes"):
+    with pytest.raises(ConstraintError, match=r"ids\.txt .*more than 1,048,576 bytes"):
         parse_selection("ids.txt", BAR.vertices)
 
 

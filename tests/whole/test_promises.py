@@ -22,8 +22,16 @@ from vtk_segdeform.subspace.subspace import cage_subspace
 
 pytestmark = pytest.mark.usefixtures("cached_models")
 
-QUICK = ["cactus", "torus", "two components", "botsch-sorkine/cylinder.off"]
-ALL = [*QUICK, "hand.off", "dinosaur", "dino.off", "botsch-sorkine/cactus.off", "koala.obj"]
+QUICK = ["small cactus", "torus", "two components", "botsch-sorkine/cylinder.off"]
+ALL = [
+    "cactus",
+    *QUICK[1:],
+    "hand.off",
+    "dinosaur",
+    "dino.off",
+    "botsch-sorkine/cactus.off",
+    "koala.obj",
+]
 
 
 def mesh_of(name):
@@ -110,7 +118,7 @@ def check_volume_and_coordinates(name, n_regions, angles, moves):
 
 def test_a_cage_moves_only_its_own_region():
     # The purpose of several cages: moving the cage of one arm does not move the other arm.
-    _, regions, cages = caged("cactus", 3)
+    _, regions, cages = caged("small cactus", 3)
     subspace = cage_subspace(regions, cages)
     rest = np.concatenate([cage.vertices for cage in cages])
     moved = rest.copy()
