@@ -229,7 +229,17 @@ def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event
     assert int(cells[" steps "]) >= 1
 
 
-def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys, monkeypatch):
+def quick_table(scale, progress) -> Section:
+    """Return what Table 1 prints, without its deformations."""
+    ratios = [Ratio(f"speed-up of products with W, {each}", 2.0, 1.0) for each in "ab"]
+    sizes = f"{scale.paper_size} vertices, {scale.n_cage_vertices} cage vertices"
+    return Section("Table 1", text=[sizes], ratios=ratios)
+
+
+@pytest.mark.parametrize("is_real", [False, pytest.param(True, marks=pytest.mark.campaign)])
+def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys, monkeypatch, is_real):
+    if not is_real:
+        monkeypatch.setattr(report, "EXPERIMENTS", {"table1": quick_table, "drag": None})
     monkeypatch.setattr(report, "warm_up", lambda: None)
     monkeypatch.setattr(table_one, "seconds_per_step", lambda cases, *_, **__: [1e-3] * len(cases))
     size = ["--quick", "--size", "500", "--cage-vertices", "60"]
