@@ -165,7 +165,7 @@ def equal(path, surface, again, name, values, other, warnings):
 
 
 EASY = settings(
-    deadline=None, derandomize=True, max_examples=12,
+    deadline=None, derandomize=True, max_examples=25,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )  # fmt: skip
 
@@ -209,7 +209,7 @@ def test_cell_arrays_follow_their_cells_beside_points_lines_and_strips(tmp_path,
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".stl"])
-@settings(EASY, max_examples=5)
+@settings(EASY, max_examples=8)
 @given(surface=surfaces())
 def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
     pymeshlab = pytest.importorskip("pymeshlab")
