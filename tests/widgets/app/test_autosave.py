@@ -103,22 +103,36 @@ def test_work_is_recovered_over_the_mesh_if_the_file_of_its_surface_is_damaged(f
         slot.remove()
 
 
-def test_the_autosave_of_a_running_program_is_not_offered(folder):
+def test_the_autosave_of_a_running_program_is_offered_once_it_is_killed(folder):
+    theirs = crash(folder)
     mine = Autosaves(folder).new(ABOUT)
     mine.write(work())
-    theirs = subprocess.run(
-        [sys.executable, "-c", _HOLD, lock.__file__, mine.path.with_name("lock")],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert theirs.stdout.split() == ["None"]
-    assert Autosaves(folder).abandoned() == []  # nor for another window of the same program
+    paths = [each / "lock" for each in (mine.path.parent, theirs)]
+    program = subprocess.Popen(
+        [sys.executable, "-c", _HOLD, lock.__file__, *paths], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        held = program.stdout.readline().split()
+        assert held[0] == "None"  # mine is locked
+        assert held[1] != "None"
+        assert Autosaves(folder).abandoned() == []  # nor for another window of the same program
+    finally:
+        program.kill()
+        program.communicate()
+    (slot,) = Autosaves(folder).abandoned()
+    assert slot.path.parent == theirs
+    handles = slot.read(no_progress).handles
+    assert_array_equal(handles["handle 1"], work().handles["handle 1"])
+    slot.release()
     mine.release()
-    assert len(Autosaves(folder).abandoned()) == 1
+    assert len(Autosaves(folder).abandoned()) == 2
 
 
 _HOLD = """
-import pathlib, runpy, sys
-print(runpy.run_path(sys.argv[1])["hold"](pathlib.Path(sys.argv[2])))
+import pathlib, runpy, sys, time
+hold = runpy.run_path(sys.argv[1])["hold"]
+print(*(hold(pathlib.Path(path)) for path in sys.argv[2:]), flush=True)
+time.sleep(1000)
 """
 
 

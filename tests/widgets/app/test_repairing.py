@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -22,7 +23,6 @@ pytestmark = pytest.mark.usefixtures("unprepared")
 
 @pytest.fixture
 def boxes():
-    gc.collect()  # objects of a failed test
     application()
     made = Boxes()
     yield made
@@ -30,10 +30,10 @@ def boxes():
     assert made.answers == []
 
 
-@pytest.fixture
-def hand(tmp_path, boxes):
-    """Return a hand on the program."""
-    window = Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved"), interval=1000.0)
+@contextmanager
+def program(folder):
+    """Run the program with its settings in *folder*; yield a hand on it."""
+    window = Window(settings_in(folder), Autosaves(folder / "unsaved"), interval=1000.0)
     hand = AppHand(window)
     yield hand
     window._is_new = False
@@ -42,6 +42,13 @@ def hand(tmp_path, boxes):
     delete(window)
     window = hand = None
     gc.collect()
+
+
+@pytest.fixture
+def hand(tmp_path, boxes):
+    """Return a hand on the program."""
+    with program(tmp_path) as hand:
+        yield hand
 
 
 class Reader(QtCore.QObject):
@@ -140,22 +147,13 @@ def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
     assert hand.title == "bottle.ply - segdeform"  # nothing was painted
 
 
-def test_repair_is_offered_beside_the_notice(hand, tmp_path):
-    opened(hand, bottle(2), tmp_path / "bottle.ply")
-    editor, plotter = hand.window.editor, hand.window.editor_widget.plotter
-    plotter.render()
-    reader = Reader(lambda dialog: click(dialog.cancelling))
-    pointer = QtHand(plotter.interactor, editor.view)
-    pointer.drag([editor.controller.notices._line.centre_of("Repair ...")])
-    until(lambda: reader.is_done, "the dialog")
-    reader.check()
-    application().processEvents()
-    assert hand.title == "bottle.ply - segdeform"
-
-
 def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
-    path = opened(hand, bottle(3), tmp_path / "bottle.ply")
+    """Undo returns to the original with its edits."""
+    path = opened(hand, bottle(3, 3), tmp_path / "bottle.ply")
     content = path.read_bytes()
+    original = hand.window.session
+    original.set_fixed([0, 1, 2])
+    boxes.answers.append("Discard")
 
     def accept(dialog):
         assert lines(dialog)[0].startswith("Fill 3 holes of ")
@@ -172,21 +170,9 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     assert np.abs(kept - given.points).max() == 0.0
     assert path.read_bytes() == content
     assert sorted(p.suffix for p in tmp_path.iterdir() if p.is_file()) == [".ini", ".ply"]
-    boxes.answers += ["Cancel", "Discard"]
-    hand.window.open(path)  # the first answer is to stay
+    boxes.answers.append("Cancel")
+    hand.window.open(path)
     assert hand.title == "bottle (repaired)* - segdeform"
-    hand.choose("File", "Open recent", "1  bottle.ply")
-    hand.settle()
-    assert hand.title == "bottle.ply - segdeform"
-    assert len(hand.window.session.mesh.borders) == 3
-
-
-def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, boxes, tmp_path):
-    opened(hand, bottle(3), tmp_path / "bottle.ply")
-    original = hand.window.session
-    original.set_fixed([0, 1, 2])
-    boxes.answers.append("Discard")
-    repair(hand, lambda dialog: click(dialog.accepting))
     rows = hand.window.editor_widget.panel.history.list
     until(lambda: rows.count() == 2, "the history")
     assert [rows.item(row).text() for row in range(2)] == ["Opened", "Repair"]
@@ -195,6 +181,12 @@ def test_undo_returns_from_a_repaired_copy_to_the_original_with_its_edits(hand, 
     hand.settle()
     assert hand.title == "bottle.ply* - segdeform"
     assert original.undo_label == "set fixed vertices"
+    assert len(original.mesh.borders) == 3
+    boxes.answers.append("Discard")
+    hand.choose("File", "Open recent", "1  bottle.ply")
+    hand.settle()
+    assert hand.title == "bottle.ply - segdeform"
+    assert hand.window.session is not original
     assert len(hand.window.session.mesh.borders) == 3
 
 
@@ -245,48 +237,6 @@ def test_settings_start_the_repair_again_without_blocking(hand, tmp_path):
     repair(hand, limit)
 
 
-def test_the_view_of_the_dialog_outlines_holes_before_and_colours_lids_after(hand, tmp_path):
-    opened(hand, bottle(3), tmp_path / "bottle.ply")
-    hand.window.editor.view.camera.SetPosition(0.0, 0.0, 10.0)  # the first hole is at the top
-    shades = {}
-
-    def look(dialog):
-        for name, button in (("before", dialog.before), ("after", dialog.after)):
-            click(button)
-            application().processEvents()
-            picture = np.asarray(dialog.preview.plotter.screenshot()).astype(int)
-            shades[name] = picture.reshape(-1, picture.shape[-1])[:, :3]
-
-    repair(hand, look)
-    vermilion, orange = [213, 94, 0], [230, 159, 0]
-
-    def count(name, colour):
-        there = shades[name]
-        parts = there / np.maximum(there.sum(axis=1, keepdims=True), 1)
-        return int((np.abs(parts - np.array(colour) / sum(colour)).max(axis=1) < 0.05).sum())
-
-    assert count("before", vermilion) > 50
-    assert count("before", orange) < 20
-    assert count("after", orange) > 200
-    assert count("after", vermilion) < 20
-
-
-def test_a_surface_that_cannot_be_repaired_says_why(hand, tmp_path, monkeypatch):
-    opened(hand, bottle(2), tmp_path / "bottle.ply")
-
-    def refuse(*_, **__):
-        raise ValueError("no faces are left")
-
-    monkeypatch.setattr("vtk_segdeform.widgets.app.repair_dialog.repair_surface", refuse)
-
-    def read(dialog):
-        assert lines(dialog) == ["no faces are left"]
-        assert not dialog.accepting.isEnabled()
-        assert not dialog.after.isEnabled()
-
-    repair(hand, read)
-
-
 def with_invalid_points():
     """Return a ball with coordinates that are no numbers, at two of its vertices."""
     ball = split_at_seam(2)
@@ -330,17 +280,75 @@ def test_repair_is_not_offered_where_it_cannot_help(hand, boxes, tmp_path):
     assert not hand.window.has_mesh
 
 
-def test_declining_a_repair_keeps_the_open_document(hand, boxes, tmp_path):
-    path = opened(hand, bottle(2), tmp_path / "bottle.ply")
+@pytest.fixture(scope="module")
+def shared(unprepared, tmp_path_factory):
+    """Return a hand on a program that shows a bottle; tests leave both as they are."""
+    application()
+    with program(tmp_path_factory.mktemp("shared")) as hand:
+        opened(hand, bottle(3, 3), tmp_path_factory.mktemp("bottle") / "bottle.ply")
+        yield hand
+
+
+def test_repair_is_offered_beside_the_notice(shared):
+    editor, plotter = shared.window.editor, shared.window.editor_widget.plotter
+    plotter.render()
+    reader = Reader(lambda dialog: click(dialog.cancelling))
+    pointer = QtHand(plotter.interactor, editor.view)
+    pointer.drag([editor.controller.notices._line.centre_of("Repair ...")])
+    until(lambda: reader.is_done, "the dialog")
+    reader.check()
+    application().processEvents()
+    assert shared.title == "bottle.ply - segdeform"
+
+
+def test_the_view_of_the_dialog_outlines_holes_before_and_colours_lids_after(shared):
+    shared.window.editor.view.camera.SetPosition(0.0, 0.0, 10.0)  # the first hole is at the top
+    shades = {}
+
+    def look(dialog):
+        for name, button in (("before", dialog.before), ("after", dialog.after)):
+            click(button)
+            application().processEvents()
+            picture = np.asarray(dialog.preview.plotter.screenshot()).astype(int)
+            shades[name] = picture.reshape(-1, picture.shape[-1])[:, :3]
+
+    repair(shared, look)
+    vermilion, orange = [213, 94, 0], [230, 159, 0]
+
+    def count(name, colour):
+        there = shades[name]
+        parts = there / np.maximum(there.sum(axis=1, keepdims=True), 1)
+        return int((np.abs(parts - np.array(colour) / sum(colour)).max(axis=1) < 0.05).sum())
+
+    assert count("before", vermilion) > 50
+    assert count("before", orange) < 20
+    assert count("after", orange) > 200
+    assert count("after", vermilion) < 20
+
+
+def test_a_surface_that_cannot_be_repaired_says_why(shared, monkeypatch):
+    def refuse(*_, **__):
+        raise ValueError("no faces are left")
+
+    monkeypatch.setattr("vtk_segdeform.widgets.app.repair_dialog.repair_surface", refuse)
+
+    def read(dialog):
+        assert lines(dialog) == ["no faces are left"]
+        assert not dialog.accepting.isEnabled()
+        assert not dialog.after.isEnabled()
+
+    repair(shared, read)
+
+
+def test_declining_a_repair_keeps_the_open_document(shared, boxes, tmp_path):
     with_invalid_points().save(tmp_path / "ball.ply")
     boxes.answers.append("Cancel")
-    hand.window.open(tmp_path / "ball.ply")
-    hand.settle()
-    assert hand.title == f"{path.name} - segdeform"
+    shared.window.open(tmp_path / "ball.ply")
+    shared.settle()
+    assert shared.title == "bottle.ply - segdeform"
 
 
-def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(hand, tmp_path, monkeypatch):
-    opened(hand, bottle(2), tmp_path / "bottle.ply")
+def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(shared, monkeypatch):
     stopped = threading.Event()
 
     def work_for_long(*_, progress, **__):
@@ -365,7 +373,7 @@ def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(hand, tmp_pa
 
     shown = []
     QtCore.QTimer.singleShot(5, watch)
-    hand.choose("File", "Repair and open")
+    shared.choose("File", "Repair and open")
     assert shown == [("Filling 2 holes of 6 edges", 0.36)]
     until(stopped.is_set, "the end of the repair")
-    assert hand.title == "bottle.ply - segdeform"
+    assert shared.title == "bottle.ply - segdeform"

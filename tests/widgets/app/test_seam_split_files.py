@@ -23,7 +23,7 @@ PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(40))
 
 def split_ball():
     """Return a document of an ellipsoid with texture coordinates, cut along their seam."""
-    points, faces = icosphere(3)
+    points, faces = icosphere(2)
     u = np.arctan2(points[:, 1], points[:, 0]) / (2.0 * np.pi) + 0.5
     corners = u[faces]
     crossing = np.ptp(corners, axis=1) > 0.5  # the seam, u = 0 and u = 1, is within these faces

@@ -87,7 +87,7 @@ def settings(panel) -> list:
     ("during", "step"),
     [pytest.param(True, 1, id="in mid-drag", marks=pytest.mark.campaign),
      pytest.param(False, 1, id="converging", marks=pytest.mark.campaign),
-     pytest.param(False, 3, id="every third, converging")],
+     pytest.param(False, 5, id="every fifth, converging")],
 )  # fmt: skip
 def test_any_action_in_the_panel_finishes_the_drag(stand, during, step):
     panel = stand.widget.panel

@@ -10,6 +10,8 @@ from vtk_segdeform import Session, Surface
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 
+pytestmark = pytest.mark.usefixtures("unprepared")
+
 
 class Seen:
     """A widget on the screen in mode 4, and its options."""

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import weakref
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.scene.view import View
 
+pytestmark = pytest.mark.usefixtures("unprepared")
 MESH = models.cactus(700)
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "qt_application.py"
 
@@ -58,11 +60,11 @@ IN_BOTH = pytest.mark.parametrize(
 )
 
 
-@pytest.fixture(params=HOSTS)
-def qt(request):
+@contextmanager
+def shown(host):
     """Yield a plotter with the editor in it, the editor, a hand and the window."""
     app = application()
-    plotter, window = request.param()
+    plotter, window = host()
     until(lambda: window.isVisible() and window.windowHandle().isExposed(), "the window")
     editor = plotter.segdeform.edit(MESH)
     plotter.camera_position = "xz"
@@ -77,6 +79,36 @@ def qt(request):
     window.close()
     window.deleteLater()
     delete_now()
+
+
+@pytest.fixture(params=HOSTS)
+def qt(request):
+    """Yield a plotter with the editor in it, the editor, a hand and the window, for one test."""
+    with shown(request.param) as view:
+        yield view
+
+
+@pytest.fixture(scope="module", params=HOSTS)
+def shared(request, unprepared):
+    """Yield the same for several tests."""
+    with shown(request.param) as view:
+        yield view
+
+
+@pytest.fixture
+def again(shared):
+    """Return the shared view as it was at first, after the tests that close theirs."""
+    plotter, editor, hand, _ = shared
+    while editor.session.undo() is not None:
+        pass
+    editor.On()
+    editor.mode = Mode.REGIONS
+    plotter.camera_position = "xz"
+    plotter.render()
+    application().processEvents()
+    plotter.interactor.setFocus()
+    assert hand.failures == []
+    return shared
 
 
 def around(editor, mask):
@@ -132,61 +164,6 @@ def test_the_whole_story_in_qt(qt):
     assert abs(session.volume_change) < 1e-12
 
 
-def test_a_job_is_stopped_by_escape_while_qt_runs(qt, monkeypatch):
-    _, editor, hand, _ = qt
-    end = time.monotonic() + 60.0
-
-    def endless(mesh, n_regions, *, progress):  # the real one may end before the key is pressed
-        while time.monotonic() < end:
-            progress(0.5, "looking everywhere")
-            time.sleep(0.001)
-        return Regions.single(mesh)
-
-    monkeypatch.setattr(actions, "segment_mesh", endless)
-    hand.key("g")
-    until(lambda: "looking everywhere" in editor.status, "the job")
-    hand.key("Escape")
-    until(lambda: not editor.is_busy, "the end")
-    assert editor.session.regions is None
-    assert "Cancelled" in editor.status
-
-
-@IN_BOTH
-def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(qt):
-    _, editor, hand, _ = qt
-    before = editor.view.camera.GetPosition()
-    hand.drag([(30, 400), (60, 380), (90, 380)])
-    assert editor.view.camera.GetPosition() != before
-    editor.session.set_fixed(MESH.vertices[:, 2] < 0.3)
-    for key in "3tvs":
-        hand.key(key)
-    hand.drag(around(editor, slice(None)), held=Qt.ControlModifier)
-    assert len(editor.session.fixed) == 0
-
-
-def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(qt):
-    _, editor, hand, _ = qt
-    editor.mode = Mode.HANDLES
-    middle = hand.at(MESH.vertices.mean(axis=0))
-    camera = editor.view.camera
-    before = camera.GetPosition()
-    way = [middle, *((middle[0] + d, middle[1] + d) for d in (20, 40))]
-    hand.drag(way, held=Qt.AltModifier)
-    assert camera.GetPosition() != before
-    assert not len(editor.session.fixed)
-    hand.key("i", Qt.ControlModifier)
-    assert len(editor.session.fixed) == MESH.n_vertices
-    hand.key("7", Qt.KeypadModifier)
-    until(lambda: abs(camera.GetDirectionOfProjection()[2]) > 0.99, "the view from the top")
-    assert editor.mode is Mode.HANDLES
-    interactor = editor.view.interactor
-    editor.Off()
-    interactor.SetAltKey(False)
-    hand.press(middle, Qt.AltModifier)
-    assert not interactor.GetAltKey()
-    hand.release(middle, Qt.AltModifier)
-
-
 @IN_BOTH
 def test_closing_a_window_removes_the_editor(qt):
     plotter, editor, hand, window = qt
@@ -195,41 +172,6 @@ def test_closing_a_window_removes_the_editor(qt):
     window.close()
     assert not editor.is_busy
     assert not editor.GetEnabled()
-
-
-def test_an_editor_that_was_removed_leaves_nothing_alive(qt):
-    plotter, *_ = qt
-    view = View.of(plotter)
-    editor = DeformEditor(view, MESH)
-    editor.On()
-    editor.remove()
-    gone = weakref.ref(editor)
-    del editor
-    gc.collect()
-    assert gone() is None
-
-
-def test_each_change_is_drawn_once(unprepared, qt):
-    _, editor, _, _ = qt
-    editor.mode = Mode.HANDLES
-    drawn = []
-    editor.view.window.AddObserver("EndEvent", lambda *_: drawn.append(len(editor.session.fixed)))
-
-    def rest():
-        """Wait until nothing has been drawn for a tenth of a second."""
-        count, end = len(drawn), time.monotonic() + 0.1
-        while time.monotonic() < end:
-            application().processEvents()
-            if len(drawn) > count:
-                count, end = len(drawn), time.monotonic() + 0.1
-
-    rest()
-    drawn.clear()
-    for number in (3, 5):
-        editor.session.set_fixed(range(number))
-        until(lambda number=number: number in drawn, "a picture")
-        rest()
-    assert drawn == [3, 5]
 
 
 # The example of an application.
@@ -241,7 +183,7 @@ def is_drawn(picture):
     return 0.1 < (grey < 215).mean() < 0.5
 
 
-def test_the_example_of_an_application_runs(unprepared, tmp_path, monkeypatch):
+def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
     app, later = application(), QtCore.QTimer.singleShot
     monkeypatch.setattr(models, "cactus", lambda _: MESH)
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
@@ -279,3 +221,97 @@ def test_the_story_on_a_high_resolution_screen():
         env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
     )  # fmt: skip
     assert "1 passed" in done.stdout, done.stdout + done.stderr
+
+
+# Several tests share a view.
+
+
+def test_a_job_is_stopped_by_escape_while_qt_runs(again, monkeypatch):
+    _, editor, hand, _ = again
+    end = time.monotonic() + 60.0
+
+    def endless(mesh, n_regions, *, progress):  # the real one may end before the key is pressed
+        while time.monotonic() < end:
+            progress(0.5, "looking everywhere")
+            time.sleep(0.001)
+        return Regions.single(mesh)
+
+    monkeypatch.setattr(actions, "segment_mesh", endless)
+    hand.key("g")
+    until(lambda: "looking everywhere" in editor.status, "the job")
+    hand.key("Escape")
+    until(lambda: not editor.is_busy, "the end")
+    assert editor.session.regions is None
+    assert "Cancelled" in editor.status
+
+
+def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(again):
+    _, editor, hand, _ = again
+    before = editor.view.camera.GetPosition()
+    hand.drag([(30, 400), (60, 380), (90, 380)])
+    assert editor.view.camera.GetPosition() != before
+    editor.session.set_fixed(MESH.vertices[:, 2] < 0.3)
+    for key in "3tvs":
+        hand.key(key)
+    hand.drag(around(editor, slice(None)), held=Qt.ControlModifier)
+    assert len(editor.session.fixed) == 0
+
+
+def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(again):
+    _, editor, hand, _ = again
+    editor.mode = Mode.HANDLES
+    middle = hand.at(MESH.vertices.mean(axis=0))
+    camera = editor.view.camera
+    before = camera.GetPosition()
+    way = [middle, *((middle[0] + d, middle[1] + d) for d in (20, 40))]
+    hand.drag(way, held=Qt.AltModifier)
+    assert camera.GetPosition() != before
+    assert not len(editor.session.fixed)
+    hand.key("i", Qt.ControlModifier)
+    assert len(editor.session.fixed) == MESH.n_vertices
+    hand.key("7", Qt.KeypadModifier)
+    until(lambda: abs(camera.GetDirectionOfProjection()[2]) > 0.99, "the view from the top")
+    assert editor.mode is Mode.HANDLES
+    interactor = editor.view.interactor
+    editor.Off()
+    interactor.SetAltKey(False)
+    hand.press(middle, Qt.AltModifier)
+    assert not interactor.GetAltKey()
+    hand.release(middle, Qt.AltModifier)
+
+
+def test_an_editor_that_was_removed_leaves_nothing_alive(again):
+    plotter, *_ = again
+    view = View.of(plotter)
+    editor = DeformEditor(view, MESH)
+    editor.On()
+    editor.remove()
+    gone = weakref.ref(editor)
+    del editor
+    gc.collect()
+    assert gone() is None
+
+
+def test_each_change_is_drawn_once(again):
+    _, editor, _, _ = again
+    editor.mode = Mode.HANDLES
+    drawn = []
+    window = editor.view.window
+    observer = window.AddObserver("EndEvent", lambda *_: drawn.append(len(editor.session.fixed)))
+
+    def rest():
+        """Wait until nothing has been drawn for a tenth of a second."""
+        count, end = len(drawn), time.monotonic() + 0.1
+        while time.monotonic() < end:
+            application().processEvents()
+            if len(drawn) > count:
+                count, end = len(drawn), time.monotonic() + 0.1
+
+    rest()
+    drawn.clear()
+    for number in (3, 5):
+        editor.session.set_fixed(range(number))
+        until(lambda number=number: number in drawn, "a picture")
+        rest()
+    window.RemoveObserver(observer)
+    assert drawn == [3, 5]

@@ -20,6 +20,7 @@ from vtk_segdeform.widgets.recording import limits
 from vtk_segdeform.widgets.recording.confinement import confined, confined_path
 from vtk_segdeform.widgets.recording.reading import read_recording
 
+pytestmark = pytest.mark.usefixtures("unprepared")
 TITLE = "vtk_segdeform recording 1"
 MESH = sd.Mesh(*OCTAHEDRON)
 CODES = {"s": 19, "r": 18, "m": 13, "o": 15}

@@ -25,6 +25,7 @@ from vtk_segdeform.widgets.recording.film_files import require_film
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
+pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(is_coarse=True)
 SIZE = (120, 90)
 TURNS = [SCENE.turned(angle) for angle in (0.0, 10.0, 20.0)]

@@ -23,7 +23,8 @@ from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.scene.widget import Widget
 
-SCENE = sausage()
+pytestmark = pytest.mark.usefixtures("bound_once")
+SCENE = sausage(is_coarse=True)
 TITLE = "vtk_segdeform recording 1"
 
 

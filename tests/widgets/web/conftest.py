@@ -8,12 +8,20 @@ from collections.abc import Iterator
 import pytest
 from chromium import Chromium
 
+from vtk_segdeform import Mesh, models
+
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Chromium]:
     """Yield a browser; whoever opens a page in it closes it."""
     with Chromium() as browser:
         yield browser
+
+
+@pytest.fixture(scope="session")
+def cactus() -> Mesh:
+    """Return the mesh that the pages show."""
+    return models.cactus(700)
 
 
 class Loop(asyncio.SelectorEventLoop):

@@ -30,6 +30,8 @@ def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
         )
         running.run("from vtk_segdeform.widgets.web import web_editor")
         running.run("web_editor._SAMPLES = 0")  # multisampling in software takes long
+        running.run("from vtk_segdeform.widgets.editor import preparing")
+        running.run("prepare, preparing.lacking = preparing.lacking, lambda _: None")
         running.run(f"mesh = {SMALL}")
         running.run("kept = sd.edit(mesh)")  # runs until the kernel ends
         running.wait("kept.web.server.running")
@@ -75,22 +77,24 @@ def test_the_example_keeps_the_volume_and_shows_the_page(cells: Kernel) -> None:
 
 @pytest.mark.campaign  # as in JupyterLab, see test_jupyterlab
 @needs_chromium
-def test_a_pull_in_the_page_is_there_in_the_next_cell(
-    cells: Kernel, kept: str, browser: Chromium
-) -> None:
-    before = cells.value("kept.session.position")
-    page = browser.page(kept, size=(700, 480))
+def test_a_pull_in_the_page_is_there_in_the_next_cell(cells: Kernel, browser: Chromium) -> None:
+    cells.run("preparing.lacking = prepare")
+    cells.run("pulled = sd.edit(mesh)")
+    cells.wait("pulled.web.server.running")
+    before = cells.value("pulled.session.position")
+    page = browser.page(cells.value("pulled.address").strip("'"), size=(700, 480))
     page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
-    cells.wait("not (kept.web.editor.is_busy or kept.web.editor.is_preparing)")
+    cells.wait("not (pulled.web.editor.is_busy or pulled.web.editor.is_preparing)")
     left, top, width, height = page.box(".sd-canvas")
     start = left + 0.5 * width, top + 0.5 * height
     page.drag(line(start, (start[0] + 90, start[1] - 30), 8), pause=0.02)
-    cells.wait(f"kept.session.position > {before}")
+    cells.wait(f"pulled.session.position > {before}")
     assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
     page.close()
-    assert abs(float(cells.value("kept.session.volume_change"))) < 1e-12
-    cells.wait("abs(kept.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
-    assert cells.value("type(kept.mesh) is sd.Mesh") == "True"
+    assert abs(float(cells.value("pulled.session.volume_change"))) < 1e-12
+    cells.wait("abs(pulled.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
+    assert cells.value("type(pulled.mesh) is sd.Mesh") == "True"
+    cells.run("pulled.close(); preparing.lacking = lambda _: None")
 
 
 def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, kept: str) -> None:

@@ -15,7 +15,8 @@ from PIL import Image
 from scipy.ndimage import binary_fill_holes
 from web_hands import Served, line
 
-from vtk_segdeform import models
+from vtk_segdeform import Mesh, Regions, Session, fit_cages
+from vtk_segdeform.session import State
 from vtk_segdeform.widgets.web.page_drawing import Update
 from vtk_segdeform.widgets.web.pictures import Picture
 
@@ -112,8 +113,10 @@ class Drawn:
 
 
 @pytest.fixture(scope="module")
-def drawn(browser: Chromium) -> Iterator[Drawn]:
-    with Served(models.cactus(700), name="cactus.ply") as served:
+def drawn(browser: Chromium, cactus: Mesh) -> Iterator[Drawn]:
+    regions = Regions.single(cactus)
+    state = State(regions, fit_cages(cactus, regions, 60))  # which is soon bound and solved
+    with Served(Session(cactus, state=state), name="cactus.ply") as served:
         drawn = Drawn(served, browser)
         yield drawn
         drawn.page.close()

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
-from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
+from hands import plain_view
 
 pytest.importorskip("trame")
 
@@ -75,16 +74,10 @@ def started(view: View) -> tuple[Loop, Timers]:
 
 @pytest.fixture
 def view() -> Any:
-    window, renderer = vtkRenderWindow(), vtkRenderer()
-    window.SetOffScreenRendering(True)
-    window.SetSize(200, 100)
-    window.AddRenderer(renderer)
-    interactor = vtkGenericRenderWindowInteractor()
-    interactor.SetRenderWindow(window)
-    interactor.SetInteractorStyle(None)
-    window.Render()
-    yield View(renderer, interactor)
-    window.Finalize()
+    view = plain_view((200, 100))
+    view.interactor.SetInteractorStyle(None)
+    view.window.Render()
+    return view
 
 
 def _received(view: View, *names: str) -> list[tuple[Any, ...]]:

@@ -11,13 +11,15 @@ import pytest
 
 pytest.importorskip("trame")
 
-from vtk_segdeform import Session, models
+from vtk_segdeform import Regions, Session, fit_cages, models
 from vtk_segdeform.kernels import compiled_kernels
+from vtk_segdeform.session import State
 from vtk_segdeform.widgets.editor import Mode, keys_of
 from vtk_segdeform.widgets.editor.hints import hint
 from vtk_segdeform.widgets.panel.status import words_of
 from vtk_segdeform.widgets.web.touch import for_fingers
 
+pytestmark = pytest.mark.usefixtures("bound_once")
 KEYS = keys_of("pyvista")
 
 
@@ -53,11 +55,14 @@ def test_no_hint_names_a_key_or_a_modifier_to_fingers(mode, bare_widgets):
 
 
 @pytest.fixture(scope="module")
-def web():
+def web(bound_once):
     from vtk_segdeform.widgets.web import WebEditor
 
     compiled_kernels()  # before that, an editor sums small arrays in another order
-    web = WebEditor(Session(models.cactus(500)), name="cactus.ply")
+    mesh = models.cactus(500)
+    regions = Regions.single(mesh)
+    state = State(regions, fit_cages(mesh, regions, 60))  # which is soon bound and solved
+    web = WebEditor(Session(mesh, state=state), name="cactus.ply")
     yield web
     web.close()
 
@@ -114,7 +119,7 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
 
     editor = web.editor
     session = web.session
-    start = Session(session.mesh)
+    start = Session(session.mesh, state=session.state)
     web.plotter.render_window.Render()
     settle(editor)
     recorder = Recorder(editor.view)

@@ -20,10 +20,11 @@ pytest.importorskip("trame")
 pytest.importorskip("aiohttp")
 import aiohttp
 from chromium import CTRL, Chromium, Page, needs_chromium
+from solids import OCTAHEDRON
 from visitors import Visitor
 from web_hands import line, only_file, pull, rested
 
-from vtk_segdeform import Session, load_session, models
+from vtk_segdeform import Mesh, Session, load_session, models
 from vtk_segdeform.io import write_mesh
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
@@ -57,8 +58,8 @@ class Program:
 
 
 @contextmanager
-def served(folder: Path, *options: str, n: int = 700) -> Iterator[Program]:
-    write_mesh(folder / "cactus.ply", models.cactus(n))
+def served(folder: Path, *options: str, mesh: Mesh | None = None) -> Iterator[Program]:
+    write_mesh(folder / "cactus.ply", mesh or models.cactus(700))
     program = Program(folder / "cactus.ply", folder, *options)
     try:
         yield program
@@ -100,8 +101,10 @@ def moved(session: Session, vertices: object) -> float:
 
 
 def test_the_program_serves_the_editor(tmp_path: Path) -> None:
-    async def visit(address: str) -> tuple[int, str]:
-        base, token = address.split("/?token=")
+    """And what it does not need it does not load; its client ends with it."""
+
+    async def visit(program: Program) -> tuple[int, str]:
+        base, token = program.address.split("/?token=")
         server = SimpleNamespace(
             port=int(base.rpartition(":")[2]), access=SimpleNamespace(token=token)
         )
@@ -116,13 +119,21 @@ def test_the_program_serves_the_editor(tmp_path: Path) -> None:
                 _, plain, headers = await guest.get(f"{guest.path}index.html", **only)
                 assert "Content-Encoding" not in headers
                 assert plain == text
+            (client,) = program.children
+            loaded = [Path(f"/proc/{k}/maps").read_text() for k in (client, program.process.pid)]
+            for library in ("numpy", "vtkmodules"):
+                assert [library in each for each in loaded] == [True, False]
+            async with guest.socket():
+                program.process.terminate()
+                assert await asyncio.to_thread(program.process.wait, 60) == 0
+            assert not Path(f"/proc/{client}").exists()
             return status, text
 
-    with served(tmp_path) as program:
-        status, text = asyncio.run(visit(program.address))
-        assert status == 200
-        assert "<html" in text
-        assert len(program.children) == 1
+    with served(tmp_path, mesh=Mesh(*OCTAHEDRON)) as program:
+        status, text = asyncio.run(visit(program))
+    assert status == 200
+    assert "<html" in text
+    assert [*tmp_path.glob("segdeform-serve-*")] == []
 
 
 @pytest.mark.campaign

@@ -18,6 +18,7 @@ from vtk_segdeform.widgets.web.drawing import Look, Mark, SurfaceStream, marks_o
 from vtk_segdeform.widgets.web.drawing.marks import Shape
 from vtk_segdeform.widgets.web.drawing.messages import Kind
 
+pytestmark = pytest.mark.usefixtures("bound_once")
 LOOK = Look(
     np.eye(4), np.eye(4), np.array([0.0, 0.0, 1.0]), np.zeros(3), np.ones(3), 0.2, 0.8,
     np.array([[0.0, 0.0, 1.0, 1.0, 1.0, 1.0]]),

@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip("trame")
 from chromium import ALT, CTRL, Chromium, Page, needs_chromium
-from solids import icosphere
+from solids import OCTAHEDRON, icosphere
 from web_hands import Served, line, only_file
 
 from vtk_segdeform import Mesh, models, read_mesh
@@ -32,14 +32,9 @@ SIZE = 1010, 480  # the side panel is beside the view from 1001 on
 
 
 @pytest.fixture(scope="module")
-def cactus() -> Mesh:
-    return models.cactus(700)
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory, cactus: Mesh) -> Iterator[Served]:
-    folder = tmp_path_factory.mktemp("server")
-    with Served(cactus, name="cactus.ply", folder=folder, upload_limit=LIMIT) as served:
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder, mesh = tmp_path_factory.mktemp("server"), Mesh(*OCTAHEDRON)
+    with Served(mesh, name="small.ply", folder=folder, upload_limit=LIMIT) as served:
         yield served
 
 
@@ -51,16 +46,25 @@ def loaded(server: Served, browser: Chromium) -> Iterator[Page]:
 
 
 @pytest.fixture
-def served(server: Served, tmp_path: Path, cactus: Mesh) -> Served:
-    """Return the shared editor with a new session."""
-    web, place = server.web, tmp_path / "cactus.ply"
-    write_mesh(place, cactus)
+def served(server: Served, tmp_path: Path) -> Served:
+    """Return the shared editor with a new session, of a mesh that is soon prepared."""
+    write_mesh(tmp_path / "small.ply", Mesh(*OCTAHEDRON))
     server.wait(lambda: server.is_at_rest)
-    before = web.session
-    server.call(lambda: web.editor.do(to_mode(Mode.PULL)))
-    server.call(lambda: web.editor.do(opening(place)))
-    server.wait(lambda: web.session is not before and server.is_at_rest)
+    server.call(lambda: server.web.editor.do(to_mode(Mode.PULL)))
+    _open(server, tmp_path / "small.ply")
     return server
+
+
+@pytest.fixture
+def cactus_file(tmp_path: Path, cactus: Mesh) -> Path:
+    write_mesh(tmp_path / "cactus.ply", cactus)
+    return tmp_path / "cactus.ply"
+
+
+def _open(server: Served, file: Path) -> None:
+    web, before = server.web, server.web.session
+    server.call(lambda: web.editor.do(opening(file)))
+    server.wait(lambda: web.session is not before and server.is_at_rest)
 
 
 @pytest.fixture
@@ -99,8 +103,11 @@ def _upload(served: Served, page: Page, file: Path) -> None:
     page.wait(f"document.querySelector('.sd-name').textContent == '{file.name}'")
 
 
-def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
-    """Upload, pull, regions, cages, a handle, drag, turn, undo, redo, download, upload again."""
+def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options: int) -> None:
+    """Upload, pull, regions, cages, a handle, drag, turn, undo, redo, download, upload again.
+
+    From the second step on, the session has the *options*.
+    """
     web, editor = served.web, served.web.editor
     _upload(served, page, mesh)
     session, changes = web.session, list[float]()
@@ -117,6 +124,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
     assert np.abs(session.vertices - rest).max() > 0.03 * session.mesh.diagonal
     assert len(changes) > 2
 
+    served.call(lambda: session.change_options(**options))
     page.key("g")
     served.wait(lambda: " found" in editor.status and served.is_at_rest)
     page.key("f")
@@ -183,10 +191,10 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path) -> None:
 
 
 def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(
-    served: Served, page: Page, tmp_path: Path
+    served: Served, page: Page, cactus_file: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "down").mkdir()
-    tell_a_story(served, page, tmp_path / "cactus.ply", tmp_path / "down")
+    tell_a_story(served, page, cactus_file, tmp_path / "down", n_cage_vertices=60)
 
 
 def _bumpy(n: int) -> Mesh:
@@ -217,8 +225,10 @@ def test_stories_of_other_meshes(
 
 @pytest.mark.campaign
 def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
-    served: Served, page: Page
+    served: Served, page: Page, cactus_file: Path
 ) -> None:
+    _open(served, cactus_file)
+    page.wait("document.querySelectorAll('.sd-history .sd-row').length == 1")
     web = served.web
     surface = web.editor.widgets.surface
     start = served.seen(page, _top(served))
@@ -249,7 +259,10 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
 
 
 @pytest.mark.campaign
-def test_one_finger_pulls_and_two_turn(served: Served, browser: Chromium) -> None:
+def test_one_finger_pulls_and_two_turn(
+    served: Served, browser: Chromium, cactus_file: Path
+) -> None:
+    _open(served, cactus_file)
     page, web = served.page(browser, touch=True, size=(390, 700)), served.web
     hint = page.evaluate("document.querySelector('.sd-hint').textContent")
     assert "Shift" not in hint + page.evaluate("document.querySelector('.sd-cards').textContent")
