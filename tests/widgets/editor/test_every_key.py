@@ -23,7 +23,7 @@ def stand_of(make, folder):
 PAINTING_FIRST = (Mode.REGIONS, Mode.HANDLES, Mode.CAGES, Mode.PULL, Mode.DEFORM)
 # Keys that all modes have are typed while painting, where a drag needs no solver.  These are typed
 # while pulling as well, and others in the other hosts.
-WHILE_PULLING = {"4", "g", "ctrl+z", "shift+f", "o"}
+WHILE_PULLING = {"g", "ctrl+z", "shift+f"}
 
 
 def mid_drags():

@@ -131,7 +131,7 @@ def roughly(monkeypatch):
 
 about_targets = pytest.mark.usefixtures("roughly")
 each_view = pytest.mark.parametrize(
-    ("look", "parallel"), [(LOOKS[0], False), (LOOKS[1], True), (LOOKS[2], False)]
+    ("look", "parallel"), every(2, [(LOOKS[0], False), (LOOKS[2], False), (LOOKS[1], True)])
 )
 
 
@@ -152,7 +152,7 @@ def turned(bench):
 
 @pytest.mark.parametrize(
     ("look", "parallel", "local"),
-    [(LOOKS[0], False, False), (LOOKS[1], True, True), (LOOKS[2], False, True)],
+    every(2, [(LOOKS[0], False, False), (LOOKS[2], False, True), (LOOKS[1], True, True)]),
 )
 @about_targets
 def test_every_part_moves_as_it_says(look, parallel, local):
@@ -299,7 +299,7 @@ def test_edge_on_parts_do_not_make_the_handle_jump(axis, parallel):
 
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
-@pytest.mark.parametrize("tilt", every(2, [0.0, 1e-9, 0.19, 0.21, 1.0]))
+@pytest.mark.parametrize("tilt", every(3, [0.0, 1e-9, 1.0, 0.19, 0.21]))
 def test_every_motion_is_rigid_and_bounded(parallel, tilt):
     view = plain_view()
     view.camera.SetParallelProjection(parallel)

@@ -121,13 +121,11 @@ def pressable(mode: Mode) -> list[str]:
 
 
 # In mode HANDLES as in mode REGIONS; and in mode DEFORM as in mode HANDLES.
+TOOLS = ("brush", "lasso", "rectangle", "connected_part", "whole_region", "radius", "through")
 SAME = {
-    Mode.HANDLES: {
-        f"paint.{name}" for name in ("brush", "lasso", "rectangle", "connected_part", "whole_region",
-                                     "radius", "through")
-    },
+    Mode.HANDLES: {f"paint.{name}" for name in TOOLS},
     Mode.DEFORM: {"handles.remove", "handles.convert"},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
