@@ -21,6 +21,8 @@ from vtk_segdeform.widgets.cage_display.rejected_cage import WARNING
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 
+pytestmark = pytest.mark.usefixtures("bound_once")
+
 
 @functools.lru_cache(maxsize=1)
 def fitted() -> tuple[Scene, State]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from hands import Hand, picture, plain_view
 from open_surfaces import bottle, polydata, sheet, split_at_seam
 from solids import icosphere
@@ -15,7 +16,7 @@ from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.editor import notices_of
 from vtk_segdeform.widgets.scene.highlights import DOT, LOOP
 
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "vtk_in_process")
 
 LOOP_RGB, DOT_RGB = (np.array(list(bytes.fromhex(c[1:])), int) for c in (LOOP, DOT))
 
@@ -28,7 +29,7 @@ def closed():
 class Scene:
     """An editor over a session, seen from the front, and a hand."""
 
-    def __init__(self, session, size=(640, 420)):
+    def __init__(self, session, size=(480, 320)):
         self.view = plain_view(size)
         self.view.camera.SetPosition(0.0, -10.0, 2.0)
         self.view.camera.SetViewUp(0.0, 0.0, 1.0)
@@ -59,7 +60,7 @@ class Scene:
 def open_editor():
     made = []
 
-    def start(session, size=(640, 420)):
+    def start(session, size=(480, 320)):
         made.append(Scene(session, size))
         return made[-1]
 
@@ -126,7 +127,7 @@ def test_a_click_on_show_marks_the_holes_and_a_second_one_removes_the_marks(open
 
 
 def test_the_buttons_work_in_a_part_of_the_window(open_editor):
-    scene = open_editor(Session(Surface(bottle())))
+    scene = open_editor(Session(Surface(bottle())), (640, 420))
     scene.view.renderer.SetViewport(0.25, 0.3, 1.0, 1.0)
     scene.view.render()
     origin = np.array(scene.view.renderer.GetOrigin())
@@ -211,7 +212,9 @@ def test_a_clean_view_has_no_line_and_no_marks(open_editor):
     assert scene.notices.is_open
 
 
-@pytest.mark.parametrize("size", [(900, 600), (300, 200), (3840, 2160)])
+@pytest.mark.parametrize(
+    "size", every(2, [((300, 200),), ((900, 600),), ((1920, 1080),), ((3840, 2160),)])
+)
 def test_the_line_covers_neither_the_status_line_nor_most_of_the_window(open_editor, size):
     scene = open_editor(Session(Surface(two_parts())), size)
     scene.notices.offer("Repair ...", lambda: None)

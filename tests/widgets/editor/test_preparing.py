@@ -17,11 +17,13 @@ from vtk_segdeform.session import Preparation
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import actions
 
+pytestmark = pytest.mark.usefixtures("vtk_in_process")
+
 
 @pytest.fixture(scope="module")
 def prepared():
     """Return a mesh and the preparation of its session; tests do not change them."""
-    session = Session(sausage().mesh)
+    session = Session(sausage(is_coarse=True).mesh)
     session.set_regions(Regions.single(session.mesh))
     return session.mesh, session.preparation()
 

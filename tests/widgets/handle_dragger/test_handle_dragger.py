@@ -17,6 +17,7 @@ from vtk_segdeform import Session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.widgets.handle_dragger import live_solve
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
@@ -77,9 +78,10 @@ class Bench:
             line = line[0] + np.linspace(0.2, 0.9, 15)[:, None] * (line[1] - line[0])
         places = np.round(line[np.isfinite(line).all(axis=1)])
         places = places[:: 1 + len(places) // 10]
-        taken = [p for p in places if self.gizmo.part_at(Pointer(Phase.HOVER, *p)) == part]
-        assert taken, f"{part} is not to be seen"
-        place = taken[len(taken) // 2]
+        places = places[np.argsort(np.abs(np.arange(len(places)) - len(places) // 2))]
+        taken = (p for p in places if self.gizmo.part_at(Pointer(Phase.HOVER, *p)) == part)
+        place = next(taken, None)
+        assert place is not None, f"{part} is not to be seen"
         assert 20.0 < place.min() <= place.max() < 380.0
         return place
 
@@ -119,8 +121,17 @@ def bench():
     bench.dragger.remove()
 
 
+@pytest.fixture
+def roughly(monkeypatch):
+    """Solve one step per event, far from convergence: for tests of targets, which are exact."""
+    monkeypatch.setattr(live_solve, "_WITHIN", None)
+    for name in ("_LEAST_STEPS", "_MOST_STEPS"):
+        monkeypatch.setattr(live_solve, name, 1)
+
+
+about_targets = pytest.mark.usefixtures("roughly")
 each_view = pytest.mark.parametrize(
-    ("look", "parallel"), [(LOOKS[0], False), (LOOKS[1], True), (LOOKS[2], False)]
+    ("look", "parallel"), every(2, [(LOOKS[0], False), (LOOKS[2], False), (LOOKS[1], True)])
 )
 
 
@@ -141,8 +152,9 @@ def turned(bench):
 
 @pytest.mark.parametrize(
     ("look", "parallel", "local"),
-    [(LOOKS[0], False, False), (LOOKS[1], True, True), (LOOKS[2], False, True)],
+    every(2, [(LOOKS[0], False, False), (LOOKS[2], False, True), (LOOKS[1], True, True)]),
 )
+@about_targets
 def test_every_part_moves_as_it_says(look, parallel, local):
     bench = Bench(look, parallel=parallel)
     axes = turned(bench) if local else np.eye(3)
@@ -177,6 +189,7 @@ def test_every_part_moves_as_it_says(look, parallel, local):
 
 
 @each_view
+@about_targets
 def test_the_grabbed_point_stays_under_the_pointer(look, parallel):
     bench = Bench(look, parallel=parallel)
     hand, view, centre = bench.hand, bench.view, bench.gizmo.centre
@@ -200,6 +213,7 @@ def test_the_grabbed_point_stays_under_the_pointer(look, parallel):
 
 
 @pytest.mark.parametrize(("ring", "parallel"), [(VIEW_RING, False), (Part(Kind.ROTATION, 1), True)])
+@about_targets
 def test_a_ring_rotates_by_the_angle_on_the_screen(ring, parallel):
     bench = Bench((0.0, -12.0, 0.0), parallel=parallel)
     hand, start, centre = bench.hand, bench.targets(), bench.gizmo.centre
@@ -231,7 +245,7 @@ def test_when_the_pointer_returns_so_do_the_targets(bench):
     for part in (FREE, Part(Kind.AXIS, 0), VIEW_RING):
         place = bench.aim(part)
         bench.hand.press(place)
-        for step in (10.0, 25.0, 10.0, 0.0):
+        for step in (10.0, 25.0, 0.0):
             bench.hand.move(place + [step, -0.5 * step])
         assert np.abs(bench.targets() - before).max() < 1e-13
         bench.hand.release(place)
@@ -246,7 +260,7 @@ def test_the_volume_is_exact_at_every_move_of_a_long_rotation():
     middle = np.array(bench.hand.at(bench.gizmo.centre))
     place = bench.aim(VIEW_RING)
     bench.hand.press(place)
-    for degrees in np.linspace(2.0, 60.0, 30):
+    for degrees in np.linspace(4.0, 60.0, 15):
         arm = rotation([0.0, 0.0, 1.0], np.radians(degrees))[:2, :2] @ (place - middle)
         bench.hand.move(middle + arm)
         assert abs(bench.session.volume_change) <= 1e-12
@@ -262,6 +276,7 @@ def test_the_volume_is_exact_at_every_move_of_a_long_rotation():
 
 
 @pytest.mark.parametrize(("axis", "parallel"), [(0, True), (1, False)])
+@about_targets
 def test_edge_on_parts_do_not_make_the_handle_jump(axis, parallel):
     bench = Bench(12.0 * np.eye(3)[axis], parallel=parallel, up=np.eye(3)[axis - 2])
     hand, centre = bench.hand, bench.gizmo.centre
@@ -284,7 +299,7 @@ def test_edge_on_parts_do_not_make_the_handle_jump(axis, parallel):
 
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
-@pytest.mark.parametrize("tilt", every(2, [0.0, 1e-9, 0.19, 0.21, 1.0]))
+@pytest.mark.parametrize("tilt", every(3, [0.0, 1e-9, 1.0, 0.19, 0.21]))
 def test_every_motion_is_rigid_and_bounded(parallel, tilt):
     view = plain_view()
     view.camera.SetParallelProjection(parallel)
@@ -301,19 +316,20 @@ def test_every_motion_is_rigid_and_bounded(parallel, tilt):
         window = 400.0 * view.pixel_at(centre)
         for part in PARTS:
             motion = Motion(view, part, grip, Pointer(Phase.PRESS, 220.0, 190.0))
-            for x, y in corners:
-                matrix = motion.matrix(Pointer(Phase.MOVE, x, y))
-                assert np.allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
-                assert np.linalg.det(matrix) == pytest.approx(1.0)
-                if part.kind is not Kind.ROTATION:
-                    farthest = {Kind.FREE: 1.0, Kind.AXIS: 5.0, Kind.PLANE: 5.0}[part.kind]
-                    assert np.linalg.norm(matrix[:3, 3]) < farthest * window
+            moves = np.array([motion.matrix(Pointer(Phase.MOVE, x, y)) for x, y in corners])
+            turns = moves[:, :3, :3]
+            assert np.allclose(turns @ turns.transpose(0, 2, 1), np.eye(3), atol=1e-12)
+            assert np.linalg.det(moves) == pytest.approx(1.0)
+            if part.kind is not Kind.ROTATION:
+                farthest = {Kind.FREE: 1.0, Kind.AXIS: 5.0, Kind.PLANE: 5.0}[part.kind]
+                assert np.linalg.norm(moves[:, :3, 3], axis=1).max() < farthest * window
             back = motion.matrix(Pointer(Phase.MOVE, 220.0, 190.0))
             if part.kind is not Kind.ROTATION:
                 assert np.allclose(back, np.eye(4), atol=1e-12)
 
 
 @pytest.mark.parametrize("axis", range(3))
+@about_targets
 def test_the_front_of_a_ring_seen_edge_on_follows_the_pointer(axis):
     bench = Bench(12.0 * np.eye(3)[axis - 1], parallel=True, up=np.eye(3)[axis])
     ring = Part(Kind.ROTATION, axis)
@@ -335,6 +351,7 @@ def test_the_front_of_a_ring_seen_edge_on_follows_the_pointer(axis):
 # Keys.
 
 
+@about_targets
 def test_keys_constrain_a_translation_to_an_axis_then_a_plane_then_not(bench):
     hand, place = bench.hand, bench.aim(FREE)
     hand.press(place)
@@ -358,6 +375,7 @@ def test_keys_constrain_a_translation_to_an_axis_then_a_plane_then_not(bench):
     assert bench.session.undo_label == "drag handle 1"
 
 
+@about_targets
 def test_keys_constrain_a_rotation_to_an_axis_then_to_its_own(bench):
     hand, place, start = bench.hand, bench.aim(VIEW_RING), bench.targets()
     hand.press(place)
@@ -402,6 +420,7 @@ def test_axis_keys_are_passed_on_while_nothing_is_dragged(bench):
     assert heard == ["key"] * 3
 
 
+@about_targets
 def test_shift_slows_the_motion_to_a_fifth_without_a_jump(bench):
     hand, place = bench.hand, bench.aim(Part(Kind.AXIS, 0))
     hand.press(place)
@@ -417,6 +436,7 @@ def test_shift_slows_the_motion_to_a_fifth_without_a_jump(bench):
     assert bench.shift()[0] < 0.0
 
 
+@about_targets
 def test_a_slow_rotation_continues_past_half_a_turn_of_the_pointer():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
@@ -430,6 +450,7 @@ def test_a_slow_rotation_continues_past_half_a_turn_of_the_pointer():
     assert not bench.hand.failures
 
 
+@about_targets
 def test_control_rotates_in_steps_of_five_degrees_and_with_shift_of_one():
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     middle, start = np.array(bench.hand.at(bench.gizmo.centre)), bench.targets()
@@ -447,6 +468,7 @@ def test_control_rotates_in_steps_of_five_degrees_and_with_shift_of_one():
 
 
 @pytest.mark.parametrize("part", [FREE, Part(Kind.AXIS, 0), Part(Kind.PLANE, 2)])
+@about_targets
 def test_control_moves_in_whole_steps(part):
     bench = Bench(parallel=True)
     view, step = bench.view, 0.05  # about 1 % of the diagonal
@@ -473,6 +495,7 @@ def test_control_moves_in_whole_steps(part):
     assert not bench.hand.failures
 
 
+@about_targets
 def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
     session, hand = bench.session, bench.hand
     pivot = bench.gizmo.centre + [0.3, -0.2, 0.1]
@@ -504,6 +527,7 @@ def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
 # Handles.
 
 
+@about_targets
 def test_a_press_on_the_vertices_of_a_handle_grabs_it_at_that_point(bench):
     hand, view = bench.hand, bench.view
     ids = bench.session.handles[TOP]
@@ -525,6 +549,7 @@ def test_a_press_on_the_vertices_of_a_handle_grabs_it_at_that_point(bench):
 
 
 @pytest.mark.parametrize("direction", [(1, 0), (0, -1), (-0.6, 0.8)])
+@about_targets
 def test_a_press_on_a_handle_moves_it_from_more_than_three_pixels_on(bench, direction):
     ids = bench.session.handles[TOP]
     vertex = ids[np.abs(SCENE.mesh.vertices[ids] - [0.0, -0.4, 0.7]).sum(axis=1).argmin()]
@@ -541,6 +566,7 @@ def test_a_press_on_a_handle_moves_it_from_more_than_three_pixels_on(bench, dire
     assert bench.session.undo_label == "drag handle 2"
 
 
+@about_targets
 def test_the_other_handle_keeps_its_targets(bench):
     hand = bench.hand
     hand.drag([bench.aim(FREE), bench.aim(FREE) + [-20.0, 30.0]])

@@ -170,7 +170,9 @@ def test_nor_does_a_callback_that_raises_once_at_any_moment(bench, place):
     print(f"\n{place}: raised at {moments} moments")
 
 
-@pytest.mark.parametrize("place", ["a listener of the session", "an observer of the beginning"])
+@pytest.mark.parametrize(
+    "place", every(2, ["a listener of the session", "an observer of the beginning"])
+)
 def test_nor_if_the_failure_listener_raises_too(bench, place, unheard):
     handler = Raiser()
     stop = bench.view.on_failure(handler)
@@ -211,7 +213,7 @@ def test_after_a_listener_has_ended_a_drag_its_keys_have_no_effect(bench):
     bench.require_works()
 
 
-@pytest.mark.parametrize("part", ["work", "report", "done"])
+@pytest.mark.parametrize("part", every(2, ["work", "report", "done"]))
 def test_a_background_job_that_raises_ends_and_the_next_drag_works(bench, part):
     def work(progress):
         if part == "work":

@@ -31,11 +31,13 @@ from vtk_segdeform.widgets.volume_overlay.diverging import (
 from vtk_segdeform.widgets.volume_overlay.legend import percent
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
+pytestmark = pytest.mark.usefixtures("bound_once")
+
 RNG = np.random.default_rng(5)
 
 
-def session_of(n_regions: int) -> Session:
-    scene = sausage(n_regions)
+def session_of(n_regions: int, *, is_coarse: bool = True) -> Session:
+    scene = sausage(n_regions, is_coarse=is_coarse)
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
@@ -48,7 +50,8 @@ def session_of(n_regions: int) -> Session:
 @pytest.fixture
 def overlay(request):
     """Return the overlay of a sausage along x seen from -y, by default with one region."""
-    session = session_of(getattr(request, "param", 1))
+    n_regions, is_coarse = getattr(request, "param", (1, True))
+    session = session_of(n_regions, is_coarse=is_coarse)
     view = plain_view((400, 300))
     surface = SurfaceDisplay(view, session)
     view.camera.SetPosition(0.0, -10.0, 0.0)
@@ -63,8 +66,8 @@ def overlay(request):
     surface.remove()
 
 
-def several(n_regions):
-    return pytest.mark.parametrize("overlay", [n_regions], indirect=True)
+def several(n_regions, *, is_coarse=True):
+    return pytest.mark.parametrize("overlay", [(n_regions, is_coarse)], indirect=True)
 
 
 def colours(overlay):
@@ -217,6 +220,7 @@ def bent(overlay):
     return seen
 
 
+@several(1, is_coarse=False)
 def test_a_bend_that_loses_volume_is_blue_inside(overlay):
     overlay.show()
     pinch, end = bent(overlay)
@@ -235,7 +239,7 @@ def test_a_bend_that_loses_volume_is_blue_inside(overlay):
 # The lines of text.
 
 
-@several(3)
+@several(3, is_coarse=False)
 def test_the_lines_show_totals_regions_and_steps(overlay):
     session = overlay.session
     overlay.show()
