@@ -11,7 +11,7 @@ from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 
 pytestmark = pytest.mark.usefixtures("bound_once")
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 MESH, X = SCENE.mesh, SCENE.mesh.vertices
 D = MESH.diagonal
 

@@ -25,7 +25,7 @@ from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.solver.solution import Status
 
 pytestmark = pytest.mark.usefixtures("bound_once")
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 MESH, X = SCENE.mesh, SCENE.mesh.vertices
 D = MESH.diagonal
 HIGH, LOW, TIP = (int(np.argmax(X @ way)) for way in ([0, 0, 1.0], [0.3, 0, -1.0], [1.0, 0, 0]))
