@@ -95,7 +95,7 @@ def test_far_from_contact_no_bit_changes():
 
 def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
     monkeypatch.setattr("vtk_segdeform.mesh.intersections._ALL_FACES", 0)
-    ball = sd.models.sphere(2000)
+    ball = sd.models.sphere(1000)
     two = np.concatenate([ball.faces, ball.faces + ball.n_vertices])
     rest = np.concatenate([ball.vertices, ball.vertices + [6.0, 0.0, 0.0]])
     near = np.concatenate([ball.vertices, ball.vertices + [1.9, 0.01, 0.02]])
