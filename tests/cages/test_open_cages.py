@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 
 import numpy as np
@@ -20,7 +21,7 @@ from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.regions.segmentation import segment
 
 
-@pytest.mark.parametrize("name", every(2, SHEETS))
+@pytest.mark.parametrize("name", every(4, SHEETS))
 def test_the_cages_of_any_surface_are_valid_and_enclose_their_regions(name, caplog):
     mesh = mesh_of(name)
     regions = segment(mesh, 2)
@@ -98,8 +99,12 @@ def test_cages_turn_with_an_open_mesh(share):
     np.testing.assert_allclose(other.vertices, one.vertices @ turn.T, atol=1e-6)
 
 
-@pytest.mark.parametrize("n_regions", [1, 2, 3])
-@pytest.mark.parametrize("ends", [[[2.0, 0, -1], [2, 0, 0], [2, 0, 2]], [[2.0, 0, 0]] * 3])
+LINE, POINT = [[2.0, 0, -1], [2, 0, 0], [2, 0, 2]], [[2.0, 0, 0]] * 3
+
+
+@pytest.mark.parametrize(
+    ("ends", "n_regions"), every(2, itertools.product((LINE, POINT), (1, 2, 3)))
+)
 def test_a_component_of_flat_faces_only_gets_a_cage_as_any_other(ends, n_regions):
     vertices, faces = icosphere(2)
     n = len(vertices)

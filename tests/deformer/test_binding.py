@@ -17,7 +17,7 @@ from vtk_segdeform.cages.fit import fit_cage
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
 
-SCENE = sausage(is_coarse=True)
+SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(20)
 
 

@@ -17,12 +17,12 @@ from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.models.shapes import cactus
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights
 from vtk_segdeform.regions.segmentation import segment
 from vtk_segdeform.solver.solution import Status
 
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
+FINE = sausage(2)
 VERTICES = SCENE.mesh.vertices
 REST = SCENE.mesh.vertices[SCENE.handle]
 
@@ -76,7 +76,7 @@ def test_the_volume_change_is_that_of_the_returned_vertices_at_any_distance(diag
 
 
 @pytest.mark.parametrize(
-    "degrees", [*(pytest.param(d, marks=pytest.mark.campaign) for d in (30, 70)), 120, 180]
+    "degrees", [*(pytest.param(d, marks=pytest.mark.campaign) for d in (30, 70, 120)), 180]
 )
 def test_far_motions_end_with_exact_volume_and_without_folds(degrees):
     scene = sausage(3)
@@ -125,15 +125,15 @@ def test_solving_for_the_rest_targets_and_reset_both_return_to_rest():
 
 
 def test_two_handles_are_moved_and_rotated_independently():
-    x = VERTICES[:, 0]
+    x = FINE.mesh.vertices[:, 0]
     left, right = np.flatnonzero(x < -2.4), np.flatnonzero(x > 2.4)
     scene = replace(
-        SCENE, fixed=np.flatnonzero(np.abs(x) < 0.3), handle=np.concatenate([left, right])
+        FINE, fixed=np.flatnonzero(np.abs(x) < 0.3), handle=np.concatenate([left, right])
     )
-    targets = VERTICES[scene.handle].copy()
+    targets = scene.mesh.vertices[scene.handle].copy()
     targets[: len(left)] = targets[: len(left)] @ rotation([1, 0, 0], 0.5).T
     targets[len(left) :] += [0.0, 0.5, 0.2]
-    solution = scene.deformer().solve(targets)
+    solution = scene.held().solve(targets)
     assert solution.handle_error < 1e-3
     assert solution.fixed_error < 1e-3
     assert abs(solution.volume_change) < 1e-13
@@ -193,7 +193,7 @@ def test_a_reset_discards_the_running_state():
     ("change", "says"),
     [
         ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertices are both fixed and"),
-        ({"handle": np.array([1026])}, r"handle must index 0..1025"),
+        ({"handle": np.array([1026])}, r"handle must index 0..257"),
         ({"fixed": np.array([5, 5])}, "fixed contains a vertex twice"),
     ],
 )
@@ -226,8 +226,8 @@ def test_cages_that_do_not_fit_are_refused():
 
 
 def test_regions_of_another_mesh_are_refused():
-    with pytest.raises(RegionError, match="mesh of 1026 vertices, but this mesh has 258"):
-        Deformer(Mesh(*icosphere(3)), SCENE.regions, SCENE.cages)
+    with pytest.raises(RegionError, match="mesh of 258 vertices, but this mesh has 66"):
+        Deformer(Mesh(*icosphere(2)), SCENE.regions, SCENE.cages)
 
 
 def test_the_printed_blend_weights_are_accepted_and_invalid_ones_refused():
@@ -335,7 +335,7 @@ def test_a_pose_can_be_resumed():
     assert_allclose(again.vertices, first.vertices, atol=1e-4 * SCENE.mesh.diagonal)
     assert again.steps < first.steps
     with pytest.raises(
-        CageError, match=r"must contain \[66, 66\] points, cage by cage; got \[66\]"
+        CageError, match=r"must contain \[18, 18\] points, cage by cage; got \[18\]"
     ):
         deformer.resume(first.cage_vertices[:1], SCENE.turned(30))
 
@@ -355,12 +355,12 @@ def test_binding_reports_its_progress_and_can_be_cancelled():
 
 
 def test_set_up_reports_every_stage_and_can_be_cancelled_at_each():
-    mesh = cactus(500)
+    mesh = Mesh(icosphere(2)[0] * [3.0, 1.0, 1.0], icosphere(2)[1])
     regions = segment(mesh, 2)
-    cages = fit_cages(mesh, regions, 60)
+    cages = fit_cages(mesh, regions, 25)
     for work, least in (
         (lambda told: segment(mesh, 2, progress=told), 4),
-        (lambda told: fit_cages(mesh, regions, 60, progress=told), 4),
+        (lambda told: fit_cages(mesh, regions, 25, progress=told), 4),
         (lambda told: Deformer(mesh, regions, cages, handle=[0], progress=told), 6),
     ):
         seen = []
@@ -418,7 +418,8 @@ def test_a_cancelled_solve_restores_the_pose_before():
 def test_a_mesh_may_have_many_bodies():
     # At least as many rotation clusters as bodies, and a region for each if requested.
     ball, faces = icosphere(1)
-    grid = np.stack(np.meshgrid(*3 * [3.0 * np.arange(3)]), axis=-1).reshape(-1, 3)
+    places = 3.0 * np.arange(3)
+    grid = np.stack(np.meshgrid(places[:2], places[:2], places), axis=-1).reshape(-1, 3)
     vertices = np.concatenate([ball + place for place in grid])
     mesh = Mesh(vertices, np.concatenate([faces + k * len(ball) for k in range(len(grid))]))
     lift = [0.0, 0.0, 0.4]
@@ -431,4 +432,4 @@ def test_a_mesh_may_have_many_bodies():
         solution = deformer.solve(vertices[top] + lift)
         assert abs(solution.volume_change) < 1e-12
         assert solution.handle_error < 1e-3
-        assert len(np.unique(mesh.components[top])) == 9
+        assert len(np.unique(mesh.components[top])) == 4

@@ -14,7 +14,8 @@ from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import ArgumentError, Cancelled, MeshError
 from vtk_segdeform.geometry.distortion import distortion
 
-SCENE = sausage(is_coarse=True)
+pytestmark = pytest.mark.usefixtures("bound_once")
+SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.mesh.vertices[SCENE.handle] + [0.0, 0.6, -0.6]
 OPTIONS = {"n_regions": 1, "n_cage_vertices": 40}
 

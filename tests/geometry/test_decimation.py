@@ -17,7 +17,7 @@ from vtk_segdeform.regions import segment
 
 @functools.cache
 def cactus():
-    return models.cactus(4000)
+    return models.cactus(2000)
 
 
 def two_close_sheets():
@@ -26,7 +26,7 @@ def two_close_sheets():
 
 
 def noisy_cactus():
-    noise = 0.1 * np.random.default_rng(0).normal(size=(4000, 3))  # several edge lengths
+    noise = 0.1 * np.random.default_rng(0).normal(size=(2000, 3))  # several edge lengths
     return cactus().with_vertices(cactus().vertices + noise)
 
 
@@ -44,18 +44,18 @@ def test_clusters_are_connected_and_never_join_two_sheets(made):
 
 
 def test_the_shape_is_the_same_in_any_place_and_size():
-    coarse, kept, _ = decimated(cactus(), 1000)
+    coarse, kept, _ = decimated(cactus(), 600)
     volumes = [signed_volume(each.vertices, each.faces) for each in (coarse, cactus())]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.05)
-    assert decimated(cactus(), 1000)[0] is coarse  # known
+    assert decimated(cactus(), 600)[0] is coarse  # known
     moved = cactus().with_vertices(1e-7 * cactus().vertices[:, [1, 2, 0]] + 3.0)
-    assert np.mean(np.isin(decimated(moved, 1000)[1], kept)) > 0.9
+    assert np.mean(np.isin(decimated(moved, 600)[1], kept)) > 0.9
 
 
 def test_regions_and_cages_of_a_large_mesh_are_those_of_a_decimated_one(monkeypatch):
     plain = segment(cactus())
-    monkeypatch.setattr(sizes, "DECIMATED", 3500)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 3200)
+    monkeypatch.setattr(sizes, "DECIMATED", 1750)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 1600)
     regions = segment(cactus())
     assert regions.n_regions == plain.n_regions == 3
     assert np.mean(regions.labels == plain.labels) > 0.9

@@ -118,7 +118,7 @@ def test_a_body_encloses_a_volume(name):
     assert lids_of(mesh).encloses.all()
 
 
-@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("name", every(2, SHEETS))
 def test_a_sheet_encloses_nothing(name):
     mesh = SHEETS[name]()
     print(f"{name}: q = {mean_winding(mesh.vertices, mesh.faces):.3f}")
@@ -159,7 +159,7 @@ def test_a_lid_of_a_flat_border_restores_the_volume_of_the_box():
     assert_allclose(x[mesh.n_vertices :], [[0.0, 0.0, mesh.vertices[:, 2].max()]], atol=1e-14)
 
 
-@pytest.mark.parametrize("name", [*BODIES, "ring", "annulus", "sheet with holes"])
+@pytest.mark.parametrize("name", [*every(3, BODIES), "ring", "annulus", "sheet with holes"])
 def test_faces_and_lids_have_no_boundary(name):
     mesh = {**BODIES, **SHEETS}[name]()
     lids = lids_of(mesh, lids=True)

@@ -58,7 +58,7 @@ def links(faces, corners):
     return {id(each): each for each in group.values()}.values(), of_edge
 
 
-@pytest.mark.parametrize("seed", every(2, range(40)))
+@pytest.mark.parametrize("seed", every(4, range(40)))
 def test_any_few_triangles_have_the_properties_of_the_definitions(seed):
     for part in range(5):
         faces = random_faces(100 * seed + part)

@@ -331,7 +331,7 @@ def test_a_mesh_that_cannot_be_repaired_is_an_error(vertices, faces, message):
         repair(vertices, faces)
 
 
-@pytest.mark.parametrize("seed", every(3, range(30)))
+@pytest.mark.parametrize("seed", every(5, range(30)))
 def test_random_damage_never_raises_and_never_gets_worse(seed):
     rng = np.random.default_rng(seed)
     vertices, faces = SPHERE if seed % 2 else torus(12, 8)

@@ -24,7 +24,7 @@ def pieces(mesh, members):
 def test_any_surface_is_segmented_into_connected_regions(name):
     mesh = mesh_of(name)
     components = mesh.components.max() + 1
-    for n_regions in (None, 1, 2, 5, 8):
+    for n_regions in (None, 1, 3, 8):
         if n_regions is not None and n_regions > mesh.n_vertices:
             continue
         regions = segment(mesh, n_regions)
@@ -37,7 +37,7 @@ def test_any_surface_is_segmented_into_connected_regions(name):
 
 @pytest.mark.parametrize("n_regions", [2, 4])
 def test_the_regions_of_a_plate_are_of_similar_area(n_regions):
-    labels = segment(Mesh(*plate(40, 40)), n_regions).labels
+    labels = segment(Mesh(*plate(24, 24)), n_regions).labels
     assert np.bincount(labels).min() > 0.7 * len(labels) / n_regions
 
 

@@ -36,13 +36,13 @@ def tube(around, along, outline):
     return Mesh(np.concatenate([rings, [[0, 0, 0], [0, 0, 10.0]]]), np.concatenate(faces))
 
 
-def limbed(around=48, along=160):
+def limbed(around=32, along=107):
     """Return a thick middle (3 < z < 7) with a thin limb at each end."""
     fat = 1.2
     return tube(around, along, lambda s: np.where(abs(s - 0.5) < 0.2, fat, 0.4))
 
 
-BAR = tube(40, 120, lambda s: np.full_like(s, 0.9))
+BAR = tube(28, 84, lambda s: np.full_like(s, 0.9))
 
 
 def cores(mesh, *arguments, **options):
@@ -88,7 +88,7 @@ def test_a_bar_is_cut_into_equal_slices_across_it(n_regions):
 @pytest.mark.parametrize("n_regions", every(2, [1, 2, 3, 6, 17, 40]))
 @pytest.mark.parametrize(
     "mesh",
-    [Mesh(*icosphere(4)), Mesh(*torus()), limbed(24, 90)],
+    [Mesh(*icosphere(3)), Mesh(*torus()), limbed(16, 60)],
     ids=["sphere", "torus", "limbed"],
 )
 def test_there_are_n_regions_each_connected(mesh, n_regions):
@@ -137,7 +137,7 @@ def test_the_result_is_deterministic():
 
 
 def test_a_finer_mesh_gives_the_same_parts():
-    coarse, fine = limbed(32, 100), limbed(64, 320)
+    coarse, fine = limbed(32, 100), limbed(56, 200)
     joints = []
     for mesh in (coarse, fine):
         labels, z = cores(mesh, 3).labels, mesh.vertices[:, 2]
@@ -188,7 +188,7 @@ def test_a_removed_vertex_joins_its_nearest_chosen_neighbour():
 
 
 def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
-    mesh = limbed(64, 200)
+    mesh = limbed(48, 150)
     x, y, z = mesh.vertices.T
     x = z + 2.0 * np.sin(3.0 * np.arctan2(y, x))  # a wavy border
     labels = (x > np.quantile(x, 0.7)).astype(int)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from campaign import every
 from numpy.testing import assert_array_equal
-from scenes import sausage
+from scenes import Scene, sausage
 from sheets import plate
 from solids import rotation
 
@@ -24,7 +24,7 @@ from vtk_segdeform.session.state import checked_state
 from vtk_segdeform.session.store import load_session, save_session
 
 pytestmark = pytest.mark.usefixtures("bound_once")
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 
 
 def turned(angle: float) -> np.ndarray:
@@ -39,13 +39,13 @@ def volume_of(mesh: Mesh, vertices: np.ndarray | None = None) -> float:
     return signed_volume(mesh.vertices if vertices is None else vertices, faces)
 
 
-def ready() -> Session:
+def ready(scene: Scene = SCENE) -> Session:
     """Return a session with fixed vertices and a handle called "tip"."""
-    session = Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle, "tip")
+    session = Session(scene.mesh)
+    session.set_regions(scene.regions)
+    session.set_cages(scene.cages)
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle, "tip")
     return session
 
 
@@ -199,16 +199,17 @@ def rotated(session: Session, turn: np.ndarray) -> np.ndarray:
 
 
 def test_a_finished_pose_rotates_with_its_handles():
-    session = ready()
+    scene = sausage(2)  # the cages of a coarse one meet their places less accurately
+    session = ready(scene)
     session.set_fixed([])
-    session.add_handle(SCENE.fixed, "base")
+    session.add_handle(scene.fixed, "base")
     dragged(session).finish()
     plain = session.vertices
     assert rotated(session, rotation([1.0, 2.0, 3.0], 2.0)) < 1e-4
     session.undo()
     assert_array_equal(session.vertices, plain)
     # A handle made in a finished pose is where the cages do not put it.
-    away = np.abs(plain - SCENE.mesh.vertices).sum(axis=1)
+    away = np.abs(plain - scene.mesh.vertices).sum(axis=1)
     away[session.state.handle] = 0.0
     session.add_handle(np.argsort(away)[-12:], "more")
     assert rotated(session, rotation([0.0, 1.0, 0.0], 1.0)) < 1e-3
@@ -246,9 +247,9 @@ def pulled(session: Session, vertex: int, by: float, **options: float) -> None:
 
 @pytest.mark.campaign
 def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
-    session = ready()
+    session = ready(sausage(2))
     session.remove_handle("tip")
-    x = session.mesh.vertices
+    x, faces = session.mesh.vertices, session.mesh.faces
     ends = int(x[:, 0].argmax()), int(np.abs(x - x[x[:, 0].argsort()[len(x) // 3]]).sum(1).argmin())
     poses = []
     for vertex, options in zip(ends, ({}, {"locality": 1.0, "radius": 0.25}), strict=True):
@@ -271,7 +272,7 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     solution = session.solution
     assert solution is not None
     assert max(solution.handle_error, solution.fixed_error) < 1e-12
-    assert abs(volume_of(session.mesh, poses[-1]) / volume_of(session.mesh) - 1.0) < 1e-12
+    assert abs(signed_volume(poses[-1], faces) / signed_volume(x, faces) - 1.0) < 1e-12
     save_session(tmp_path / "pulled", session)
     loaded = load_session(tmp_path / "pulled")
     for each in (session, loaded):

@@ -216,7 +216,7 @@ def test_a_flipped_bit_is_an_error_or_makes_no_difference(tmp_path):
     save_session(tmp_path / "good.segdeform", SMALL)
     content = (tmp_path / "good.segdeform").read_bytes()
     rng, refusals = np.random.default_rng(1), 0
-    for place in rng.choice(len(content), 200, replace=False):
+    for place in rng.choice(len(content), 100, replace=False):
         broken = bytearray(content)
         broken[place] ^= 1 << rng.integers(8)
         (tmp_path / "bad.segdeform").write_bytes(broken)
@@ -226,4 +226,4 @@ def test_a_flipped_bit_is_an_error_or_makes_no_difference(tmp_path):
             refusals += 1
         else:
             require_only_moved(SMALL.surface.given, loaded.deformed)
-    assert refusals > 100
+    assert refusals > 50

@@ -20,7 +20,7 @@ from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.solver.barrier import Barrier
 from vtk_segdeform.solver.solution import Status
 
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 HELD = {"fixed": SCENE.fixed, "handle": SCENE.handle}
 
 
@@ -51,7 +51,7 @@ def in_order(p):
 
 
 def test_at_rest_all_volumes_are_as_they_were(barrier):
-    assert len(barrier.corners) > 1000
+    assert len(barrier.corners) > 500
     assert_allclose(barrier.ratios(rest_cages()), 1.0, atol=1e-9)
     assert barrier.value_and_slope(rest_cages())[0] == 0.0
     assert barrier.hessian(rest_cages()) is None
@@ -150,13 +150,14 @@ def test_the_solver_passes_the_surface_of_the_same_pose(monkeypatch):
         assert_allclose(x, deformer.step_volumes.surface.map(p), atol=1e-12)
 
 
-def test_triangles_share_inner_points_of_the_body(barrier):
-    n = deformer_of(avoid_folds=True).step_volumes.surface.n_vertices
+def test_triangles_share_inner_points_of_the_body():
+    deformer = sausage(2).deformer(avoid_folds=True)  # of small triangles
+    barrier, n = deformer._barrier, deformer.step_volumes.surface.n_vertices
     inner = barrier.corners[:, 3]
     assert (inner >= n).all()
     assert len(np.unique(inner)) < 0.5 * len(inner)
     assert_allclose(barrier.points.sum(axis=1), 1.0, atol=1e-12)
-    faces = {tuple(sorted(each)) for each in deformer_of(avoid_folds=True)._samples.faces.tolist()}
+    faces = {tuple(sorted(each)) for each in deformer._samples.faces.tolist()}
     assert {tuple(sorted(each)) for each in barrier.corners[:, :3].tolist()} == faces
 
 

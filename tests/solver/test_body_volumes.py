@@ -71,11 +71,12 @@ def test_splinters_share_the_constraint_of_the_largest_body():
 @pytest.mark.parametrize("separate", [True, False])
 def test_large_bodies_are_scaled_one_by_one_unless_a_cage_moves_two(separate, monkeypatch):
     for size in ("COARSE_VOLUME", "SCALED_VOLUME"):
-        monkeypatch.setattr(sizes, size, 300)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
-    mesh = joined((BALL, 0.0, 1.0, 1), (BALL, 5.0, 1.5, 1))
+        monkeypatch.setattr(sizes, size, 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 80)
+    ball = models.sphere(66)
+    mesh = joined((ball, 0.0, 1.0, 1), (ball, 5.0, 1.5, 1))
     regions = Regions.from_labels(mesh, mesh.components) if separate else Regions.single(mesh)
-    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 40))
+    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 30))
     first, last = int(mesh.vertices[:, 0].argmin()), int(mesh.vertices[:, 0].argmax())
     deformer = deformer.hold(fixed=[first], handle=[last])
     solution = deformer.solve(mesh.vertices[[last]] + [0.5, 0.0, 0.7])

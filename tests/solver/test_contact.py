@@ -20,7 +20,7 @@ LIMBS = [Limb(CURVE, [0.13] * 7), Limb([(0, 0, -0.1), (0, 0, 0.2)], [0.25, 0.2])
 @pytest.fixture(scope="module")
 def fork():
     """Return a deformer of the fork that avoids contact, and targets beside the other prong."""
-    mesh = standing_body(LIMBS, 1200, blend=0.05)
+    mesh = standing_body(LIMBS, 700, blend=0.05)
     x = mesh.vertices
     regions = sd.segment(mesh, 1)
     fixed, handle = np.flatnonzero(x[:, 2] < 0.12), np.flatnonzero((x[:, 0] > 0) & (x[:, 2] > 0.85))
@@ -85,7 +85,7 @@ def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, mon
 
 
 def test_far_from_contact_no_bit_changes():
-    scene = sausage(2)
+    scene = sausage(2, is_coarse=True)
     free, avoiding = scene.deformer(), scene.deformer(avoid_contact=True)
     targets = scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.01]
     assert avoiding._constraints.contact.surface.spacing < 0.2
@@ -95,7 +95,7 @@ def test_far_from_contact_no_bit_changes():
 
 def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
     monkeypatch.setattr("vtk_segdeform.mesh.intersections._ALL_FACES", 0)
-    ball = sd.models.sphere(2000)
+    ball = sd.models.sphere(1000)
     two = np.concatenate([ball.faces, ball.faces + ball.n_vertices])
     rest = np.concatenate([ball.vertices, ball.vertices + [6.0, 0.0, 0.0]])
     near = np.concatenate([ball.vertices, ball.vertices + [1.9, 0.01, 0.02]])

@@ -18,16 +18,16 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import total_volume
 from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
-SCENE = sausage()
+SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
 
 
 @pytest.fixture
 def scaled(monkeypatch):
     """Scale small meshes to their volume, as large ones are."""
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 1000)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 700)
-    monkeypatch.setattr(sizes, "SCALED_VOLUME", 1000)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])

@@ -15,10 +15,10 @@ SCENE = sausage(3)
 
 def test_shared_places_are_as_accurate_as_separate_ones(monkeypatch):
     targets = SCENE.turned(40)
-    each = SCENE.deformer().solve(targets)
+    each = SCENE.held().solve(targets)
     monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
     monkeypatch.setattr(sizes, "PLACES", 30)
-    deformer = SCENE.deformer()
+    deformer = SCENE.held()
     assert len(deformer._continuation.solver.positions.rows) == 60
     shared = deformer.solve(targets)
     assert shared.handle_error < 1.5 * each.handle_error + 1e-4
@@ -30,7 +30,7 @@ def test_shared_places_are_as_accurate_as_separate_ones(monkeypatch):
 def test_a_set_with_shared_places_is_checked_at_its_largest_error(monkeypatch):
     monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
     monkeypatch.setattr(sizes, "PLACES", 30)
-    deformer, targets = SCENE.deformer(), SCENE.turned(40)
+    deformer, targets = SCENE.held(), SCENE.turned(40)
     solution, goal = deformer.solve(targets), SCENE.mesh.vertices.copy()
     goal[SCENE.handle] = targets
     away = np.linalg.norm(solution.vertices - goal, axis=1) / deformer._frame.size

@@ -10,7 +10,7 @@ from scenes import sausage
 
 from vtk_segdeform.solver.solution import Status
 
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,7 +108,7 @@ OPEN = {
     "box without a face": lambda: open_box(),
     "bottle": lambda: bottle(24, 24),
     "tube": lambda: tube(6.0, 24, 16),
-    "body with holes": lambda: with_holes(models.cactus(2000), 12, 0.03),
+    "body with holes": lambda: with_holes(models.cactus(1000), 12, 0.04),
     "box beside a sheet": lambda: together(
         open_box(), sheet(lambda u, v: (4 + u, v, 0.1 * np.sin(9 * u)), 9, 9)
     ),
