@@ -55,6 +55,7 @@ class Factor:
 
     triangle: FloatArray  # in LAPACK's order; zero above its diagonal
     coupled: bool
+    share: float = 0.0  # of the term of the rotations, which the Hessian contains
 
     def solve(self, y: FloatArray) -> FloatArray:
         """Return H^-1 y, (m, 3), for *y* (m, 3)."""
@@ -113,6 +114,7 @@ def full_factor(
             return Factor(
                 linalg.cholesky(full, lower=True, overwrite_a=True, check_finite=False),
                 coupled=True,
+                share=share,
             )
         except linalg.LinAlgError:
             continue

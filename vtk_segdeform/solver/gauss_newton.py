@@ -28,7 +28,8 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
 2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
    needed, and a small step does not mean that the minimum is near.  With the derivatives of the
    rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
-   They are computed again after 6 steps, and shared by solvers with other weights.
+   They are computed again after 6 steps, and shared by solvers with other weights.  If H is not
+   convex, it contains a share of the rotations' derivatives only, and h is shorter than that.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
@@ -81,6 +82,9 @@ _OLD = 6  # steps after which H is computed again
 _OLDISH = 2  # the same if a solver with other weights has just computed most of it
 _OLD_ACTIVE = 3  # the same while a term is active
 _SIMILAR = 2.0  # ratio of weights up to which a factor of H serves for both
+_EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
+_SLOWEST = 0.9  # largest ratio of two steps by which the later ones are extrapolated
+_SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
 
 
@@ -302,7 +306,7 @@ class GaussNewton:
         step = np.zeros_like(p)
         newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
-        remaining = math.inf
+        remaining = length = math.inf
         last = options.max_steps + (options.within is not None)  # which estimates what remains
         while len(merits) <= last:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
@@ -319,7 +323,13 @@ class GaussNewton:
             if here.is_active and state.step_size > _LONGEST_ACTIVE:
                 step *= _LONGEST_ACTIVE / state.step_size
             if options.within is not None:
-                remaining = self._farthest(step)
+                before, length = length, self._farthest(step)
+                remaining = _left(length, before if state.age else math.inf)
+                if newton and state.factor.share < _EXACT:
+                    if state.age and remaining <= options.within:
+                        state.drop_factor()  # the exact H may be convex here
+                        continue
+                    remaining *= _SHORT
             if state.step_size <= options.tolerance:
                 status = Status.CONVERGED
                 break
@@ -531,3 +541,8 @@ class GaussNewton:
     def _length(self, step: FloatArray) -> float:
         """Return the root mean square of a *step* over the surface."""
         return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))
+
+
+def _left(length: float, before: float) -> float:
+    """Return the sum of all steps that follow, of a *length* each time in the ratio to *before*."""
+    return length / (1.0 - min(_SLOWEST, length / before if before else 0.0))

@@ -1,0 +1,27 @@
+"""Poses of a live drag are near converged ones, also while the body buckles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import vtk_segdeform as sd
+from vtk_segdeform import models
+
+
+def test_every_pose_shown_is_within_a_hundredth_of_the_one_it_converges_to():
+    mesh = models.torus(600)
+    regions, height = sd.Regions.single(mesh), mesh.vertices[:, 2] / np.ptp(mesh.vertices[:, 2])
+    cages = sd.fit_cages(mesh, regions, 40)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=height < -0.38, handle=height > 0.38)
+    rest, worst, behind = mesh.vertices[deformer.handle], 0.0, 0.0
+    for press in 0.4 * mesh.diagonal * np.arange(1, 9) / 8:
+        targets = rest - [0.0, 0.0, press]
+        pose = deformer.solve(targets, max_steps=8, within=0.0025)
+        assert abs(pose.volume_change) <= 1e-12
+        at = targets if pose.targets is None else pose.targets
+        final = deformer.copy().solve(at)
+        behind = max(behind, float(np.linalg.norm(targets - at, axis=1).max()))
+        worst = max(worst, float(np.linalg.norm(final.vertices - pose.vertices, axis=1).max()))
+    print(f"{worst / mesh.diagonal:.1%} away, {behind / mesh.diagonal:.1%} behind the hand")
+    assert worst < 0.01 * mesh.diagonal
+    assert behind < 0.3 * mesh.diagonal
