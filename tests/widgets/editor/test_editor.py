@@ -167,7 +167,7 @@ def test_the_whole_story(any_view, tmp_path):
     arm = np.array(hand.at(middle)) - pivot
     way = [
         pivot + [np.cos(a) * arm[0] + np.sin(a) * arm[1], np.cos(a) * arm[1] - np.sin(a) * arm[0]]
-        for a in np.radians(np.linspace(0.0, 60.0, 6))
+        for a in np.radians(np.linspace(0.0, 60.0, 13))
     ]
     hand.drag(way)
     assert bench.session.undo_label == "drag handle 1"
