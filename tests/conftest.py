@@ -125,18 +125,28 @@ def _windows_again() -> Iterator[None]:
         yield
 
 
-@functools.cache
-def _cached(name: str) -> Any:
+@pytest.fixture(scope="session", autouse=True)
+def _bodies_once() -> Iterator[None]:
+    """Create each cactus and dinosaur once per process; meshes are immutable."""
     from vtk_segdeform import models
 
-    return functools.cache(getattr(models, name))
+    def once(make: Any) -> Any:
+        known: dict[tuple[int, ...], Any] = {}
 
+        @functools.wraps(make)
+        def body(*args: Any, **named: Any) -> Any:
+            if named or not all(type(value) is int for value in args):
+                return make(*args, **named)
+            if args not in known:
+                known[args] = make(*args)
+            return known[args]
 
-@pytest.fixture
-def cached_models(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Create each cactus and dinosaur once per process; meshes are immutable."""
-    for name in ("cactus", "dinosaur"):
-        monkeypatch.setattr(f"vtk_segdeform.models.{name}", _cached(name))
+        return body
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("cactus", "dinosaur"):
+            patch.setattr(models, name, once(getattr(models, name)))
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 @pytest.mark.parametrize("enough", [500, 100_000])
 @pytest.mark.parametrize("name", ["cactus", "dinosaur"])
-@pytest.mark.usefixtures("cached_models")
 def test_a_cactus_and_a_dinosaur_stand_on_their_feet(name, enough, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.geometry.up_axis._ENOUGH", enough)
     vertices = getattr(models, name)(1000).vertices

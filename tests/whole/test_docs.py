@@ -160,7 +160,7 @@ def test_python_on_a_page_comes_from_a_program_or_runs(page):
 
 
 @pytest.mark.parametrize("page", [name for name, text in PAGES.items() if ">>> " in text])
-def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path, cached_models):
+def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     if page in NEED_MESHLAB and not meshlab.available():
         pytest.skip("needs PyMeshLab")

@@ -44,7 +44,7 @@ def imported(name: str) -> ModuleType:
 
 
 @pytest.mark.parametrize("name", WITH_EXAMPLES)
-def test_the_examples_of_a_module_are_right(name, monkeypatch, tmp_path, cached_models):
+def test_the_examples_of_a_module_are_right(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # for examples that write files
     module = imported(name)
     linecache.clearcache()  # otherwise doctest checks every cached file before each docstring

@@ -69,7 +69,6 @@ def test_every_example_has_a_number_to_hold():
     "name",
     [pytest.param(n, marks=[pytest.mark.campaign] if n in LONG else []) for n in RIGHT],
 )
-@pytest.mark.usefixtures("cached_models")
 def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_path):
     folder = tmp_path / "some" / "where"  # which it makes
     monkeypatch.setattr("sys.argv", [name, str(folder)] if name in LEAVES else [name])

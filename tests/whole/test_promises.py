@@ -20,8 +20,6 @@ from vtk_segdeform.geometry.distortion import distortion
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
 
-pytestmark = pytest.mark.usefixtures("cached_models")
-
 QUICK = ["small cactus", "torus", "two components", "botsch-sorkine/cylinder.off"]
 ALL = [
     "cactus",

@@ -148,7 +148,7 @@ def numbers_of_lines(text, starts, lines, skip, values):
                 at += 1
             if at == end:
                 return False
-            values[row, column], at = _number(text, at, False)
+            values[row, column], at = _number(text, at, np.bool_(False))
             if at < 0:
                 return False
         while at < end and text[at] <= _SPACE:
