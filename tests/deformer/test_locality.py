@@ -27,6 +27,7 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
 from vtk_segdeform.solver.solution import Status
 
+pytestmark = pytest.mark.usefixtures("cached_models")
 SCENE = sausage(2, is_coarse=True)
 X = SCENE.mesh.vertices
 D = SCENE.mesh.diagonal
@@ -173,7 +174,7 @@ def spike(mesh, x, vertex):
 
 
 def dense():
-    return models.cactus(700)
+    return models.cactus(600)
 
 
 def real(name):
