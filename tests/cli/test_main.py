@@ -22,7 +22,7 @@ from vtk_segdeform.io import convert, read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
 QUICK = ["--regions", "2", "--cage-vertices", "60"]
-pytestmark = pytest.mark.usefixtures("cached_models", "bound_once")
+pytestmark = pytest.mark.usefixtures("cached_models")
 
 
 @pytest.fixture(scope="module")
