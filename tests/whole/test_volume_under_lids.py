@@ -69,7 +69,7 @@ def held(deformer, **options):
 
 @pytest.mark.parametrize(
     ("name", "n_regions"),
-    every(4, [*((name, 3) for name in BODIES), ("bottle", 1), ("bottle", 6)]),
+    every(7, [*((name, 3) for name in BODIES), ("bottle", 1), ("bottle", 6)]),
 )
 def test_every_pose_has_the_volume_of_the_rest_shape(name, n_regions):
     deformer = bound(name, n_regions)
