@@ -214,7 +214,7 @@ def test_intersections_of_random_triangles_agree_with_vtk(spread):
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_intersections_do_not_depend_on_the_sweep_axis_or_on_batches(axis, monkeypatch):
-    vertices, faces = joined(icosphere(2), moved(icosphere(2), [0.7, 0.1, 0.2]))
+    vertices, faces = joined(icosphere(1), moved(icosphere(1), [0.7, 0.1, 0.2]))
     expected = self_intersections(vertices, faces)
     assert len(expected) > 20
     rolled = np.roll(vertices, axis, axis=1) * [1, 10, 1]

@@ -22,7 +22,6 @@ from vtk_segdeform.io import convert, read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
 QUICK = ["--regions", "2", "--cage-vertices", "60"]
-pytestmark = pytest.mark.usefixtures("bound_once")
 
 
 @pytest.fixture(scope="module")

@@ -96,7 +96,7 @@ def test_far_motions_end_with_exact_volume_and_without_folds(degrees):
 def test_a_jump_and_a_drag_end_in_the_same_place():
     jump = SCENE.deformer(tolerance=1e-8, max_steps=2000).solve(SCENE.turned(45))
     drag = SCENE.deformer(tolerance=1e-8, max_steps=2000)
-    for degrees in range(5, 50, 5):
+    for degrees in range(15, 50, 15):
         solution = drag.solve(SCENE.turned(degrees))
         assert abs(solution.volume_change) < 1e-13
     assert_allclose(solution.vertices, jump.vertices, atol=1e-4 * SCENE.mesh.diagonal)
@@ -288,7 +288,7 @@ def test_the_volume_is_exact_for_targets_as_far_apart_as_allowed(way):
     rest = scene.mesh.vertices[deformer.handle]
     side = np.where(np.isin(deformer.handle, coarse.handle), 1.0, -1.0)[:, None]
     far = scene.mesh.diagonal * side * way
-    for distance in np.linspace(1.0, 9.4, 6):
+    for distance in np.linspace(1.0, 9.4, 4):
         solution = deformer.solve(rest + distance * far, max_steps=8)
         assert abs(solution.volume_change) <= 1e-12
     assert np.ptp(solution.vertices, axis=0).max() > 18.0 * scene.mesh.diagonal

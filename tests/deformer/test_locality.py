@@ -173,7 +173,7 @@ def spike(mesh, x, vertex):
 
 
 def dense():
-    return models.cactus(700)
+    return models.cactus(600)
 
 
 def real(name):

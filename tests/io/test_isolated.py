@@ -55,6 +55,7 @@ def test_the_whole_file_is_read_with_or_without_the_child_process(
     assert again.point_data.active_texture_coordinates_name == "uv"
 
 
+@pytest.mark.usefixtures("vtk_without_child")
 @pytest.mark.parametrize("suffix", [".vtp", ".vtk", ".vtkhdf"])
 def test_names_of_components_do_not_make_a_file_unreadable(tmp_path, suffix):
     surface = to_polydata(Mesh(*CUBE))
@@ -69,6 +70,7 @@ def test_names_of_components_do_not_make_a_file_unreadable(tmp_path, suffix):
         assert [again.GetComponentName(k) for k in (0, 1)] == [expected, "Süd 1%"]
 
 
+@pytest.mark.usefixtures("vtk_without_child")
 def test_pieces_of_a_file_are_one_surface(tmp_path):
     parts = [pv.Cube().triangulate(), pv.Cube(center=(5, 0, 0)).triangulate()]
     pv.MultiBlock(parts).save(tmp_path / "a.vtkhdf")
@@ -85,7 +87,7 @@ def test_reading_that_takes_too_long_is_stopped(tmp_path, monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs limits of memory")
 def test_reading_that_needs_too_much_memory_is_an_error(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtkhdf", Mesh(*icosphere(6)))
+    write_mesh(tmp_path / "a.vtkhdf", Mesh(*icosphere(4)))
     monkeypatch.setattr(isolated, "_MEMORY", 1)
     monkeypatch.setattr(isolated, "_PER_BYTE", 0)
     with pytest.raises(MeshError, match=r"a\.vtkhdf: "):

@@ -15,6 +15,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
+from vtk_segdeform.pictures import canvas
 from vtk_segdeform.pictures.pictures import picture_distortion
 from vtk_segdeform.widgets.recording.film_files import write_film
 from vtk_segdeform.widgets.recording.recording import Recorder
@@ -54,6 +55,11 @@ WRITERS = {
         )
     },
 }
+
+
+@pytest.fixture(autouse=True)
+def small_pictures(monkeypatch):
+    monkeypatch.setattr(canvas, "_HEIGHT", 60)
 
 
 @pytest.fixture(params=WRITERS)

@@ -79,7 +79,7 @@ def noisy(mesh, seed=1):
     return mesh.with_vertices(mesh.vertices + np.median(mesh.adjacency.data) * shift)
 
 
-@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("name", every(2, BODIES))
 @pytest.mark.parametrize(
     "change",
     [
@@ -88,7 +88,7 @@ def noisy(mesh, seed=1):
     ],
 )
 def test_every_part_of_a_body_is_a_region_and_nothing_else(name, change):
-    mesh, truth = body(name, 1500 if change is noisy else 1000)
+    mesh, truth = body(name, 1500) if change is noisy else body(name)
     count, agreement = overlaps(change(mesh), truth)
     assert dict(zip(BODIES[name], agreement > 0.5, strict=True)) == dict.fromkeys(
         BODIES[name], True

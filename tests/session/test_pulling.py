@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -37,11 +39,17 @@ def ready() -> Session:
     return Session(MESH, state=State(SCENE.regions, SCENE.cages))
 
 
-def pulled(vertex: int = HIGH, shift: np.ndarray = UP, **options) -> Session:
+@functools.cache
+def _pulled(vertex: int, shift: tuple[float, ...], **options) -> Session:
     session = ready()
     session.pull(vertex, X[vertex] + shift, **options)
     session.commit()
     return session
+
+
+def pulled(vertex: int = HIGH, shift: np.ndarray = UP, **options) -> Session:
+    """Return a session after one pull: a copy of the first one."""
+    return copy.copy(_pulled(vertex, tuple(shift.tolist()), **options))
 
 
 def moved(session: Session, before: np.ndarray) -> float:
@@ -73,8 +81,15 @@ BEFORE: dict[str, Callable[[Session], object]] = {
 }
 
 
-@pytest.mark.parametrize("locality", [None, 1.0])
-@pytest.mark.parametrize("before", every(2, BEFORE))
+# Every state before it, the localities in turn; every pair in the campaign.
+PRESSES = [(before, (None, 1.0)[(k + j) % 2]) for j in range(2) for k, before in enumerate(BEFORE)]
+
+
+@pytest.mark.parametrize(
+    ("before", "locality"),
+    PRESSES[: len(BEFORE)]
+    + [pytest.param(*each, marks=pytest.mark.campaign) for each in PRESSES[len(BEFORE) :]],
+)
 def test_nothing_moves_at_the_press(before, locality):
     session = pulled()
     BEFORE[before](session)
@@ -409,12 +424,19 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("wrong", "says"), WRONG)
-def test_what_cannot_be_pulled_says_why_and_changes_nothing(wrong, says):
+@functools.cache
+def partly_fixed() -> Session:
+    """Return a session with fixed vertices and a pull that was stopped early, to be copied."""
     session = ready()
     session.set_fixed(SCENE.fixed)
     session.pull(TIP, X[TIP] + 0.3 * UP, max_steps=2)
     session.commit()
+    return session
+
+
+@pytest.mark.parametrize(("wrong", "says"), WRONG)
+def test_what_cannot_be_pulled_says_why_and_changes_nothing(wrong, says):
+    session = copy.copy(partly_fixed())
     state = session.state
     with pytest.raises((ConstraintError, CageError), match=says):
         wrong(session)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import functools
 import itertools
 from dataclasses import replace
 
@@ -94,7 +96,7 @@ def one_action(session: Session, rng: np.random.Generator) -> None:
     session.commit()
 
 
-@pytest.mark.parametrize("seed", every(2, range(3)))
+@pytest.mark.parametrize("seed", every(3, [2, 0, 1]))
 def test_any_sequence_of_actions_is_undone_and_redone_bit_for_bit(seed):
     rng = np.random.default_rng(seed)
     session = ready()
@@ -728,11 +730,18 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("wrong", "error", "says"), WRONG)
-def test_what_cannot_be_done_says_why_and_changes_nothing(wrong, error, says):
+@functools.cache
+def posed() -> Session:
+    """Return a session with a pose, to be copied."""
     session = ready()
     session.move_handle("tip", up(0.1), max_steps=2)
     session.commit()
+    return session
+
+
+@pytest.mark.parametrize(("wrong", "error", "says"), WRONG)
+def test_what_cannot_be_done_says_why_and_changes_nothing(wrong, error, says):
+    session = copy.copy(posed())
     before, options = snapshot(session), session.options
     with pytest.raises(error, match=says):
         wrong(session)

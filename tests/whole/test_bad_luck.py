@@ -25,6 +25,7 @@ from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
 
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
 posix = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and limits")
@@ -45,8 +46,8 @@ def killed(folder, count, seed):
 
 @posix
 def test_a_save_that_is_killed_leaves_the_old_file_or_the_new(tmp_path):
-    found = killed(tmp_path, 20, seed=1)
-    assert found["old"] + found["new"] == 20
+    found = killed(tmp_path, 12, seed=1)
+    assert found["old"] + found["new"] == 12
     assert found["killed while writing"] > 0  # otherwise nothing was tested
 
 

@@ -17,6 +17,7 @@ from zoo_operations import bent, require_right
 
 import vtk_segdeform as sd
 
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 STEP = 1e-6
 LONG = pytest.mark.campaign
 

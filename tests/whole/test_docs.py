@@ -23,6 +23,7 @@ from vtk_segdeform.io.convert import is_mesh_file
 from vtk_segdeform.pictures.canvas import require_offscreen
 from vtk_segdeform.widgets.editor.bindings import DEFAULT_KEYS
 
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 GENERATED = ("build", "figures", "gallery")  # by `make docs`

@@ -22,12 +22,14 @@ import numpy as np
 import public_calls
 import pytest
 from bad_values import BAD
+from campaign import every
 from public_calls import CORE, SAID_AS, WIDGETS, Call, calls, valid
 
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import Locality, Pose, State
 
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 SECONDS = 30.0  # limit for one call
 GIGABYTES = 4  # in addition to the memory in use
 SETTERS = {"DeformEditor.path"}  # of paths
@@ -146,9 +148,7 @@ def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     _check_errors(cheap, 1, 2, bounded)
 
 
-@pytest.mark.parametrize(
-    ("step", "most"), [(3, 8), pytest.param(1, 21, marks=pytest.mark.campaign)]
-)
+@pytest.mark.parametrize(("step", "most"), every(2, [(5, 6), (1, 21)]))
 @pytest.mark.parametrize("cls", [State, Pose, Locality], ids=lambda cls: cls.__name__)
 def test_a_session_rejects_a_state_with_bad_parts(cls, step, most, bounded):
     """Each field of a state, or of its pose, in turn holds each *step*-th bad value."""
@@ -185,19 +185,21 @@ def _paths() -> list[tuple[Call, str]]:
     return pairs
 
 
-def test_a_file_name_that_is_too_long_raises_one_of_our_errors(bounded):
+@pytest.mark.parametrize("every_path", every(2, [False, True]))
+def test_a_file_name_that_is_too_long_raises_one_of_our_errors(every_path, bounded):
     cheap = [pair for pair in _paths() if not public_calls.expensive(pair[0])]
-    for call, name in cheap:
+    for number, (call, name) in enumerate(cheap):
         suffix = Path(valid(call.name, name)).suffix if name == "path" else ""
         longest = "x" * (255 - len(suffix)) + suffix
-        for path in (longest, "x" * 300 + suffix, "x" * 300 + "/a" + suffix):
+        paths = (longest, "x" * 300 + suffix, "x" * 300 + "/a" + suffix)
+        for path in paths if every_path else [paths[number % 3]]:
             function = call.bound()
             try:
                 answer = function(**call.arguments() | {name: path})
             except SegDeformError:
                 continue
             public_calls.remove(answer)
-    public_calls.tidy()
+        public_calls.tidy()
 
 
 def test_a_file_descriptor_is_not_a_path_and_stays_open(bounded):

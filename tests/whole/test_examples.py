@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import runpy
 from pathlib import Path
 
 import pytest
 
+import vtk_segdeform
 from vtk_segdeform import models
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.pictures.canvas import require_offscreen
 
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RIGHT = {
     "a_pull": lambda names: (
@@ -72,9 +75,13 @@ def test_every_example_has_a_number_to_hold():
 def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_path):
     folder = tmp_path / "some" / "where"  # which it makes
     monkeypatch.setattr("sys.argv", [name, str(folder)] if name in LEAVES else [name])
-    if not whole:  # of the size that its pages show
+    if not whole:  # the models and the cages are smaller than those that its pages show
         for model in (models.cactus, models.dinosaur):
             monkeypatch.setattr(models, model.__name__, smaller(model))
+        for call in (vtk_segdeform.deform, vtk_segdeform.pull):
+            monkeypatch.setattr(
+                vtk_segdeform, call.__name__, functools.partial(call, n_cage_vertices=60)
+            )
     if name in DRAW:
         try:
             require_offscreen()

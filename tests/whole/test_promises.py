@@ -13,9 +13,11 @@ import pytest
 from campaign import every
 from numpy.testing import assert_allclose
 from real_meshes import botsch_sorkine, path_of
+from scipy.spatial import cKDTree
 from solids import rotation, torus, two_components
 
 import vtk_segdeform as sd
+from vtk_segdeform.cages.simplify import simplify
 from vtk_segdeform.geometry.distortion import distortion
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
@@ -36,7 +38,7 @@ def mesh_of(name):
     if name == "cactus":
         return sd.models.cactus()
     if name == "small cactus":
-        return sd.models.cactus(1000)
+        return sd.models.cactus(600)
     if name == "dinosaur":
         return sd.models.dinosaur()
     if name == "torus":
@@ -138,20 +140,38 @@ def test_volume_is_exact_on_every_mesh_at_every_angle_and_throughout_a_drag(name
     check_volume_and_coordinates(name, n_regions, angles=[30, 70, 120, 180], moves=100)
 
 
+def coarser(vertices, faces, selection, n):
+    """Return a mesh with *n* vertices, each with the role of the nearest vertex given."""
+    points, faces = simplify(vertices, faces, n)
+    return points, faces, selection[cKDTree(vertices).query(points)[1]]
+
+
 @pytest.mark.parametrize(
-    ("name", "most", "finished_most"),
-    [("cactus", 0.10, 0.06), pytest.param("cylinder", 0.20, 0.10, marks=pytest.mark.campaign)],
+    ("name", "n", "most", "finished_most", "left"),
+    # With few vertices, finishing reduces the distortion less, and ARAP loses less volume.
+    every(
+        3,
+        [
+            ("cactus", 800, 0.10, 0.09, 0.96),
+            ("cactus", None, 0.10, 0.06, 0.95),
+            ("cylinder", None, 0.20, 0.10, 0.95),
+        ],
+    ),
 )
-def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(name, most, finished_most):
+def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(
+    name, n, most, finished_most, left
+):
     igl = pytest.importorskip("igl")
     vertices, faces, selection, matrix = botsch_sorkine(name)
+    if n is not None:
+        vertices, faces, selection = coarser(vertices, faces, selection, n)
     mesh = sd.Mesh(vertices, faces)
     fixed, handle = np.flatnonzero(selection == 0), np.flatnonzero(selection == 2)
     targets = vertices[handle] @ matrix[:3, :3].T + matrix[:3, 3]
 
     begin = time.perf_counter()
     regions = sd.segment(mesh, 3)
-    cages = sd.fit_cages(mesh, regions, 200)
+    cages = sd.fit_cages(mesh, regions, 200 if n is None else 120)
     deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle)
     ours = deformer.solve(targets)
     seconds = time.perf_counter() - begin
@@ -191,7 +211,7 @@ def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(name, most
         f"distortion {distortion(mesh, pose):.4f}"
     )
     assert abs(change) <= 1e-12
-    assert lost < 0.95
+    assert lost < left
     assert max(ours.handle_error, ours.fixed_error) <= 1e-3
     assert ours_distortion <= most
     assert finished_distortion <= finished_most

@@ -22,7 +22,8 @@ import vtk_segdeform as sd
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.session.state import State
 
-FEW, MANY = 3, int(os.environ.get("SEGDEFORM_EXAMPLES", "1000"))
+pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
+FEW, MANY = 2, int(os.environ.get("SEGDEFORM_EXAMPLES", "1000"))
 NUMBERS = st.floats(-1.0, 1.0, allow_nan=False, width=32)
 SEEDS = st.integers(0, 2**32 - 1)
 PROPERTIES = []

@@ -13,7 +13,7 @@ from monkey import Monkey
 @pytest.mark.parametrize(
     ("seed", "count"),
     [
-        (5, 40),
+        (5, 30),
         pytest.param(5, 60, marks=pytest.mark.campaign),
         pytest.param(1, 150, marks=pytest.mark.campaign),
         pytest.param(9, 300, marks=pytest.mark.campaign),
