@@ -261,10 +261,11 @@ def test_frames_in_the_browser_are_compared_with_those_in_process(monkeypatch):
 
 
 @pytest.mark.parametrize("drawn", ["in process", pytest.param("page", marks=pytest.mark.campaign)])
-def test_a_drag_is_followed(monkeypatch, drawn):
+def test_a_drag_is_followed(monkeypatch, task, drawn):
     pytest.importorskip("trame")
+    monkeypatch.setattr(browser, "bent_cactus", {500: task}.get)
     monkeypatch.setattr(browser, "_WARM_UP", 6 if drawn == "page" else 2)
-    monkeypatch.setattr(browser, "_MOVES", 120 if drawn == "page" else 12)
+    monkeypatch.setattr(browser, "_MOVES", 120 if drawn == "page" else 6)
     if drawn == "in process":
         drag = browser.in_process(500, TINY, (300, 200))
     else:

@@ -162,12 +162,12 @@ def test_volume(ready, preserved):
     overlay.remove()
 
 
+@pytest.mark.usefixtures("unprepared")  # else the line shows how far it is
 def test_notices():
     view = plain_view(SIZE)
     view.camera.SetPosition(0.0, -20.0, 4.0)
     view.camera.SetViewUp(0.0, 0.0, 1.0)
     session = Session(Surface(bottle(5)))
-    session.accept(session.preparation())  # else the line shows how far it is
     editor = DeformEditor(view, session)
     view.renderer.ResetCamera()
     editor.On()

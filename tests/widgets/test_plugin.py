@@ -90,7 +90,9 @@ def test_any_surface_is_deformed_by_its_own_points(name):
     height = given.points[:, 2]
     fixed, handle = height < 0.3, np.flatnonzero(height > 2.7)[::-1]
     targets = given.points[handle] + np.array([0.2, 0.0, 0.0])
-    bent = given.segdeform.deform(fixed, handle, targets, n_regions=1, n_cage_vertices=40)
+    bent = given.segdeform.deform(
+        fixed, handle, targets, n_regions=1, n_cage_vertices=40, refine=False
+    )
     require_only_moved(given, bent)
     assert np.abs(bent.points[handle] - targets).max() < 5e-3
     assert np.abs(bent.points[fixed] - given.points[fixed]).max() < 5e-3
@@ -127,7 +129,7 @@ def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
     handle = height > 0.9
     with caplog.at_level(logging.WARNING, logger="vtk_segdeform.widgets.plugin"):
         bar.segdeform.deform(
-            height < 0.1, handle, bar.points[handle] + [0, 0, 15.0], n_regions=1,
+            height < 0.1, handle, bar.points[handle] + [0, 0, 8.0], n_regions=1,
             n_cage_vertices=12, refine=False,
         )  # fmt: skip
     assert "handle error" in caplog.text
@@ -185,6 +187,7 @@ def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, b
     editor.session.segment(2)  # no longer shown
 
 
+@pytest.mark.campaign  # as in the window of `edit`, below
 def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
     editor = plotter.segdeform.edit(session)
     plotter.show(auto_close=False, interactive=False)
@@ -252,7 +255,7 @@ def pull(hand: Hand, editor) -> None:
     hand.drag([(x, y), (x + 6, y + 9), (x + 12, y + 21)])
 
 
-@pytest.mark.parametrize("kind", [sd.Mesh, pv.PolyData, sd.Session])
+@pytest.mark.parametrize("kind", every(2, [pv.PolyData, sd.Session, sd.Mesh]))
 def test_off_screen_the_window_closes_at_once_and_nothing_is_changed(kind, bar):
     mesh = convert.from_polydata(bar)
     given = {sd.Mesh: mesh, pv.PolyData: bar, sd.Session: sd.Session(mesh)}[kind]
@@ -279,6 +282,7 @@ def test_the_window_returns_the_edited_session(session, monkeypatch):
     assert failures == []
     assert session.undo_label == "drag handle 1"
     assert np.abs(session.vertices - session.mesh.vertices).max() > 0.1
+    assert abs(session.volume_change) < 1e-12
     assert_array_equal(session.deformed.points, session.vertices)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
 from campaign import every
@@ -31,16 +29,11 @@ STYLES = {
 }
 
 
-@functools.cache
-def _cactus():
-    return models.cactus(500)
-
-
 class Bench:
-    """An editor over a cactus in plain VTK, and a hand."""
+    """An editor over a slender bar in plain VTK, and a hand."""
 
     def __init__(self, scale=1.0, shift=0.0):
-        mesh = _cactus()
+        mesh = models.bar(divisions=(2, 2, 8))
         self.mesh = Mesh(mesh.vertices * scale + shift, mesh.faces)
         self.view = plain_view()
         self.editor = DeformEditor(self.view, self.mesh)
@@ -74,11 +67,27 @@ class Bench:
         return np.abs(after - before).max(axis=1) / self.mesh.diagonal
 
 
-@pytest.fixture(params=every(2, [((1e-7, 0.0),), ((1.0, 0.0),), ((1.0, 1e6),), ((1e6, 0.0),)]))
-def bench(request):
+@pytest.fixture(
+    scope="module",
+    params=every(2, [((1e-7, 0.0),), ((1.0, 0.0),), ((1.0, 1e6),), ((1e6, 0.0),)]),
+)
+def shared(request):
+    """Yield a bench over a mesh of some size at some place, with its style and its mode."""
     bench = Bench(*request.param)
-    yield bench
+    yield bench, bench.view.interactor.GetInteractorStyle(), bench.editor.mode
     bench.editor.remove()
+
+
+@pytest.fixture
+def bench(shared):
+    """Yield the shared bench with the style, mode, projection and view that it had at first."""
+    bench, style, mode = shared
+    bench.view.interactor.SetInteractorStyle(style)
+    bench.view.camera.SetParallelProjection(False)
+    bench.editor.mode = mode
+    bench.editor.controller.camera.viewpoint.home()
+    View.render(bench.view)
+    return bench
 
 
 def test_every_drag_moves_the_camera_in_every_mode_and_style(bench):

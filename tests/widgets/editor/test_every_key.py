@@ -21,19 +21,26 @@ def stand_of(make, folder):
 
 
 PAINTING_FIRST = (Mode.REGIONS, Mode.HANDLES, Mode.CAGES, Mode.PULL, Mode.DEFORM)
+pytestmark = pytest.mark.usefixtures("bound_once")
+
 # Keys that all modes have are typed while painting, where a drag needs no solver.  These are typed
-# while pulling as well, and others in the other hosts.
-WHILE_PULLING = {"g", "ctrl+z", "shift+f"}
+# while pulling as well, Shift+F while a pose converges, and others in the other hosts.
+WHILE_PULLING = {"g", "ctrl+z"}
+# Keys whose action differs from that of another key only in its argument.
+ALIKE = {"1", "3", "l", "t", "r"}
 
 
 def mid_drags():
     """Return every mode with every key."""
-    return [
-        pytest.param(*each.values, id=each.id)
-        if each.values[0] is Mode.PULL and each.values[1] in WHILE_PULLING
-        else each
-        for each in table(*PAINTING_FIRST)
-    ]
+    parameters = []
+    for each in table(*PAINTING_FIRST):
+        (mode, key), marks = each.values, each.marks
+        if mode is Mode.PULL and key in WHILE_PULLING:
+            marks = []
+        elif mode is Mode.REGIONS and key in ALIKE:
+            marks = [pytest.mark.campaign]
+        parameters.append(pytest.param(mode, key, id=each.id, marks=marks))
+    return parameters
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +77,11 @@ KEYS_OF_PYVISTA = {"c", "f", "p", "r", "s", "w", "escape"}
 
 
 @pytest.mark.parametrize(
-    ("mode", "key"), table(Mode.REGIONS, Mode.PULL, Mode.DEFORM, daily=KEYS_OF_PYVISTA)
+    ("mode", "key"),
+    [
+        *table(Mode.REGIONS, Mode.PULL, daily=KEYS_OF_PYVISTA),
+        *table(Mode.DEFORM, daily=()),
+    ],
 )
 def test_in_mid_drag_in_a_plotter(plotter, mode, key):
     plotter.during(mode, key)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hands import plain_view
-from test_editor import Bench, bench, ready  # noqa: F401 - two of them are fixtures
+from soaking import session_of, slender
+from test_editor import Bench, bench  # noqa: F401 - one of them is a fixture
 from test_editor import pull_handle as pull_handle_in
 
 from vtk_segdeform import load_session, read_mesh
@@ -21,6 +24,13 @@ from vtk_segdeform.widgets.scene import glide
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
 
 pull_handle = functools.partial(pull_handle_in, moves=2)
+
+
+@pytest.fixture(scope="module")
+def ready():
+    """Return the state of a session of few vertices, complete except for a pose."""
+    session = session_of(slender())
+    return session.mesh, session.state
 
 
 @pytest.fixture(autouse=True)
@@ -165,6 +175,8 @@ def glided(bench):  # noqa: F811
 
 def test_the_surface_glides_to_the_finished_pose(bench, monkeypatch):  # noqa: F811
     monkeypatch.setattr(glide, "SECONDS", 1.0)
+    clock = itertools.count()  # 40 ms from picture to picture
+    monkeypatch.setattr(glide, "time", SimpleNamespace(monotonic=lambda: 0.04 * next(clock)))
     bench.type("4")
     before = glided(bench)
     points, after = bench.editor.widgets.surface.points, bench.session.vertices

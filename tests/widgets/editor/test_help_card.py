@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from campaign import every
 from hands import picture, plain_view
 
 from vtk_segdeform.widgets.editor.help_card import HelpCard
@@ -14,8 +15,16 @@ SECTIONS = [
 ]
 
 
-@pytest.mark.parametrize("size", [(300, 220), (800, 600), (600, 1000)])
-@pytest.mark.parametrize("background", [0.0, 1.0])
+@pytest.mark.parametrize(
+    ("size", "background"),
+    every(
+        2,
+        [
+            ((300, 220), 0.0), ((300, 220), 1.0), ((800, 600), 1.0), ((800, 600), 0.0),
+            ((600, 1000), 0.0), ((600, 1000), 1.0),
+        ],
+    ),
+)  # fmt: skip
 def test_the_card_fits_into_the_window_and_is_legible_on_any_background(size, background):
     view = plain_view(size)
     view.renderer.SetBackground(background, background, background)

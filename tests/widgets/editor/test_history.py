@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, plain_view
+from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 
 from vtk_segdeform.session.session import Session
@@ -26,6 +26,7 @@ def editor():
     session.set_cages(scene.cages)
     session = Session(scene.mesh, state=session.state)
     session.add_handle(scene.handle, "tip")
+    draw_seldom(view)
     editor = DeformEditor(view, session)
     editor.mode = Mode.REGIONS
     editor.On()

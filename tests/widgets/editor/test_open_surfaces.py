@@ -34,7 +34,7 @@ class Scene:
         self.session = session = Session(Surface(given))
         mesh = session.mesh
         session.set_regions(Regions.single(mesh))
-        ball, faces = icosphere(2)
+        ball, faces = icosphere(1)
         middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
         session.set_cages([Cage(ball * 0.8 * mesh.diagonal + middle, faces)])
         self.view = plain_view((300, 300))
@@ -101,7 +101,7 @@ def open_editor():
 
 
 SURFACES = {
-    "bottle": lambda: bottle(4),
+    "bottle": lambda: bottle(4, 3),
     "sheet": lambda: sheet(32),
     "one-sided": moebius,
     "finned": finned,
@@ -148,7 +148,7 @@ def test_a_connected_part_ends_at_its_border(open_editor):
 def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, name):
     scene = open_editor(SURFACES[name]())
     session, x = scene.session, scene.session.mesh.vertices
-    session.change_options(n_cage_vertices=60)
+    session.change_options(n_cage_vertices=40)
     session.fit_cages()
     along = int(np.ptp(x, axis=0).argmax())
     low, high = np.quantile(x[:, along], [0.1, 0.9])
@@ -188,8 +188,8 @@ def test_nothing_is_black_from_either_side(open_editor, name):
 def test_the_seam_of_a_surface_with_one_side_does_not_show(open_editor):
     """Where faces differ in orientation depends on which are flipped; the picture does not."""
     seen = []
-    for flipped in (0, 700):
-        given = moebius()
+    for flipped in (0, 400):
+        given = moebius(100, 6)
         faces = np.array(given.regular_faces)
         faces[:flipped] = faces[:flipped, ::-1]
         scene = open_editor(polydata(given.points, faces))

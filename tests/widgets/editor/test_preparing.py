@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from hands import Hand, plain_view
+from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 
 from vtk_segdeform import Regions, Session
@@ -56,7 +56,7 @@ class Bench:
 
     def __init__(self, mesh, gate, monkeypatch):
         monkeypatch.setattr(Session, "preparation", lambda _, progress: gate.prepare(progress))
-        self.view, self.gate = plain_view((500, 400)), gate
+        self.view, self.gate = plain_view((250, 200)), gate
         self.editor = DeformEditor(self.view, mesh)
         camera = self.view.camera
         camera.SetPosition(0.0, -5.0, 0.5)
@@ -64,6 +64,7 @@ class Bench:
         camera.SetViewUp(0.0, 0.0, 1.0)
         self.view.renderer.ResetCamera()
         self.view.render()
+        draw_seldom(self.view)
         self.hand = Hand(self.view)
         self.editor.mode = Mode.PULL
         self.editor.On()

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hands import picture, plain_view
 from PIL import Image
-from test_editor import Bench, bench, pull_handle, ready  # noqa: F401 - two of them are fixtures
+from test_editor import Bench, pull_handle, ready  # noqa: F401 - one of them is a fixture
 
-from vtk_segdeform import load_session, read_mesh
+from vtk_segdeform import Session, load_session, read_mesh
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.widgets.editor.editor import Mode
 from vtk_segdeform.widgets.recording.recording import replay
@@ -19,8 +19,18 @@ from vtk_segdeform.widgets.region_selector.region_selector import Tool
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
 
 
+@pytest.fixture
+def bench(ready):  # noqa: F811
+    """Yield an editor over a session that is ready, in a view with few pixels to film."""
+    mesh, state = ready
+    made = Bench(plain_view((200, 160)), Session(mesh, state=state))
+    yield made
+    assert made.hand.failures == []
+    made.editor.remove()
+
+
 @pytest.mark.campaign
-def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # noqa: F811
+def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type("3", "t", "v", "4")
     pull_handle(bench, (10, 15))
@@ -50,7 +60,7 @@ def test_the_input_is_recorded_and_replayed_from_two_files(bench, tmp_path):  # 
     ]  # fmt: skip
 
 
-def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):  # noqa: F811
+def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):
     bench.editor.path = tmp_path / "work.segdeform"
     del bench.editor.view.render  # draw at every event again
     bench.type("ctrl+m")
@@ -60,7 +70,7 @@ def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):  # noqa
     bench.type("ctrl+m")
     assert "No video saved" in bench.editor.status
     bench.type("4", "ctrl+m")
-    pull_handle(bench, moves=4)
+    pull_handle(bench, (10, 15), moves=4)
     bench.type("ctrl+m")
     assert "saved to" in bench.editor.status
     with Image.open(tmp_path / "work.film.gif") as film:
@@ -69,7 +79,7 @@ def test_the_video_contains_the_drags_and_nothing_else(bench, tmp_path):  # noqa
 
 
 @pytest.mark.parametrize("key", ["ctrl+r", "ctrl+m"])
-def test_an_unwritable_folder_is_reported_immediately(bench, tmp_path, key):  # noqa: F811
+def test_an_unwritable_folder_is_reported_immediately(bench, tmp_path, key):
     bench.editor.path = tmp_path / "no" / "work.segdeform"
     bench.type(key)
     assert "no" in bench.editor.status
@@ -79,7 +89,7 @@ def test_an_unwritable_folder_is_reported_immediately(bench, tmp_path, key):  # 
     assert "recording" not in bench.editor.status
 
 
-def test_the_status_line_shows_an_ongoing_recording(bench, tmp_path):  # noqa: F811
+def test_the_status_line_shows_an_ongoing_recording(bench, tmp_path):
     bench.editor.path = tmp_path / "work.segdeform"
     seen = []
     for key in ("ctrl+r", "ctrl+m", "ctrl+r", "ctrl+m"):
@@ -91,7 +101,7 @@ def test_the_status_line_shows_an_ongoing_recording(bench, tmp_path):  # noqa: F
     assert not np.array_equal(seen[0], seen[2])
 
 
-def test_a_second_recording_does_not_overwrite_the_first(bench, tmp_path):  # noqa: F811
+def test_a_second_recording_does_not_overwrite_the_first(bench, tmp_path):
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type(*["ctrl+r"] * 4)
     assert (tmp_path / "work.recording.txt").exists()
@@ -100,10 +110,10 @@ def test_a_second_recording_does_not_overwrite_the_first(bench, tmp_path):  # no
     assert "control key=r" not in lines
 
 
-def test_two_files_are_replayed_from_the_command_line(bench, tmp_path, capsys):  # noqa: F811
+def test_two_files_are_replayed_from_the_command_line(bench, tmp_path, capsys):
     bench.editor.path = tmp_path / "work.segdeform"
     bench.type("4", "ctrl+r")
-    pull_handle(bench)
+    pull_handle(bench, (10, 15), moves=4)
     bench.hand.tick(2)
     bench.type("ctrl+r")
     film, mesh = tmp_path / "bug.gif", tmp_path / "out.ply"

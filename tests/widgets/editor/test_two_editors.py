@@ -13,13 +13,13 @@ from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 
-LEFT, RIGHT = (200, 200), (600, 200)
+LEFT, RIGHT = (120, 120), (360, 120)
 
 
 @pytest.fixture
 def halves():
     """Return two editors, in the left and right half of a window, and a hand in it."""
-    left = plain_view((800, 400))
+    left = plain_view((480, 240))
     left.renderer.SetViewport(0.0, 0.0, 0.5, 1.0)
     renderer = vtkRenderer()
     renderer.SetViewport(0.5, 0.0, 1.0, 1.0)
@@ -38,7 +38,7 @@ def halves():
         editor.remove()
 
 
-def test_keys_go_to_the_one_under_the_pointer(halves):
+def test_keys_go_to_the_one_under_the_pointer_and_to_its_widgets(halves):
     (left, right), hand = halves
     hand.move(RIGHT)
     hand.key("3")
@@ -46,10 +46,7 @@ def test_keys_go_to_the_one_under_the_pointer(halves):
     hand.move(LEFT)
     hand.key("2")
     assert (left.mode, right.mode) == (Mode.CAGES, Mode.HANDLES)
-
-
-def test_keys_of_widgets_too(halves):
-    (left, right), hand = halves
+    hand.key("1")
     before = left.widgets.selector.radius, right.widgets.selector.radius
     hand.move(RIGHT)
     hand.key("bracketright")
@@ -57,22 +54,17 @@ def test_keys_of_widgets_too(halves):
     assert right.widgets.selector.radius > before[1]
 
 
-def test_removing_one_editor_leaves_the_display_of_the_other(halves, capfd):
+def test_a_removed_editor_leaves_the_display_of_the_other_and_cannot_be_switched_on(halves, capfd):
     (left, right), _ = halves
-    before = picture(right.view)[:, 400:]
+    before = picture(right.view)[:, 240:]
     left.remove()
-    assert np.array_equal(picture(right.view)[:, 400:], before)
+    assert np.array_equal(picture(right.view)[:, 240:], before)
     assert (before[-20:] < 128).mean() > 0.5  # the status line is shown
+    with pytest.raises(RuntimeError, match="create another one"):
+        left.On()
     assert capfd.readouterr().err == ""
     right.remove()
     assert right.view.window.GetNumberOfLayers() == 1
-
-
-def test_a_removed_editor_cannot_be_switched_on(halves):
-    (left, _), _ = halves
-    left.remove()
-    with pytest.raises(RuntimeError, match="create another one"):
-        left.On()
 
 
 def test_a_single_editor_receives_keys_wherever_the_pointer_is(halves):

@@ -108,8 +108,9 @@ def test_the_mesh_does_not_hide_it(view):
     assert np.array_equal(picture(view), before)
 
 
-@pytest.mark.parametrize("axes", [np.eye(3), TURNED], ids=["world", "turned"])
-@pytest.mark.parametrize("place", every(2, [(look,) for look in LOOKS]))
+@pytest.mark.parametrize(
+    ("place", "axes"), every(3, [(look, axes) for look in LOOKS for axes in (np.eye(3), TURNED)])
+)
 def test_parts_are_hit_where_they_are_drawn(view, place, axes):
     view.camera.SetParallelProjection(place == LOOKS[1])
     look_from(view, place)

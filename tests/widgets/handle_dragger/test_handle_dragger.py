@@ -245,7 +245,7 @@ def test_when_the_pointer_returns_so_do_the_targets(bench):
     for part in (FREE, Part(Kind.AXIS, 0), VIEW_RING):
         place = bench.aim(part)
         bench.hand.press(place)
-        for step in (10.0, 25.0, 0.0):
+        for step in (25.0, 0.0):
             bench.hand.move(place + [step, -0.5 * step])
         assert np.abs(bench.targets() - before).max() < 1e-13
         bench.hand.release(place)
@@ -307,7 +307,7 @@ def test_every_motion_is_rigid_and_bounded(parallel, tilt):
     centre, axes = np.array([0.4, 0.3, 0.2]), rotation([1.0, 2.0, 3.0], 0.5).T
     grip = Grip(centre + 0.1, centre, axes, 0.7, 0.05)
     corners = [(x, y) for x in (0, 150, 399) for y in (0, 210, 399)]
-    for axis, side in itertools.product(range(3), (-1.0, 1.0)):
+    for axis, side in itertools.product(range(3), (-1.0, 1.0) if tilt else (1.0,)):
         look = axes[axis] + side * tilt * axes[axis - 1]
         view.camera.SetFocalPoint(*centre)
         view.camera.SetPosition(*(centre + 11.0 * look / np.linalg.norm(look)))
@@ -935,7 +935,7 @@ def test_a_jerk_shows_only_poses_that_can_be_trusted_and_ends_as_without_hurry(b
     assert window.GetMultiSamples() == 4
     assert session.solution.status is Status.CONVERGED
     calm = Session(SCENE.mesh, state=replace(session.state, pose=None))
-    for share in np.linspace(0.0, 1.0, 9)[1:]:
+    for share in np.linspace(0.0, 1.0, 5)[1:]:
         calm.drag({TIP: start + share * (bench.targets() - start)})
     for vertices in (converged(session), calm.vertices):
         assert np.abs(vertices - session.vertices).max() < 1e-4 * SCENE.mesh.diagonal

@@ -113,13 +113,6 @@ def everything(editor: DeformEditor) -> tuple:
     return all_sections(editor), toolbar(editor), status(editor), history(editor)
 
 
-def pressable(mode: Mode) -> list[str]:
-    """Return the names of all visible fields in *mode* that do something."""
-    with editing(mode) as editor:
-        found = [field for section in sections(editor) for field in section.fields]
-        return [field.name for field in found if field.visible and field.kind != "label"]
-
-
 # In mode HANDLES as in mode REGIONS; and in mode DEFORM as in mode HANDLES.
 TOOLS = ("brush", "lasso", "rectangle", "connected_part", "whole_region", "radius", "through")
 SAME = {
@@ -128,38 +121,55 @@ SAME = {
 }
 
 
+def presses(editor: DeformEditor, name: str) -> None:
+    """Press *name*, with another value if it has one, and check that this is what it says."""
+    if name == "regions.merge":
+        press(editor, "regions.list.select", ["0", "1"])
+    if name == "paint.brush":
+        press(editor, "paint.lasso")
+    if name == "deform.range" and not of(editor, "deform.overlay").value:
+        press(editor, "deform.overlay")
+        editor.wait()
+    field, before = of(editor, name), everything(editor)
+    if name == "deform.lids":  # the mesh is closed
+        assert not field.enabled
+        return
+    assert field.enabled, name
+    value = another(field) if field.kind in VALUES else None
+    assert press(editor, name, value) is None
+    editor.wait()
+    assert everything(editor) != before, name
+    now = of(editor, name).value
+    if value is None:
+        assert field.value is None or now is True
+        return
+    near = 0.3 if name == "cages.detail" else 1e-12  # that is met only nearly
+    assert now == pytest.approx(value, rel=near)
+    assert now != field.value
+    if field.special:
+        press(editor, name, field.minimum)
+        assert of(editor, name).value is None
+        editor.wait()
+    else:
+        press(editor, name, field.value)
+        editor.wait()
+        assert of(editor, name).value == pytest.approx(field.value, rel=near)
+
+
 @pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
 def test_every_control_does_what_it_says_and_then_says_so(mode):
-    names = set(pressable(mode))
-    assert names >= SAME.get(mode, set())
-    for name in sorted(names - SAME.get(mode, set())):
-        with editing(mode) as editor:
-            if name == "regions.merge":
-                press(editor, "regions.list.select", ["0", "1"])
-            if name == "paint.brush":
-                press(editor, "paint.lasso")
-            if name == "deform.range":
-                press(editor, "deform.overlay")
-                editor.wait()
-            field, before = of(editor, name), everything(editor)
-            if name == "deform.lids":  # the mesh is closed
-                assert not field.enabled
-                continue
-            assert field.enabled, name
-            value = another(field) if field.kind in VALUES else None
-            assert press(editor, name, value) is None
-            editor.wait()
-            assert everything(editor) != before, name
-            now = of(editor, name).value
-            if value is None:
-                assert field.value is None or now is True
-                continue
-            near = 0.3 if name == "cages.detail" else 1e-12  # that is met only nearly
-            assert now == pytest.approx(value, rel=near)
-            assert now != field.value
-            if field.special:
-                press(editor, name, field.minimum)
-                assert of(editor, name).value is None
+    with editing(mode) as editor:
+        shown = [field for section in sections(editor) for field in section.fields]
+        kinds = {f.name: f.kind for f in shown if f.visible and f.kind != "label"}
+        assert {*kinds} >= SAME.get(mode, set())
+        names = sorted({*kinds} - SAME.get(mode, set()))
+        for name in names:  # each has its old value again, so that it disables no other one
+            if kinds[name] in VALUES:
+                presses(editor, name)
+    for name in names:
+        if kinds[name] not in VALUES:
+            with editing(mode) as editor:
+                presses(editor, name)
 
 
 def test_controls_that_are_disabled_or_not_shown_do_nothing():
@@ -358,7 +368,7 @@ def test_wrong_names_and_values_are_refused_by_name():
             for field in fields:
                 with pytest.raises(ArgumentError, match=field.name):
                     checked(field, make())
-            for name in (*verbs, "history", "history.preview")[k % 3 :: 3]:
+            for name in (*verbs, "history", "history.preview")[k % 6 :: 6]:
                 with pytest.raises(ArgumentError, match=name):
                     press(editor, name, make())
         assert editor.session.state is state

@@ -25,7 +25,7 @@ RNG = np.random.default_rng(3)
 
 @functools.cache
 def cactus():
-    return models.cactus(800)
+    return models.cactus(500)
 
 
 def over(mesh, size=(400, 400), *, parallel=False):
@@ -289,7 +289,7 @@ def test_a_lasso_selects_by_the_even_odd_rule():
         so_far = lasso.outline.tolist()
         odd = [crossings_above(p, so_far) % 2 == 1 for p in picker.display_points()]
         assert lasso.mask.tolist() == (odd if len(so_far) > 2 else [False] * len(odd))
-    assert 20 < lasso.mask.sum() < 780
+    assert 20 < lasso.mask.sum() < 480
 
 
 def test_visible_vertices_are_cached_until_the_camera_or_the_pose_changes():

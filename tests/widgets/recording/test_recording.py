@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import pyvista as pv
-from hands import Hand, picture, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
 from soaking import slender
 
@@ -81,6 +81,7 @@ class Desk:
         view.every(50, self.puller.tick)
         view.renderer.ResetCamera()
         view.render()
+        draw_seldom(view)
         self.hand = Hand(view)
 
     def work(self) -> None:
@@ -287,6 +288,7 @@ class Pulling:
         self.view.camera.SetViewUp(0.0, 0.0, 1.0)
         self.view.renderer.ResetCamera()
         self.view.render()
+        draw_seldom(self.view)
         self.puller.On()
 
     def work(self, hand: Hand) -> None:

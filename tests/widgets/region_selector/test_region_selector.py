@@ -395,7 +395,7 @@ def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk)
 
 
 def test_painting_a_handle_keeps_the_pose_and_painting_a_region_resets_it():
-    scene = sausage()
+    scene = sausage(is_coarse=True)
     view = plain_view()
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
@@ -436,7 +436,7 @@ def test_region_under_pointer_is_that_of_the_vertex_there(desk):
 
 def test_random_strokes_can_all_be_undone(desk):
     dice = np.random.default_rng(5)
-    for _ in range(30):
+    for _ in range(20):
         desk.selector.tool = list(Tool)[dice.integers(4)]
         desk.selector.paints = list(Paint)[dice.integers(3)]
         desk.selector.region = int(dice.integers(3))

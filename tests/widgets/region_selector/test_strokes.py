@@ -28,7 +28,7 @@ def test_one_fast_move_of_the_brush_reaches_all_that_a_slow_one_does(radius):
     (x0, y0, _), (x1, y1, _) = view.to_display(np.array([[-0.5, -0.86, 0.05], [0.5, -0.86, 0.05]]))
     brush = Brush(picker, Pointer(Phase.PRESS, x0, y0), radius=radius, through=False)
     brush.extend(Pointer(Phase.MOVE, x1, y1))
-    steps = np.linspace(0.0, 1.0, 100)
+    steps = np.linspace(0.0, 1.0, 60)
     path = [picker.hit(Pointer(Phase.MOVE, x0 + t * (x1 - x0), y0 + t * (y1 - y0))) for t in steps]
     points = np.array([hit.point for hit in path])
     away = np.linalg.norm(session.mesh.vertices[:, None] - points, axis=2).min(axis=1)

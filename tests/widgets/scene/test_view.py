@@ -317,7 +317,7 @@ def test_a_widget_that_is_off_receives_no_events(scribble):
 
 def test_the_surface_follows_the_pose_in_place():
     view = plain_view()
-    scene = sausage()
+    scene = sausage(is_coarse=True)
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
-from hands import Hand, picture, plain_view
+from campaign import every
+from hands import Hand, draw_seldom, picture, plain_view
 from open_meshes import open_box, sheet
 from scenes import sausage
 from solids import rotation
@@ -21,6 +22,7 @@ from vtk_segdeform.pictures.palette import of_region
 from vtk_segdeform.solver.volume_constraints import region_volumes
 from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
+from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.diverging import (
     HALF_RANGES,
     NEUTRAL,
@@ -58,6 +60,7 @@ def overlay(request):
     view.camera.SetViewUp(0.0, 0.0, 1.0)
     view.renderer.ResetCamera()
     view.render()
+    draw_seldom(view)
     overlay = VolumeOverlay(view, session, surface)
     overlay.wanted_range = None
     overlay.surface = surface
@@ -239,14 +242,14 @@ def test_a_bend_that_loses_volume_is_blue_inside(overlay):
 # The lines of text.
 
 
-@several(3, is_coarse=False)
+@several(3)
 def test_the_lines_show_totals_regions_and_steps(overlay):
     session = overlay.session
     overlay.show()
     regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
     assert lines_of(overlay) == ["Volume: 0 %", "Local: 0 to 0 %", *regions]
     session.change_options(preserve_volume=True)
-    solution = session.drag(sausage(3).turned(30.0), max_steps=4)
+    solution = session.drag(sausage(3, is_coarse=True).turned(30.0), max_steps=4)
     lines = lines_of(overlay)
     assert lines[0] == "Volume: 0 %"
     s = LocalVolume(session.mesh).change(session.vertices)
@@ -282,6 +285,7 @@ def test_the_line_of_a_region_has_its_colour(overlay):
 
 
 def test_the_time_per_frame_is_shown_from_the_second_frame_on(overlay):
+    del overlay.view.render  # drawn at every event
     cages = CageDisplay(overlay.view, overlay.session)
     cages.through = True
     cages.On()
@@ -303,14 +307,25 @@ def test_the_time_per_frame_is_shown_from_the_second_frame_on(overlay):
 
 
 @several(3)
-@pytest.mark.parametrize("size", [(400, 300), (800, 600), (1600, 1200)])
-@pytest.mark.parametrize("background", [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("background", "size"),
+    every(
+        2,
+        [
+            ((shade,) * 3, size)
+            for size, shades in (
+                ((400, 300), (1.0, 0.0)), ((800, 600), (0.0, 1.0)), ((1600, 1200), (1.0, 0.0))
+            )
+            for shade in shades
+        ],
+    ),
+)  # fmt: skip
 def test_text_and_colour_bar_are_legible_and_do_not_overlap(overlay, size, background):
     view = overlay.view
     view.window.SetSize(*size)
     view.renderer.SetBackground(*background)
     overlay.show()
-    view.render()
+    View.render(view)
     boxes = []
     for line in props(overlay, vtkTextActor):
         place, extent = np.array(line.GetPosition()), np.zeros(2)
