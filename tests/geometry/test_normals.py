@@ -22,7 +22,7 @@ from vtk_segdeform.kernels import dispatch
 MESHES = {
     "sphere": lambda: Mesh(*icosphere(4)),
     "torus": lambda: models.torus(3000),
-    "cactus": lambda: models.cactus(2500),
+    "cactus": lambda: models.cactus(1200),
 }
 MESHES = {name: functools.cache(made) for name, made in MESHES.items()}
 

@@ -20,7 +20,7 @@ LIMBS = [Limb(CURVE, [0.13] * 7), Limb([(0, 0, -0.1), (0, 0, 0.2)], [0.25, 0.2])
 @pytest.fixture(scope="module")
 def fork():
     """Return a deformer of the fork that avoids contact, and targets beside the other prong."""
-    mesh = standing_body(LIMBS, 700, blend=0.05)
+    mesh = standing_body(LIMBS, 500, blend=0.05)
     x = mesh.vertices
     regions = sd.segment(mesh, 1)
     fixed, handle = np.flatnonzero(x[:, 2] < 0.12), np.flatnonzero((x[:, 0] > 0) & (x[:, 2] > 0.85))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 import pyvista as pv
+from pyvistaqt.rwi import QVTKRenderWindowInteractor
 
 from vtk_segdeform.widgets.editor import finishing
 
@@ -22,6 +23,12 @@ def in_haste() -> Iterator[None]:
     yield
     gc.enable()
     pv.global_theme.anti_aliasing = smooth
+
+
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Leave the view blank, which is slow to draw: for tests of files, menus and dialogs."""
+    monkeypatch.setattr(QVTKRenderWindowInteractor, "paintGL", lambda _: None)
 
 
 @pytest.fixture(autouse=True)

@@ -19,6 +19,7 @@ from vtk_segdeform.widgets.app.autosave import Autosaves
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
 
 pytestmark = pytest.mark.usefixtures("unprepared")
+BLANK = pytest.mark.usefixtures("unpainted")
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ def program(folder):
         window.editor.controller.file.mark_saved(window.session)
     delete(window)
     window = hand = None
-    gc.collect()
+    gc.collect(0)  # what is new since the last one, all others being disabled
 
 
 @pytest.fixture
@@ -109,6 +110,7 @@ def soup():
     return polydata(corners, np.arange(len(corners)).reshape(-1, 3))
 
 
+@BLANK
 @pytest.mark.parametrize(
     ("given", "name", "text"),
     [
@@ -147,6 +149,7 @@ def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
     assert hand.title == "bottle.ply - segdeform"  # nothing was painted
 
 
+@BLANK
 def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
     """Undo returns to the original with its edits."""
     path = opened(hand, bottle(3, 3), tmp_path / "bottle.ply")
@@ -266,6 +269,7 @@ def test_a_file_with_invalid_points_is_repaired_and_opened(hand, boxes, tmp_path
     assert "NaN" in boxes.seen[0]
 
 
+@BLANK
 def test_repair_is_not_offered_where_it_cannot_help(hand, boxes, tmp_path):
     points = np.outer(np.arange(3.0), [1.0, 0.0, 0.0])  # in a line
     polydata(points, [[0, 1, 2]]).save(tmp_path / "line.ply")
@@ -326,6 +330,7 @@ def test_the_view_of_the_dialog_outlines_holes_before_and_colours_lids_after(sha
     assert count("after", vermilion) < 20
 
 
+@BLANK
 def test_a_surface_that_cannot_be_repaired_says_why(shared, monkeypatch):
     def refuse(*_, **__):
         raise ValueError("no faces are left")
@@ -340,6 +345,7 @@ def test_a_surface_that_cannot_be_repaired_says_why(shared, monkeypatch):
     repair(shared, read)
 
 
+@BLANK
 def test_declining_a_repair_keeps_the_open_document(shared, boxes, tmp_path):
     with_invalid_points().save(tmp_path / "ball.ply")
     boxes.answers.append("Cancel")
@@ -348,6 +354,7 @@ def test_declining_a_repair_keeps_the_open_document(shared, boxes, tmp_path):
     assert shared.title == "bottle.ply - segdeform"
 
 
+@BLANK
 def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(shared, monkeypatch):
     stopped = threading.Event()
 

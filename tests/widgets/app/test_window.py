@@ -39,6 +39,7 @@ from vtk_segdeform.widgets.editor import preparing
 BALL = models.sphere(300)
 PREPARED = preparing.lacking
 pytestmark = pytest.mark.usefixtures("unprepared")
+BLANK = pytest.mark.usefixtures("unpainted")
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +102,7 @@ def start(tmp_path, boxes):
         delete(hand.window)
     made.clear()
     hand = None
-    gc.collect()
+    gc.collect(0)  # what is new since the last one, all others being disabled
 
 
 def choose_file(monkeypatch, path):
@@ -134,6 +135,7 @@ def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
     assert slots(tmp_path) == []
 
 
+@BLANK
 def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch):
     hand, read, threads = start(), documents.read_session, []
     go_on = threading.Event()
@@ -159,6 +161,7 @@ def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monk
     assert_array_equal(hand.window.session.mesh.vertices, BALL.vertices)
 
 
+@BLANK
 def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
     start, ball_file, arm_file, tmp_path
 ):
@@ -188,6 +191,7 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
 # Saving and its dialogs.
 
 
+@BLANK
 def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     start, ball_file, tmp_path, monkeypatch
 ):
@@ -219,6 +223,7 @@ def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     assert len(load_session(tmp_path / "knob.segdeform").handles) == 2
 
 
+@BLANK
 def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeypatch, boxes):
     hand = start(ball_file)
     change(hand)
@@ -243,6 +248,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
     assert start().page is not None  # no recovery is offered
 
 
+@BLANK
 def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
     start, ball_file, arm_file, tmp_path, boxes
 ):
@@ -265,6 +271,7 @@ def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
     assert slots(tmp_path) == []
 
 
+@BLANK
 def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     start, ball_file, tmp_path, monkeypatch, boxes
 ):
@@ -401,6 +408,7 @@ def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
     until(is_framed, "the mesh in the view")
 
 
+@BLANK
 def test_menus_and_start_page_are_reached_by_keys(start, monkeypatch, boxes):
     monkeypatch.setattr(models, "cactus", lambda: BALL)
     hand = start()
@@ -429,6 +437,7 @@ def test_menus_and_start_page_are_reached_by_keys(start, monkeypatch, boxes):
     assert not view.hasFocus()  # but a control of the panel
 
 
+@BLANK
 def test_keys_are_changed_in_a_dialog_by_keys_and_kept(start, arm_file):
     hand = start(arm_file)
     window = hand.window
@@ -554,6 +563,7 @@ def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     assert threading.main_thread() not in threads
 
 
+@BLANK
 def test_abandoned_work_is_offered_and_recovered(start, bent, arm_file, tmp_path, boxes):
     left(tmp_path, bent, About("arm.segdeform", str(arm_file)))
     boxes.answers.append("Recover")
@@ -570,6 +580,7 @@ def test_abandoned_work_is_offered_and_recovered(start, bent, arm_file, tmp_path
     assert slots(tmp_path) == []
 
 
+@BLANK
 def test_recovering_work_later_or_never(start, bent, ball_file, tmp_path, boxes):
     slot = left(tmp_path, Session(Surface.read(ball_file)), About("ball.vtp", "", str(ball_file)))
     for answer, path in (("Escape", None), ("Later", ball_file)):
@@ -611,6 +622,7 @@ def test_recovering_one_of_several_autosaves_keeps_the_others(start, ball_file, 
     assert slots(tmp_path) == [hand.window.autosaver._slot.path]
 
 
+@BLANK
 def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     path = left(tmp_path, Session(BALL), About("ball.vtp"))
     path.write_bytes(path.read_bytes()[:-50])
@@ -623,6 +635,7 @@ def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
+@BLANK
 def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
     hand, told = start(ball_file, interval=0.05), []

@@ -232,7 +232,7 @@ def test_a_slot_that_processes_events_loses_no_drag(stand):
     assert np.linalg.norm(stand.hand.at(centre) - last) < 3.0
 
 
-@pytest.mark.parametrize("moment", every(2, ["in mid-drag", "converging", "in a job"]))
+@pytest.mark.parametrize("moment", every(3, ["in mid-drag", "converging", "in a job"]))
 def test_closing_a_widget_is_immediate_and_keeps_the_drag(another, moment):
     dragged(another, during=moment == "in mid-drag")
     if moment == "in a job":

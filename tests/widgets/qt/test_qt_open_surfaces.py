@@ -18,6 +18,7 @@ class Seen:
 
     def __init__(self, given):
         self.widget = DeformWidget(given)
+        self.widget.plotter.setUpdatesEnabled(False)  # the view is not tested, and slow to draw
         self.widget.resize(760, 640)
         self.widget.show()
         until(lambda: self.widget.windowHandle().isExposed(), "the window")

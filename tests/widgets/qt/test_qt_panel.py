@@ -26,6 +26,7 @@ def widget(unprepared):
     session = Session(mesh, state=state)
     session.pin(int(np.argmin(np.abs(mesh.vertices[:, 0]))))
     widget = DeformWidget(session)
+    widget.plotter.setUpdatesEnabled(False)  # the view is not tested, and slow to draw
     widget.resize(900, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")

@@ -209,6 +209,7 @@ def seen(state, last):
         close(before)
     mesh, now = state
     new = shown(Session(mesh, state=now))
+    new.widget.plotter.setUpdatesEnabled(False)  # the view is slow to draw, and seldom looked at
     new.widget.plotter.setFocus()
     last[:] = new, new.editor.controller.camera.viewpoint.settings(), new.look()
     return new

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Iterator
+
+# aiohttp reads the certificates of the system when it is imported, also in each of the processes
+# that the tests start, for 0.1 s; no test needs any.
+os.environ.setdefault("SSL_CERT_FILE", os.devnull)
 
 import pytest
 from chromium import Chromium

@@ -58,8 +58,8 @@ def address(cells: Kernel) -> Iterator[str]:
 
 
 def test_the_example_keeps_the_volume_and_shows_the_page(cells: Kernel) -> None:
-    sources = example(lambda source: source.replace("sd.models.cactus()", SMALL))
-    assert SMALL in sources[0]
+    sources = example(lambda source: source.replace("sd.models.cactus()", "mesh"))
+    assert "mesh = mesh" in sources[0]
     shown = [cells.run(source)[-1]["data"] for source in sources]
     n_regions, page, position, volume, moved = shown
     assert int(n_regions["text/plain"]) == 3
