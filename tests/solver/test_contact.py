@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scenes import sausage
+from scipy import sparse
+from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
 from vtk_segdeform.mesh import new_crossings, self_intersections
 from vtk_segdeform.models.implicit import Limb, standing_body
 from vtk_segdeform.solver import Contact
+from vtk_segdeform.solver.contact import ContactSurface
 
 SIDE = [(-0.35, 0, 1.2), (-0.35, 0, 0.6), (-0.2, 0, 0.3)]
 CURVE = [*SIDE, (0, 0, 0.2), *((-x, y, z) for x, y, z in reversed(SIDE))]
@@ -103,3 +106,28 @@ def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
     found = np.unique(self_intersections(near, two))
     assert np.array_equal(new_crossings(near, rest, two), found)
     assert len(found) > 20
+
+
+def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thin_part():
+    """Of a thick part everything else may meet, as in the crease of a bend."""
+    for height, thin in ((1.0, False), (0.05, True)):
+        body = sd.models.sphere(1000)
+        body = body.with_vertices(body.vertices * [1.0, 1.0, height])
+        a, b, c = body.vertices[body.faces.T]
+        face_areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        areas = np.bincount(body.faces.ravel(), np.repeat(face_areas, 3)) / (3.0 * face_areas.sum())
+        i, j = body.edges.T
+        lengths = np.linalg.norm(body.vertices[i] - body.vertices[j], axis=1)
+        graph = sparse.coo_array((lengths, (i, j)), shape=(1000, 1000)).tocsr()
+        surface = ContactSurface.of(
+            np.eye(1000), body.vertices, body.faces, areas=areas, edges=graph + graph.T
+        )
+        sums = np.add.outer(surface.radii, surface.radii)
+        is_near = csgraph.dijkstra(graph, directed=False) <= 4.0 * sums
+        assert surface.excluded[is_near].all()
+        normals = surface.normals(body.vertices)
+        facing_away = normals @ normals.T < 0.5
+        others = surface.excluded & ~is_near
+        assert not others[~facing_away].any()
+        opposite = normals[:, 2][:, None] * normals[:, 2] < -0.9
+        assert others[opposite].any() == thin

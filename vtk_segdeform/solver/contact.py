@@ -17,7 +17,7 @@ All of it is a smooth function of p that does not depend on how the mesh is move
 Three kinds of pairs are no contact, since they are near each other at rest already:
 
     neighbours      within 4 (h_a + h_b) along the surface
-    two sides       of a thin part: one is behind the other, within 4.5 (h_a + h_b)
+    two sides       of a thin part: one is behind the other, within 4.5 (h_a + h_b), facing away
     crossings       the same, of a mesh that crosses itself at rest
 
 and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is the height of the true
@@ -47,6 +47,7 @@ from .terms import NO_SURFACE
 _LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cover the surface
 _DEPTH = 1.5  # D_ab / (h_a + h_b)
 _BEHIND = 4.5  # (h_a + h_b): distance of two sides of a thin part, at most
+_SIDES = 0.5  # <n_a, n_b> of these, at most: a convex part is thick, and may fold inwards
 _NEIGHBOURS = 4.0  # (h_a + h_b): distance along the surface
 _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
@@ -144,11 +145,11 @@ class ContactSurface:
         e, sums = points[a] - points[b], radii[a] + radii[b]
         squared = np.einsum("ij,ij->i", e, e)
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
-        behind = (gap <= 0.0) & (squared < (_BEHIND * sums) ** 2)
+        facing = np.einsum("ij,ij->i", normals[a], normals[b])
+        behind = (gap <= 0.0) & (squared < (_BEHIND * sums) ** 2) & (facing < _SIDES)
         excluded[a[behind], b[behind]] = excluded[b[behind], a[behind]] = True
         in_front = (gap > 0.0) & (squared - gap**2 < (_LATERAL * sums) ** 2)
-        in_front &= np.einsum("ij,ij->i", normals[a], normals[b]) < -_FACING[0]
-        in_front &= ~excluded[a, b]
+        in_front &= (facing < -_FACING[0]) & ~excluded[a, b]
         least = np.full(n, np.inf)
         for each in (a, b):
             np.minimum.at(least, each[in_front], gap[in_front])
