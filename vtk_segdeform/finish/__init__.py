@@ -5,7 +5,9 @@ The files, in reading order:
     cell_energy    the stretch energy over all vertices, and the rotations that it is fitted to
     volume_band    how far the body may be compressed and expanded
     folds          triangles that a pose turned over
-    unfolding      opens them where they are
+    gradients      of the triangles of a patch, and the pose that has given ones
+    unfolding      opens folds where they are
+    creases        smooths creases in which a pose crosses itself
     finisher       the iteration: fixed vertices, handles and volumes exact
 """
 

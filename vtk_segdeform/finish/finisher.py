@@ -15,10 +15,11 @@ Cells are first large, which removes folds and kinks of the start and moves whol
 Triangles that are folded after that are opened where they are (`unfolding`).
 
 Parts that cross only after the finish are put half of the way back to where they were before it,
-or all of it, and the last steps are repeated with these vertices held: the rest of the surface
-relaxes around them.  In a cactus bent by 120 degrees this leaves distortion 0.072 without
-crossings; the start has 0.120, and the finish with crossings 0.067.  Where many of the faces of a
-patch crossed before the finish, nothing is done: holding them would not part them.
+or all of it, with more and more of the surface about them, and the last steps are repeated with
+these vertices held: the rest of the surface relaxes around them.  In a cactus bent by 120 degrees
+this leaves distortion 0.079 without crossings; the start has 0.120, and the finish with crossings
+0.067.  Where many of the faces of a patch crossed before the finish, they are not held, which would
+not part them.  Creases in which a few triangles still cross others are smoothed (`creases`).
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
@@ -42,7 +43,9 @@ from ..mesh import Mesh, new_crossings
 from ..progress import Progress, cancellable, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
+from .creases import smoothed
 from .folds import Folds
+from .gradients import around
 from .unfolding import unfolded
 
 # t of the final cells.  Medians of 15 poses of limbs for t = 0.03, 0.05, 0.1: distortion 1.22,
@@ -60,7 +63,8 @@ _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
 _UNFOLDED = 3  # rounds of removing folds, and restoring the volume, at most
 _MANY = 0.5  # share of the crossing faces of a patch that crossed before
-_PARTLY = 0.5, 0.0, 0.0  # shares of the finish at which crossing parts are held, one after another
+# Shares of the finish at which crossing parts are held, and rings about them, one after another.
+_PARTLY = (0.5, 1), (0.0, 1), (0.0, 1), (0.0, 2), (0.0, 4), (0.0, 8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +166,12 @@ class Finisher:
         crossing = least = self._grown(found.vertices, before)
         best, end, steps = found, found.vertices, found.steps
         stays = np.zeros(len(begin), dtype=bool)
-        for turn, share in enumerate(_PARTLY):
+        for turn, (share, rings) in enumerate(_PARTLY):
             if not len(least):
                 break
-            stays[self._mesh.faces[crossing]] = True
-            stays = self._with_neighbours(stays)
-            held, own = self._held | stays, part(progress, 0.3 * turn, 0.3 * (turn + 1))
+            stays |= around(self._mesh, crossing, rings)
+            own = part(progress, *(0.8 * (turn + np.arange(2)) / len(_PARTLY)))
+            held = self._held | stays
             places = begin[held] + share * (end[held] - begin[held])
             places[self._held[held]] = end[self._held]
             problem = Finisher(self._mesh, self._energy, held, self._constraints, own)
@@ -178,10 +182,11 @@ class Finisher:
                 best, least = found, crossing
         if len(least) and not len(before):
             return Finish(begin, (), steps)
-        opened = self._without_folds(best.vertices, part(progress, 0.9, 1.0))
-        if len(self._grown(opened, before)) <= len(least):
-            best = replace(best, vertices=opened)
-        return replace(best, steps=steps)
+        x = self._without_creases(best.vertices, part(progress, 0.8, 0.9))
+        opened = self._without_folds(x, part(progress, 0.9, 1.0))
+        if len(self._crossing(opened)) <= len(self._crossing(x)):
+            x = opened
+        return replace(best, vertices=x, steps=steps)
 
     def _grown(self, x: FloatArray, before: IntArray) -> IntArray:
         """Return the crossing faces in the pose *x*, of patches of which few crossed *before*."""
@@ -340,6 +345,17 @@ class Finisher:
             return x
         paths = np.hstack([x, *directions])
         return moved_along(paths, steps_to_volume(self._constraints, paths))
+
+    def _without_creases(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* without those of its crossings that smoothing removes."""
+        free = np.zeros(len(x), dtype=bool)
+        free[self._free] = True
+        smooth = smoothed(self._mesh, x, free, self._crossing, progress)
+        if smooth is x:
+            return x
+        smooth = self._landed(smooth, self._directions(smooth))
+        is_better = len(self._crossing(smooth)) < len(self._crossing(x))
+        return smooth if is_better and np.isfinite(smooth).all() else x
 
     def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:
         """Return *x* with as few folds as its places and volumes allow."""

@@ -6,28 +6,24 @@ Each triangle near a fold gets a gradient J*: that of the pose, without what fol
                  about the edge, by half of the excess each
     flatness     singular values are at least, and at most, those of a triangle far from folded
 
-The vertices then follow all of these as well as they can, a few dozen times over,
-
-    minimise  sum_T w_T A_T |J_T - J*_T|^2     over the vertices near, with the others in place
-
-where w_T is larger for triangles that are, or were, changed: so that their neighbours give way.
+The vertices then follow all of these as well as they can (`gradients`), a few dozen times over,
+with larger weights for triangles that are, or were, changed: so that their neighbours give way.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray
 from ..mesh import Mesh
 from .folds import Folds
+from .gradients import Patch, around
 
 _RINGS = 3, 6, 12  # around folded triangles, that move; one after the other
 _STEPS = 30  # with one of them, at most
 _LEAST, _MOST = 0.3, 4.0  # singular values of gradients
 _TURNED, _CHANGED = np.radians(115.0), np.radians(60.0)  # as in `folds`, of triangles far from it
-_HEAVY = 10.0  # w_T of changed triangles
+_HEAVY = 10.0  # weight of changed triangles
 _TINY = 1e-300
 
 
@@ -37,69 +33,35 @@ def unfolded(mesh: Mesh, folds: Folds, x: FloatArray, free: BoolArray) -> FloatA
     for rings in _RINGS:
         if not least.any():
             break
-        near = _around(mesh, least, rings)
-        patch = _Patch(mesh, folds, near & free)
-        here = patch.opened(best)
+        patch = Patch(mesh, folds, around(mesh, least, rings) & free)
+        here = _Opening(patch, folds).opened(best)
         folded = folds.at(here)
         if np.count_nonzero(folded) < np.count_nonzero(least):
             best, least = here, folded
     return best
 
 
-def _around(mesh: Mesh, folded: BoolArray, rings: int) -> BoolArray:
-    """Return the vertices within so many *rings* around *folded* triangles (m,), (n,) bool."""
-    near = np.zeros(mesh.n_vertices, dtype=bool)
-    near[mesh.faces[folded]] = True
-    for _ in range(rings):
-        near |= mesh.adjacency @ near.astype(float) > 0.0
-    return near
+class _Opening:
+    """Folds of the triangles of a patch, opened step by step."""
 
-
-class _Patch:
-    """The triangles at the vertices *moving* (n,) bool."""
-
-    def __init__(self, mesh: Mesh, folds: Folds, moving: BoolArray) -> None:
-        triangles = np.flatnonzero(moving[mesh.faces].any(axis=1) & folds.good)
-        self._own = np.flatnonzero(moving)
-        number = np.full(mesh.n_faces, -1)
-        number[triangles] = np.arange(len(triangles))
-        sides = number[folds.sides]
-        inside = (sides >= 0).all(axis=1)
-        self._edges, self._sides = folds.edges[inside], sides[inside]
-        self._angles = folds.angles[inside]
-        self._faces: IntArray = mesh.faces[triangles]
-        a, b, d = folds.inverses[:, triangles]
-        zero = np.zeros_like(a)
-        self._inverses = np.stack([np.stack([a, b], 1), np.stack([zero, d], 1)], 1)
-        self._areas = 0.5 / (a * d)
-        rows = np.arange(2 * len(triangles))
-        # J^T of all triangles, two rows each, is B x.
-        inverse = np.swapaxes(self._inverses, 1, 2)
-        values = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-        columns = np.repeat(self._faces, 2, axis=0)
-        places = np.repeat(rows, 3), columns.ravel()
-        self._gradient = sparse.csr_array((values.ravel(), places), (len(rows), mesh.n_vertices))
-        self._heavy = np.zeros(len(triangles), dtype=bool)
+    def __init__(self, patch: Patch, folds: Folds) -> None:
+        inside, self._sides = patch.edges(folds)
+        self._patch, self._edges, self._angles = patch, folds.edges[inside], folds.angles[inside]
 
     def opened(self, x: FloatArray) -> FloatArray:
         """Return the pose *x* (n, 3) with its folds opened, as far as that is possible."""
-        x = x.copy()
-        own = self._gradient[:, self._own]
+        heavy = np.zeros(len(self._patch.triangles), dtype=bool)
         for _ in range(_STEPS):
-            j = np.swapaxes((self._gradient @ x).reshape(-1, 2, 3), 1, 2)
-            wanted, changed = self._wanted(x, j)
+            wanted, changed = self._wanted(x, self._patch.at(x))
             if not changed.any():
                 break
-            self._heavy |= changed
-            weights = np.repeat(self._areas * np.where(self._heavy, _HEAVY, 1.0), 2)
-            weighted = own.T * weights
-            off = np.swapaxes(wanted - j, 1, 2).reshape(-1, 3)
-            x[self._own] += splu((weighted @ own).tocsc()).solve(np.asarray(weighted @ off))
+            heavy |= changed
+            x = self._patch.fitted(x, wanted, np.where(heavy, _HEAVY, 1.0))
         return x
 
     def _wanted(self, x: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return J* (m, 3, 2), and which of them differ from *j*."""
-        a, b, c = (x[corner] for corner in self._faces.T)
+        a, b, c = (x[corner] for corner in self._patch.faces.T)
         normals = np.cross(b - a, c - a)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
         along = x[self._edges[:, 1]] - x[self._edges[:, 0]]
