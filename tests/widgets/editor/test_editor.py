@@ -124,7 +124,6 @@ def pull_handle(bench, shift=(20, 30), moves=2):
     bench.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
 
 
-@pytest.mark.usefixtures("cached_models")
 def test_the_whole_story(any_view, tmp_path):
     mesh = models.cactus(500)
     coarse = Session(mesh)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -15,7 +16,7 @@ from chromium import CTRL, SHIFT, Chromium, needs_chromium
 from hands import plain_view
 from web_hands import Served, line
 
-from vtk_segdeform import Session, models
+from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.recording import Recorder, replay
@@ -25,15 +26,19 @@ pytestmark = [
     needs_chromium,
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
 ]
-MESH = models.cactus(2000)
 Size = tuple[int, int]
+
+
+@functools.cache
+def body() -> Mesh:
+    return models.cactus(2000)
 
 
 @pytest.fixture(scope="module")
 def recorded(browser: Chromium) -> tuple[list[str], Size, list[Any]]:
     """Return the recording of a story in a page, the size of its view, and its poses."""
     compiled_kernels()  # before that, an editor sums small arrays in another order
-    with Served(MESH, name="cactus.ply") as served:
+    with Served(body(), name="cactus.ply") as served:
         page, web = served.page(browser, size=(900, 640)), served.web
         size = served.call(lambda: web.editor.view.window.GetSize())
         served.call(web.session.start_afresh)
@@ -85,7 +90,7 @@ def poses_of(session: Session) -> list[Any]:
 
 @contextmanager
 def plain(size: Size) -> Iterator[DeformEditor]:
-    editor = DeformEditor(plain_view(size), Session(MESH))
+    editor = DeformEditor(plain_view(size), Session(body()))
     editor.On()
     ready(editor, editor.view.interactor.InvokeEvent)
     yield editor
@@ -97,7 +102,7 @@ def in_pyvista(size: Size) -> Iterator[DeformEditor]:
     import pyvista as pv
 
     plotter = pv.Plotter(off_screen=True, window_size=[*size])
-    editor = plotter.segdeform.edit(Session(MESH))
+    editor = plotter.segdeform.edit(Session(body()))
     plotter.show(interactive=False, auto_close=False)
     ready(editor, editor.view.interactor.InvokeEvent)
     yield editor
@@ -111,7 +116,7 @@ def in_qt(size: Size) -> Iterator[DeformEditor]:
     from vtk_segdeform.widgets.qt.widget import DeformWidget
 
     app = application()
-    widget = DeformWidget(Session(MESH))
+    widget = DeformWidget(Session(body()))
     widget.resize(size[0] + 300, size[1] + 100)
     widget.show()
     app.processEvents()
@@ -146,6 +151,8 @@ def test_the_input_of_a_page_gives_the_same_poses_to_the_bit(
     with host(size) as editor:
         replay(editor.view, lines, busy=lambda: editor.is_busy)
         again = poses_of(editor.session)
-    differ = [float(np.abs(a - b).max() / MESH.diagonal) for a, b in zip(again, poses, strict=True)]
+    differ = [
+        float(np.abs(a - b).max() / body().diagonal) for a, b in zip(again, poses, strict=True)
+    ]
     print(f"{host.__name__}: differences of {len(poses)} poses {differ}, {len(lines)} lines")
     np.testing.assert_array_equal(again, poses)
