@@ -34,6 +34,7 @@ def smoothed(
     x: FloatArray,
     free: BoolArray,
     crossing: Callable[[FloatArray], IntArray],
+    *,
     progress: Progress | None = None,
 ) -> FloatArray:
     """Return the pose *x* (n, 3) with fewer *crossing* faces, if *free* vertices (n,) allow it."""

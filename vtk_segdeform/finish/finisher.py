@@ -23,6 +23,8 @@ not part them.  Creases in which a few triangles still cross others are smoothed
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
+
+Long because holding what crosses apart repeats the iteration with other vertices held.
 """
 
 from __future__ import annotations
@@ -350,7 +352,7 @@ class Finisher:
         """Return *x* without those of its crossings that smoothing removes."""
         free = np.zeros(len(x), dtype=bool)
         free[self._free] = True
-        smooth = smoothed(self._mesh, x, free, self._crossing, progress)
+        smooth = smoothed(self._mesh, x, free, self._crossing, progress=progress)
         if smooth is x:
             return x
         smooth = self._landed(smooth, self._directions(smooth))
