@@ -71,7 +71,7 @@ def _averaged(
     graph = sparse.coo_array(links, (m, m)).tocsr()
     graph = graph + graph.T
     counts = np.maximum(graph.sum(axis=1), 1.0)[:, None]
-    inside = moving[patch.faces].all(axis=1)
+    inside = np.asarray(moving[patch.faces].all(axis=1))
     flat = gradients.reshape(m, 9)
     rows = graph[inside]
     for _ in range(averages):

@@ -49,7 +49,7 @@ class Patch:
         number = np.full(len(folds.faces), -1)
         number[self.triangles] = np.arange(len(self.triangles))
         sides = number[folds.sides]
-        inside = (sides >= 0).all(axis=1)
+        inside = np.asarray((sides >= 0).all(axis=1))
         return inside, sides[inside]
 
     def at(self, x: FloatArray) -> FloatArray:
