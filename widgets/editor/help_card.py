@@ -161,29 +161,29 @@ class HelpCard:
     def _put(
         self, text: str, colour: str, at: tuple[float, float], size: float,
         *, bold: bool = False, key: bool = False,
-    ) -> Text:  # fmt: skip
+    ) -> None:  # fmt: skip
         words = Text(self.view.foreground, colour, bold=bold or key, monospace=key, layer=7)
         words.set_text(text, size)
         words.place(*at)
         self._parts.append(words)
-        return words
 
     def _widths(self, sections: Sequence[Section], size: float) -> tuple[float, float]:
         """Return the widths of the keys and of the actions, in ems."""
         rows = [row for _, rows in sections for row in rows]
         columns = ([key for key, _ in rows], True), ([label for _, label in rows], False)
-        widths = [
-            [self._put(text, INK, (0.0, 0.0), size, key=key).width() for text in texts]
-            for texts, key in columns
-        ]
-        self._clear_probes()
+        widths = []
+        for texts, is_key in columns:
+            probe = Text(self.view.foreground, INK, bold=is_key, monospace=is_key)
+            widths.append([_width(probe, text, size) for text in texts])
+            probe.remove()
         keys, labels = (float(np.max(w, initial=0.0)) / size for w in widths)
         return keys, labels
 
-    def _clear_probes(self) -> None:
-        for part in self._parts:
-            part.remove()
-        self._parts = []
+
+def _width(probe: Text, text: str, size: float) -> float:
+    """Return the width of *text* in pixels."""
+    probe.set_text(text, size)
+    return probe.width()
 
 
 def _n_lines(sections: Sequence[Section]) -> float:
