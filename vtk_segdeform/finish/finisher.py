@@ -23,8 +23,6 @@ not part them.  Creases in which a few triangles still cross others are smoothed
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
-
-Long because holding what crosses apart repeats the iteration with other vertices held.
 """
 
 from __future__ import annotations
@@ -193,9 +191,7 @@ class Finisher:
     def _grown(self, x: FloatArray, before: IntArray) -> IntArray:
         """Return the crossing faces in the pose *x*, of patches of which few crossed *before*."""
         faces, crossing = self._mesh.faces, self._crossing(x)
-        near = np.zeros(len(x), dtype=bool)
-        near[faces[crossing]] = near[faces[before]] = True
-        own = np.flatnonzero(self._with_neighbours(near))
+        own = np.flatnonzero(around(self._mesh, np.union1d(crossing, before), 1))
         among = self._mesh.adjacency[own][:, own]
         count, label = connected_components(among, directed=False)
         patch = np.zeros(len(x), dtype=np.int64)
@@ -205,10 +201,6 @@ class Finisher:
         )
         grown: IntArray = crossing[(then <= _MANY * now)[patch[faces[crossing, 0]]]]
         return grown
-
-    def _with_neighbours(self, some: BoolArray) -> BoolArray:
-        """Return the vertices *some* (n,) and those beside them."""
-        return np.asarray(some | (self._energy.neighbours @ some.astype(float) > 0.0))
 
     def between(self, begin: FloatArray, end: FloatArray, shares: float | FloatArray) -> FloatArray:
         """Return *begin* moved by *shares*, (n, 1) or one, of its finish *end*, on the volumes."""
