@@ -315,6 +315,14 @@ def test_columns_through_corners_and_edges_of_a_cage_are_handled(level):
     assert_array_equal(inside, winding[clear] > 0.5)
 
 
+def test_faces_without_area_change_no_distance_to_a_surface():
+    vertices, faces = icosphere(1)
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    flat = faces[:2][:, [[0, 1, 1], [0, 0, 0]]].reshape(-1, 3)
+    found = distance_to_surface(points, vertices, np.concatenate([faces, flat]))
+    assert_allclose(found, distance_to_surface(points, vertices, faces), rtol=1e-12)
+
+
 def test_a_region_is_tested_once_and_others_anew(monkeypatch):
     mesh = models.torus(400)
     half = mesh.vertices[:, 0] > 0.0

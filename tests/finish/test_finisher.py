@@ -287,6 +287,20 @@ def test_creases_that_cross_themselves_are_smoothed_and_nothing_else_moves():
     assert_array_equal(found.vertices[held], x[held])
 
 
+def test_a_vertex_of_flat_triangles_only_stays_where_it_is():
+    mesh = sheet()
+    faces = mesh.faces
+    flat = mesh.vertices.copy()
+    flat[faces[(faces == 62).any(axis=1)]] = flat[62]
+    mesh, free = mesh.with_vertices(flat), np.ones(mesh.n_vertices, dtype=bool)
+    pose = flat + 0.1 * np.sin(3.0 * flat[:, [1, 2, 0]])
+    answers = [np.flatnonzero((faces == 62).any(axis=1)), np.array([], dtype=int)]
+    smooth = smoothed(mesh, pose, free, lambda _: answers.pop(0))
+    assert np.isfinite(smooth).all()
+    assert (smooth != pose).any()
+    assert_array_equal(smooth[62], pose[62])
+
+
 def test_parts_pushed_through_each_other_are_not_smoothed():
     one, mesh = sheet(), creased()[0]
     across = one.vertices[:, [2, 0, 1]] - [0.0, 1.5, 0.3]

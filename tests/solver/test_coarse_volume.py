@@ -55,6 +55,16 @@ def test_a_point_is_the_mean_of_its_cell_over_the_surface():
 
 
 @pytest.mark.usefixtures("coarse")
+def test_a_cell_without_area_is_the_mean_of_its_vertices():
+    """As where a mesh far from the origin was stored in single precision."""
+    flat = SCENE.mesh.vertices.copy()
+    flat[flat[:, 0] > 0.0, 1:] = 0.0
+    coarse_volume = CoarseVolume.of(SCENE.mesh.with_vertices(flat), SUBSPACE)
+    sums = np.bincount(coarse_volume.cells, coarse_volume.shares)
+    assert_allclose(sums, 1.0, rtol=1e-12)
+
+
+@pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("constraints", [total_volume, region_volumes])
 def test_coarse_volumes_change_like_those_of_the_mesh(constraints):
     mesh = SCENE.mesh

@@ -223,15 +223,11 @@ def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize(
-    "name",
-    [
-        "small cactus",
-        *(pytest.param(n, marks=pytest.mark.campaign) for n in ("torus", "wire", "cactus")),
-    ],
-)
+@pytest.mark.parametrize("name", ["small cactus", "torus", "wire", "cactus"])
 def test_a_scene_rotated_scaled_and_moved_has_the_same_solution(name):
-    mesh = mesh_of(name)
+    mesh = sd.models.cactus(1000) if name == "small cactus" else mesh_of(name)
+    # Where a torus is cut into regions is decided by rounding.
+    tolerance = 1e-4 if name == "torus" else 1e-6
     fixed, handle, axis = ends(mesh)
     targets = bent(mesh, handle, 45.0, axis)
     plain = sd.deform(mesh, fixed, handle, targets)
@@ -242,7 +238,7 @@ def test_a_scene_rotated_scaled_and_moved_has_the_same_solution(name):
         moved = sd.deform(scene, fixed, handle, scale * targets @ turned.T + shift)
         error = np.abs(((moved.vertices - shift) @ turned / scale) - plain.vertices).max()
         print(f"{name}, scale {scale:g}, shift {np.linalg.norm(shift):g}: {error:.1e}")
-        assert error <= 1e-6 * mesh.diagonal
+        assert error <= tolerance * mesh.diagonal
         # Far from the origin the vertices themselves are rounded; the wire has little volume for
         # its area.
         area = scene.with_vertices(moved.vertices).face_areas.sum()

@@ -17,6 +17,9 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Mesh
 from .folds import Folds
 
+_STAY = 1e-12  # share of the equations by which vertices stay where they are
+_TINY = 1e-300
+
 
 class Patch:
     """The triangles at the vertices *moving* (n,) bool of a mesh.
@@ -62,7 +65,11 @@ class Patch:
         weighted = own.T * np.repeat(self._areas * weights, 2)
         off = np.swapaxes(wanted - self.at(x), 1, 2).reshape(-1, 3)
         x = x.copy()
-        x[self._moving] += splu((weighted @ own).tocsc()).solve(np.asarray(weighted @ off))
+        normal = weighted @ own
+        # A vertex of flat triangles only is in no equation, and stays.
+        stay = _STAY * float(normal.diagonal().mean()) + _TINY
+        normal = normal + stay * sparse.eye_array(len(self._moving))
+        x[self._moving] += splu(normal.tocsc()).solve(np.asarray(weighted @ off))
         return x
 
 

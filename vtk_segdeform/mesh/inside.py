@@ -81,14 +81,18 @@ def distance_to_surface(x: FloatArray, vertices: FloatArray, faces: IntArray) ->
     a = vertices[faces]  # (k, 3 corners, 3)
     along = a[:, [1, 2, 0]] - a
     normal = np.cross(along[:, 0], along[:, 1])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    size, squares = np.linalg.norm(normal, axis=1), np.einsum("kcj,kcj->kc", along, along)
+    has_area = size > 0.0
+    normal /= np.where(has_area, size, 1.0)[:, None]
+    squares = np.where(squares > 0.0, squares, 1.0)  # of coinciding corners
     nearest = np.empty(len(x))
     rows = max(1, _BLOCK // (3 * len(faces)))
     for start in range(0, len(x), rows):
         to_x = x[start : start + rows, None, None] - a  # (rows, k, 3 corners, 3)
-        t = np.einsum("nkcj,kcj->nkc", to_x, along) / np.einsum("kcj,kcj->kc", along, along)
+        t = np.einsum("nkcj,kcj->nkc", to_x, along) / squares
         off_edge = np.linalg.norm(to_x - t.clip(0, 1)[..., None] * along, axis=-1).min(axis=2)
         over = (np.einsum("nkcj,kcj->nkc", to_x, np.cross(normal[:, None], along)) >= 0).all(axis=2)
+        over &= has_area
         off_plane = np.abs(np.einsum("nkj,kj->nk", to_x[:, :, 0], normal))
         nearest[start : start + rows] = np.where(over, off_plane, off_edge).min(axis=1)
     return nearest

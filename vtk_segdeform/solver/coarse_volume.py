@@ -79,6 +79,8 @@ class CoarseVolume:
             areas = of_clusters
         else:
             _, cells = voronoi_cells(mesh, sizes.COARSE_VOLUME_POINTS, rng, progress)
+        is_flat = np.bincount(cells, areas) == 0.0
+        areas = np.where(is_flat[cells], 1.0, areas)
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
 
