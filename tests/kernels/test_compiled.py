@@ -46,7 +46,7 @@ from vtk_segdeform.io.polygons import (
 )
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
-from vtk_segdeform.mesh import find_faults, mesh_of
+from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
 from vtk_segdeform.mesh.grouping import first_members
 from vtk_segdeform.mesh.shells import _boxes
 from vtk_segdeform.regions.blending import blend_weights, border_distance
@@ -170,6 +170,50 @@ def torn(seed):
     if seed % 5 == 1:
         vertices = np.vstack([vertices, [[np.nan, 0, 0], vertices[0]]])
     return vertices, faces
+
+
+def lattice(seed):
+    """Return triangles that touch, overlap in a plane, fold over an edge or are flat."""
+    rng = np.random.default_rng(seed)
+    points = np.stack(np.meshgrid(*3 * [np.arange(3.0)]), axis=-1).reshape(-1, 3)
+    return points, np.array([rng.permutation(27)[:3] for _ in range(120)])
+
+
+def needles(seed):
+    """Return triangles of very different sizes, some of which are needles."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** rng.uniform(-2.0, 0.5, 200)[:, None, None]
+    corners = rng.normal(size=(200, 1, 3)) + size * rng.normal(size=(200, 3, 3))
+    share = 10.0 ** rng.uniform(-14.0, 0.0, 50)[:, None]
+    corners[:50, 2] = corners[:50, 0] + share * (corners[:50, 2] - corners[:50, 0])
+    return corners.reshape(-1, 3), np.arange(600).reshape(-1, 3)
+
+
+def crossed(seed):
+    """Return two spheres that cross, and a third one nearby."""
+    turned = [
+        (x + 0.7 * k * np.array([1.0, 0.1, 0.2 * seed]), f)
+        for k in range(2)
+        for x, f in [icosphere(3)]
+    ]
+    return together(*turned, (icosphere(2)[0] + [0.0, 0.0, 1.95], icosphere(2)[1]))
+
+
+@pytest.mark.parametrize("far", [0.0, 1e5])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("soup", [lattice, needles, crossed])
+def test_the_same_faces_intersect(twin, monkeypatch, soup, seed, far):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    monkeypatch.setattr("vtk_segdeform.mesh.near_faces._PIECE", 50)
+    points, faces = soup(seed)
+    points = (1.0 + far) * points + far
+    some = np.random.default_rng(seed).permutation(len(faces))[:40]
+    quick, slow = twin(lambda: self_intersections(points, faces))
+    assert len(quick) > 10
+    assert_array_equal(quick, slow)
+    quick, slow = twin(lambda: np.unique(intersections_of(points, faces, some), axis=0))
+    assert len(quick) > 1
+    assert_array_equal(quick, slow)
 
 
 @pytest.mark.parametrize("far", [0.0, 1e3])

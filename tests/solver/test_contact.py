@@ -10,7 +10,7 @@ from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.mesh import new_crossings, self_intersections
+from vtk_segdeform.mesh import self_intersections
 from vtk_segdeform.models.implicit import Limb, standing_body
 from vtk_segdeform.solver import Contact
 from vtk_segdeform.solver.contact import ContactSurface
@@ -94,18 +94,6 @@ def test_far_from_contact_no_bit_changes():
     assert avoiding._constraints.contact.surface.spacing < 0.2
     expected, solution = free.solve(targets), avoiding.solve(targets)
     assert np.array_equal(solution.vertices, expected.vertices)
-
-
-def test_crossings_of_a_large_mesh_are_searched_where_parts_meet(monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.mesh.intersections._ALL_FACES", 0)
-    ball = sd.models.sphere(1000)
-    two = np.concatenate([ball.faces, ball.faces + ball.n_vertices])
-    rest = np.concatenate([ball.vertices, ball.vertices + [6.0, 0.0, 0.0]])
-    near = np.concatenate([ball.vertices, ball.vertices + [1.9, 0.01, 0.02]])
-    assert len(new_crossings(rest, rest, two)) == 0
-    found = np.unique(self_intersections(near, two))
-    assert np.array_equal(new_crossings(near, rest, two), found)
-    assert len(found) > 20
 
 
 def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thin_part():

@@ -217,7 +217,7 @@ class Finisher:
 
     def _crossing(self, x: FloatArray) -> IntArray:
         """Return the faces that cross others in the pose *x*, but not at rest."""
-        return new_crossings(x, self._mesh.vertices, self._mesh.faces, all_faces=0)
+        return new_crossings(x, self._mesh.vertices, self._mesh.faces)
 
     def _run(self, begin: FloatArray, most: int, progress: Progress | None) -> Finish:
         """Return the finish of a pose whose held vertices are in their places.

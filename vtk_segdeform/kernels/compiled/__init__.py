@@ -12,6 +12,7 @@
     half_edges      `topology.HalfEdges`, `grouping.connected`,
                     `grouping.first_members`, `Mesh.adjacency`
     pairs           `contact.Contact`
+    crossings       `near_faces.near_faces`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     triangles       `faults.Search`, `shells.shell_volumes`, `shells.shell_depths`,
@@ -25,6 +26,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 
 from .beams import beam_meets, beyond_sides
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
+from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import solve_factored
 from .half_edges import (
     border_half_edges,
@@ -94,11 +96,13 @@ __all__ = [
     "first_equal_points",
     "first_members",
     "flat_faces",
+    "grow_tree",
     "independent_edges",
     "interpolated_rows",
     "link",
     "link_corners",
     "map_packed",
+    "may_meet",
     "number_trees",
     "numbers_of_lines",
     "one_fan_each",
@@ -116,6 +120,7 @@ __all__ = [
     "shell_sums",
     "solve_factored",
     "sorted_edges",
+    "touching_boxes",
     "used_vertices",
     "valid_collapses",
     "volume_along_sums",
