@@ -50,6 +50,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         lids=lids,
+        avoid_contact=options.avoid_contact,
         refine=options.refine,
         progress=progress,
     )
