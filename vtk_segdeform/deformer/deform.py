@@ -69,7 +69,8 @@ def deform(
         None does so for meshes of at most 100,000 vertices, where it takes less time than all the
         rest; a pose that cannot be finished is returned as it is.
     progress : Progress, optional
-        Called while cages are fitted and bound, and before every step; may cancel.
+        Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
+        before every step.  It cancels by raising `Cancelled`.
 
     Returns
     -------
@@ -79,6 +80,8 @@ def deform(
     ------
     ConstraintError
         If *fixed*, *handle* or *targets* are invalid.
+    Cancelled
+        If *progress* raised it.
     """
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")

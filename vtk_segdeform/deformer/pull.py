@@ -71,7 +71,8 @@ def pull(
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
     progress : Progress, optional
-        Called while cages are fitted and bound, and before every step; may cancel.
+        Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
+        before every step.  It cancels by raising `Cancelled`.
 
     Returns
     -------
@@ -81,6 +82,8 @@ def pull(
     ------
     ConstraintError
         If *vertex*, *to*, *radius*, *pins* or *locality* are invalid.
+    Cancelled
+        If *progress* raised it.
 
     Examples
     --------
