@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import sizes
 from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
-from ..errors import Cancelled, SegDeformError
+from ..errors import Cancelled, ConstraintError, SegDeformError
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -79,7 +79,7 @@ def deform(
     Raises
     ------
     ConstraintError
-        If *fixed*, *handle* or *targets* are invalid.
+        If *fixed*, *handle* or *targets* are invalid, or *handle* is empty.
     Cancelled
         If *progress* raised it.
     """
@@ -90,6 +90,10 @@ def deform(
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     stays, moves = checked_constraints(mesh, fixed, handle)
+    if not len(moves):
+        raise ConstraintError(
+            "deform requires at least one vertex in handle; got none. Select the vertices to move"
+        )
     places = checked_targets(targets, len(moves))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
