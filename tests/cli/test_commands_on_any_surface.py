@@ -136,6 +136,18 @@ def test_check_says_each_thing_once(tmp_path, capsys):
     ]
 
 
+def test_check_tells_a_flattened_body_from_a_sheet(tmp_path, capsys):
+    path = tmp_path / "flat.vtp"
+    flat = holed()
+    flat.points[:, 1] *= 1e-3
+    write_mesh(path, flat)
+    assert main(["check", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "Flattened body with 4 holes: too thin to preserve the volume." in printed
+    assert "--lids on preserves the volume of a flattened body" in printed
+    assert checked(path, capsys)["flattened"] == [True]
+
+
 def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
     two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
     write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))

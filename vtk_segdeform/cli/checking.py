@@ -7,6 +7,7 @@ With ``--json`` it prints one object with these keys:
     components, closed          their number; whether none has a border
     holes                       number of edges of each border
     encloses                    whether each component encloses a volume
+    flattened                   whether it does not because it is an open body pressed flat
     volume_under_lids           whether some volume is preserved under lids over holes
     volume                      the volume in words
     workarounds                 what the mesh has differently: objects with kind, text and count,
@@ -67,6 +68,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
         "closed": report.is_two_manifold,
         "holes": [],
         "encloses": [],
+        "flattened": [],
         "volume_under_lids": False,
         "workarounds": [],
         "faults": [_counted(fault) for fault in report.faults],
@@ -104,6 +106,7 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
         "closed": mesh.is_closed,
         "holes": sorted((len(loop) for loop in mesh.borders), reverse=True),
         "encloses": lids.encloses.tolist(),
+        "flattened": lids.flattened.tolist(),
         "volume_under_lids": bool(lids.used.any()),
         "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
@@ -125,6 +128,8 @@ def _print(found: dict[str, Any], say: Say) -> None:
     faces = counted(found["faces"], "face", "faces")
     say(f"{given}; as a mesh {found['vertices']} vertices, {faces}, {parts}")
     say(f"It can be deformed as it is. {found['volume']}.")
+    if any(found["flattened"]):
+        say("  --lids on preserves the volume of a flattened body, unless it is 0")
     for each in found["workarounds"]:
         if each["kind"] != "hole":
             say(f"  {each['text']}")
