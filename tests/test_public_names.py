@@ -39,6 +39,7 @@ def test_every_listed_name_exists():
 def test_a_name_is_imported_once():
     assert sd.Mesh is sd.mesh.Mesh
     assert vars(sd)["Mesh"] is sd.Mesh
+    assert sd.Cancelled is sd.errors.Cancelled
 
 
 def test_no_import_of_a_folder_replaces_a_public_function():

@@ -53,6 +53,7 @@ if _TYPE_CHECKING:
     )
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, deform, pull
+    from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
@@ -65,6 +66,7 @@ if _TYPE_CHECKING:
 # The module from which each public name is imported.
 _MODULE_OF = {
     "Cage": "cages",
+    "Cancelled": "errors",
     "Change": "session",
     "Deformer": "deformer",
     "Mesh": "mesh",
@@ -96,6 +98,7 @@ _SUBPACKAGES = {
 
 __all__ = [
     "Cage",
+    "Cancelled",
     "Change",
     "Deformer",
     "Mesh",

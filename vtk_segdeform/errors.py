@@ -33,7 +33,21 @@ class SessionError(SegDeformError, ValueError):
 
 
 class Cancelled(SegDeformError, RuntimeError):
-    """The progress callback cancelled the work; nothing was changed."""
+    """The work was cancelled by its progress callback; nothing was changed.
+
+    Raise it in a callback; what the callback returns is ignored.
+
+    >>> import vtk_segdeform as sd
+    >>> def stop_while_binding(fraction, text):
+    ...     if fraction > 0.7:
+    ...         raise sd.Cancelled("cancelled by the user")
+    >>> ball = sd.models.sphere(600)
+    >>> try:
+    ...     sd.pull(ball, 0, [0.0, 0.0, 1.5], progress=stop_while_binding)
+    ... except sd.Cancelled as reason:
+    ...     print(reason)
+    cancelled by the user
+    """
 
 
 class MissingDependencyError(SegDeformError, RuntimeError):

@@ -14,7 +14,9 @@ T = TypeVar("T")
 _PERIOD = 0.05  # seconds between two calls of a progress callback
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction done, 0..1, and a text; may raise `errors.Cancelled` to stop."""
+"""Called with the fraction done, 0..1, and a text; may raise `Cancelled` to stop.
+
+What it returns is ignored."""
 
 
 def tell(progress: Progress | None, fraction: float, message: str) -> None:

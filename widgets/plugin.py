@@ -271,7 +271,7 @@ class PolyDataTools:
         n_regions : int, optional
             Number of regions; by default one for each limb and one for the trunk.
         progress : Progress, optional
-            Progress callback; may cancel.
+            Called with the fraction done and a text; may raise `Cancelled`.
         """
         surface, copy = Surface(self._given), self._given.copy()
         found = segment(surface.mesh, n_regions, progress=progress)

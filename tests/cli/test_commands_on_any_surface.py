@@ -136,6 +136,36 @@ def test_check_says_each_thing_once(tmp_path, capsys):
     ]
 
 
+def test_check_tells_a_flattened_body_from_a_sheet(tmp_path, capsys):
+    path = tmp_path / "flat.vtp"
+    flat = holed()
+    flat.points[:, 1] *= 1e-3
+    write_mesh(path, flat)
+    assert main(["check", str(path)]) == 0
+    printed = capsys.readouterr().out
+    assert "Flattened body with 4 holes: too thin to preserve the volume." in printed
+    assert "--lids on preserves the volume of a flattened body" in printed
+    assert checked(path, capsys)["flattened"] == [True]
+
+
+@pytest.mark.parametrize("away", [0.0, 1e4, 4e6])
+def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys):
+    ball, path = sphere(2000), tmp_path / "ball.ply"
+    x = ball.vertices + away
+    for points in (x, x.astype(np.float32)):
+        write_mesh(path, pv.make_tri_mesh(points, ball.faces))
+        found = [n for n in checked(path, capsys)["notes"] if n["kind"] == "single precision"]
+        assert len(found) == (points is not x and away > 0.0)
+    if not found:
+        return
+    assert main(["check", str(path)]) == 0
+    printed = capsys.readouterr().out
+    steps = {1e4: "0.00098", 4e6: "0.25"}[away]
+    assert f"at this distance from the origin in steps of {steps} (median edge " in printed
+    assert "move the model to the origin before you export it" in printed
+    assert (found[0]["count"] > 0) == ("collapsed" in printed) == (away == 4e6)
+
+
 def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
     two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
     write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))

@@ -19,6 +19,7 @@ from vtk_segdeform.benchmarks.sections import Ratio, Section
 from vtk_segdeform.cli.main import ProgressBar, main
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert, read_mesh
+from vtk_segdeform.mesh import new_crossings
 from vtk_segdeform.mesh.mesh import Mesh
 
 QUICK = ["--regions", "2", "--cage-vertices", "60"]
@@ -123,6 +124,22 @@ def test_a_turn_about_the_fixed_centre_is_asked_for_by_name(bar, bar_file, tmp_p
         bar.vertices[bottom][:, 2].mean() + np.cos(angle) * arm[2],
     ]
     assert_allclose(found, expected, atol=2e-3 * bar.diagonal)
+
+
+@pytest.mark.parametrize(("shift", "advice"), [(0.05, ""), (-0.9, ": move less, or add cage")])
+def test_faces_that_cross_are_counted_where_contact_is_avoided(
+    shift, advice, bar, bar_file, tmp_path, capsys
+):
+    out = tmp_path / "moved.ply"
+    words = ["deform", bar_file, "-o", str(out), "--fixed", "z<10%", "--handle", "z>90%"]
+    words += ["--translate", f"0,0,{shift}", "--regions", "1", "--cage-vertices", "40"]
+    main([*words, "--no-refine"])
+    assert "crossings" not in lines(capsys.readouterr().out)
+    main([*words, "--no-refine", "--avoid-contact"])
+    count = len(new_crossings(read_mesh(out).vertices, bar.vertices, bar.faces))
+    expected = f"crossings       {count} faces cross that did not at rest{advice}"
+    assert lines(capsys.readouterr().out)["crossings"].startswith(expected)
+    assert (count > 0) == (shift < 0.0)
 
 
 def test_check_praises_a_good_mesh(bar_file, capsys):

@@ -9,6 +9,7 @@ import pytest
 from given_surfaces import holed, require_only_moved
 from numpy.testing import assert_allclose
 
+from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
@@ -35,10 +36,12 @@ def test_pull_moves_the_point_keeps_the_pins_and_writes_what_was_given(given, tm
     at, pin = x[x[:, 2].argmax()], x[x[:, 2].argmin()]
     to, out = at + [0.1 * mesh.diagonal, 0.0, 0.0], tmp_path / "pulled.vtp"
     words = ["pull", given, "-o", str(out), "--at", text(at), "--to", text(to), "--pin", text(pin)]
-    assert main([*words, "--regions", "1", "--cage-vertices", "40", "--radius", "0.5"]) == 0
+    words += ["--regions", "1", "--cage-vertices", "40", "--radius", "0.5", "--avoid-contact"]
+    assert main(words) == 0
     printed = capsys.readouterr().out
     assert "volume kept under lids" in printed
     assert "status          converged" in printed
+    assert "crossings       0 faces cross that did not at rest\n" in printed
     after = read_polydata(out)
     require_only_moved(before, after)
     moved = Surface(after).mesh.vertices
@@ -47,6 +50,22 @@ def test_pull_moves_the_point_keeps_the_pins_and_writes_what_was_given(given, tm
     lids, closed = lids_of(mesh), lids_of(mesh).closed(mesh)
     volumes = [signed_volume(lids.extension @ each, closed) for each in (x, moved)]
     assert np.ptp(volumes) < 1e-6 * volumes[0]  # of single precision coordinates
+
+
+def test_places_far_from_the_origin_have_all_their_digits(tmp_path, capsys):
+    mesh = models.bar(divisions=(2, 2, 7))
+    far = mesh.with_vertices(mesh.vertices + [1e6, -1e6, 0.0])
+    path, vertex = tmp_path / "far.ply", 40
+    write_mesh(path, far)
+    at = far.vertices[vertex]
+    words = ["pull", str(path), "-o", str(tmp_path / "out.ply"), "--to", text(at + [0.05, 0, 0])]
+    words += ["--regions", "1", "--cage-vertices", "40"]
+    assert main([*words, "--at", text(at)]) == 0
+    assert main([*words, "--at", text(at - [1.0, 0, 0])]) == 2
+    printed = capsys.readouterr()
+    for words in (printed.out, printed.err):
+        place = re.search(r" at (\S+,\S+,\S+)", words)[1]
+        assert np.linalg.norm(far.vertices - np.array(place.split(","), float), axis=1).min() < 2e-6
 
 
 @pytest.mark.parametrize(

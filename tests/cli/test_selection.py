@@ -51,6 +51,12 @@ def test_strict_and_loose_comparisons_differ_exactly_on_the_limit(ball):
         parse_selection(f"z>{top}", ball.vertices)
 
 
+def test_the_extent_of_a_mesh_far_from_the_origin_has_all_its_digits(ball):
+    far = ball.vertices + [1e6, 0.0, 0.0]
+    with pytest.raises(ConstraintError, match=r"the mesh spans x 1000\d{3}\.\d{4,}\.\.1000"):
+        parse_selection("x<0", far)
+
+
 def test_and_means_both(ball):
     both = parse_selection("z>50% & x<30%", ball.vertices)
     expected = np.intersect1d(

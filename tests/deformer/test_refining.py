@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from threading import Event
 
+import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
@@ -11,7 +12,7 @@ from scenes import sausage
 from vtk_segdeform import sizes
 from vtk_segdeform.deformer import deform, pull
 from vtk_segdeform.deformer.deformer import Deformer
-from vtk_segdeform.errors import ArgumentError, Cancelled, MeshError
+from vtk_segdeform.errors import ArgumentError, Cancelled, ConstraintError, MeshError
 from vtk_segdeform.geometry.distortion import distortion
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -52,6 +53,12 @@ def test_a_pose_that_cannot_be_finished_is_returned_as_it_is(monkeypatch):
         bent(True)
     with pytest.raises(ArgumentError, match="refine"):
         bent("yes")
+
+
+@pytest.mark.parametrize("handle", [[], np.zeros(SCENE.mesh.n_vertices, dtype=bool)])
+def test_a_pose_without_a_handle_is_an_error(handle):
+    with pytest.raises(ConstraintError, match=r"at least one vertex in handle; got none\. Select"):
+        deform(SCENE.mesh, SCENE.fixed, handle, [], **OPTIONS)
 
 
 def test_a_finish_is_cancelled_even_while_its_matrix_is_factored(monkeypatch):

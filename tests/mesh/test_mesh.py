@@ -176,8 +176,14 @@ def test_a_pose_costs_a_fraction_of_the_check():
         lambda it: sd.fit_cages(it, None),
         lambda it: sd.Deformer(it, None, ()),
         lambda it: sd.Session(it),
+        lambda it: sd.deform(it, [0], [1], [[0, 0, 0]]),
+        lambda it: sd.pull(it, 0, [0, 0, 0]),
     ],
 )
 def test_the_error_for_another_type_says_how_to_make_a_mesh(call):
-    with pytest.raises(sd.errors.MeshError, match=r"mesh must be a Mesh; got .*Make one with"):
-        call(np.zeros((4, 3)))
+    polydata = sd.io.to_polydata(sd.models.bar(divisions=(1, 1, 2)))
+    says = r"mesh must be a Mesh; got {}\. Make one with .* or Surface\(polydata\)\.mesh$"
+    for given, name in ((np.zeros((4, 3)), "ndarray"), (polydata, "PolyData")):
+        with pytest.raises(sd.errors.MeshError, match=says.format(name)):
+            call(given)
+    assert isinstance(sd.Surface(polydata).mesh, sd.Mesh)

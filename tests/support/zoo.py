@@ -389,7 +389,9 @@ def _crossed() -> Soup:
 
 
 LEFT, RIGHT = np.flatnonzero(_left(-2.4)), np.flatnonzero(~_left(2.4))
-NEED_ONE = {"selection in a session": "requires at least one vertex"}
+NEED_ONE = {
+    f"selection in {each}": "requires at least one vertex" for each in ("a session", "deform")
+}
 SELECTIONS = [  # (fixed, handle)
     Creature("both ends", lambda: (LEFT, RIGHT)),
     Creature("masks", lambda: (_mask(*LEFT), _mask(*RIGHT))),

@@ -7,11 +7,13 @@ With ``--json`` it prints one object with these keys:
     components, closed          their number; whether none has a border
     holes                       number of edges of each border
     encloses                    whether each component encloses a volume
+    flattened                   whether it does not because it is an open body pressed flat
     volume_under_lids           whether some volume is preserved under lids over holes
     volume                      the volume in words
     workarounds                 what the mesh has differently: objects with kind, text and count,
                                 the number of given points there
-    faults, notes               of the triangles as given: objects with kind, text and count
+    faults, notes               of the triangles as given: objects with kind, text and count; the
+                                note "single precision" counts triangles that have collapsed
     self_intersections          pairs of faces of the mesh that intersect
     can_be_deformed, reason     whether there is a mesh, and otherwise why not
 """
@@ -25,6 +27,7 @@ from typing import Any
 import numpy as np
 
 from .. import io
+from ..arrays import FloatArray, IntArray
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface, repair_surface, triangles_of
@@ -33,6 +36,8 @@ from ..progress import Progress
 from .outputs import Say
 
 _MOST_HOLES = 10  # listed one by one
+_SINGLE = "single precision"  # the kind of a note
+_COARSE = 1e-3  # of the median edge: larger steps between coordinates are worth a note
 
 
 def check(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -56,7 +61,8 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
 
 def described(given: Any, name: str) -> dict[str, Any]:
     """Return the object that ``--json`` prints, of a pyvista.PolyData named *name*."""
-    report = find_faults(np.asarray(given.points, dtype=np.float64), triangles_of(given))
+    points, faces = np.asarray(given.points, dtype=np.float64), triangles_of(given)
+    report = find_faults(points, faces)
     found: dict[str, Any] = {
         "file": name,
         "points": given.n_points,
@@ -67,10 +73,11 @@ def described(given: Any, name: str) -> dict[str, Any]:
         "closed": report.is_two_manifold,
         "holes": [],
         "encloses": [],
+        "flattened": [],
         "volume_under_lids": False,
         "workarounds": [],
         "faults": [_counted(fault) for fault in report.faults],
-        "notes": [_counted(note) for note in report.notes],
+        "notes": [*map(_counted, report.notes), *_of_precision(points, faces)],
         "self_intersections": None,
         "can_be_deformed": False,
         "reason": None,
@@ -104,10 +111,34 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
         "closed": mesh.is_closed,
         "holes": sorted((len(loop) for loop in mesh.borders), reverse=True),
         "encloses": lids.encloses.tolist(),
+        "flattened": lids.flattened.tolist(),
         "volume_under_lids": bool(lids.used.any()),
         "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
     }
+
+
+def _of_precision(points: FloatArray, faces: IntArray) -> list[dict[str, Any]]:
+    """Return a note if *points* (p, 3) are rounded to coarse steps of single precision."""
+    corners = points[faces]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has a fault of its own
+        single = corners.astype(np.float32)
+        if not len(faces) or not np.isfinite(single).all() or (single != corners).any():
+            return []
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    edge = float(np.median(lengths[lengths > 0.0])) if lengths.any() else 0.0
+    step = float(np.spacing(np.abs(single).max()))
+    if step <= _COARSE * edge:
+        return []
+    a, b, c = np.moveaxis(corners, 1, 0)
+    collapsed = int((np.cross(b - a, c - a) == 0.0).all(axis=1).sum())
+    lost = f"{counted(collapsed, 'triangle has', 'triangles have')} collapsed; "
+    text = (
+        "coordinates are in single precision, at this distance from the origin in steps of "
+        f"{step:.2g} (median edge {edge:.2g}); {lost if collapsed else ''}move the model to the "
+        "origin before you export it, or export in double precision"
+    )
+    return [{"kind": _SINGLE, "text": text, "count": collapsed}]
 
 
 def _counted(fault: Any) -> dict[str, Any]:
@@ -120,14 +151,18 @@ def _print(found: dict[str, Any], say: Say) -> None:
     given = f"{found['file']}: {found['points']} points, {polygons}"
     if not found["can_be_deformed"]:
         say(f"{given}: {found['reason']}")
+        _print_precision(found, say)
         return
     parts = counted(found["components"], "component", "components")
     faces = counted(found["faces"], "face", "faces")
     say(f"{given}; as a mesh {found['vertices']} vertices, {faces}, {parts}")
     say(f"It can be deformed as it is. {found['volume']}.")
+    if any(found["flattened"]):
+        say("  --lids on preserves the volume of a flattened body, unless it is 0")
     for each in found["workarounds"]:
         if each["kind"] != "hole":
             say(f"  {each['text']}")
+    _print_precision(found, say)
     holes = found["holes"]
     if holes:
         most = ", ".join(map(str, holes[:_MOST_HOLES])) + (
@@ -137,6 +172,12 @@ def _print(found: dict[str, Any], say: Say) -> None:
     if found["self_intersections"]:
         pairs = counted(found["self_intersections"], "pair", "pairs")
         say(f"  {pairs} of faces intersect; this does not prevent a deformation")
+
+
+def _print_precision(found: dict[str, Any], say: Say) -> None:
+    for note in found["notes"]:
+        if note["kind"] == _SINGLE:
+            say(f"  {note['text']}")
 
 
 def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> bool:

@@ -358,8 +358,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--regions", type=_count, default=None, metavar="N", help=text)
     text = "total cage vertices (default: by the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
-    text = "whether open parts enclose a volume under lids over their holes (default: auto)"
-    add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
+    _contact_and_lids(parser)
     _refine(parser)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
@@ -382,15 +381,20 @@ def _handles(parser: argparse.ArgumentParser) -> None:
         )
     add("--no-volume", action="store_true", help="do not preserve the volume")
     add("--avoid-folds", action="store_true", help="keep the body from turning inside out")
-    add("--avoid-contact", action="store_true", help="keep parts of the surface from crossing")
-    text = "whether open parts enclose a volume under lids over their holes (default: auto)"
-    add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
+    _contact_and_lids(parser)
     text = "stretch resistance relative to detail preservation (default: 10)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
     _refine(parser)
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
+
+
+def _contact_and_lids(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--avoid-contact", action="store_true", help="keep parts of the surface from crossing")
+    text = "whether open parts enclose a volume under lids over their holes (default: auto)"
+    add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
 
 
 def _refine(parser: argparse.ArgumentParser) -> None:

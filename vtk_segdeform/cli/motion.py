@@ -42,6 +42,18 @@ def parse_vector(text: str, name: str) -> FloatArray:
     return numbers
 
 
+def coordinate_text(x: float, size: float) -> str:
+    """Return the coordinate *x* in 6 digits, or in as many as show 1e-6 of a mesh's *size*.
+
+    Examples
+    --------
+    >>> coordinate_text(1 / 3, 2.0), coordinate_text(1e6 + 1 / 3, 2.0)
+    ('0.333333', '1000000.33333')
+    """
+    digits = next(d for d in range(6, 17) if d == 16 or abs(x) <= size * 10.0 ** (d - 6))
+    return f"{x:.{digits}g}"
+
+
 def parse_rotation(text: str) -> tuple[FloatArray, float]:
     """Parse "z,60" or "1,0,1,60"; return the unit axis (3,) and the angle in radians.
 

@@ -52,6 +52,13 @@ def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     say(f"status          {solution.status}")
 
 
+def report_crossings(solution: Solution, say: Say) -> None:
+    """Print how many faces cross others that did not at rest, and what to do about it."""
+    count = len(solution.crossings())
+    advice = ": move less, or add cage vertices" if count else ""
+    say(f"crossings       {count} faces cross that did not at rest{advice}")
+
+
 def report_volume(change: float, say: Say) -> None:
     """Print the relative change of the volume."""
     say(f"volume change   {change:+.1e} of the original volume")

@@ -17,8 +17,8 @@ from ..mesh import Mesh, distance_to_surface
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
 from .commands import LIDS
-from .motion import parse_vector
-from .outputs import HANDLE_TOLERANCE, Say, report_surface, report_volume
+from .motion import coordinate_text, parse_vector
+from .outputs import HANDLE_TOLERANCE, Say, report_crossings, report_surface, report_volume
 
 _FARTHEST = 0.05  # diagonals between a given point and the surface
 
@@ -37,8 +37,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"volume          {lids_of(mesh, lids).summary(preserved=True)}")
     vertex = _nearest(mesh, at, "at")
     pinned = [_nearest(mesh, pin, "pin") for pin in pins]
-    grabbed = ", ".join(f"{x:.6g}" for x in mesh.vertices[vertex])
-    say(f"grabbed         vertex {vertex} of the mesh at {grabbed}")
+    say(f"grabbed         vertex {vertex} of the mesh at {_place(mesh, vertex)}")
     start = time.perf_counter()
     solution = pulled(
         mesh,
@@ -50,6 +49,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         lids=lids,
+        avoid_contact=options.avoid_contact,
         refine=options.refine,
         progress=progress,
     )
@@ -58,6 +58,8 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
     say(f"status          {solution.status}")
+    if options.avoid_contact:
+        report_crossings(solution, say)
     surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")
     if options.picture is not None:
@@ -78,9 +80,12 @@ def _nearest(mesh: Mesh, point: FloatArray, name: str) -> int:
     vertex = int(np.linalg.norm(mesh.vertices - point, axis=1).argmin())
     apart = float(distance_to_surface(point[None], mesh.vertices, mesh.faces)[0]) / mesh.diagonal
     if apart > _FARTHEST:
-        x = ",".join(f"{x:.6g}" for x in mesh.vertices[vertex])
         raise ConstraintError(
             f"--{name} is {100 * apart:.3g} % of model size away from the surface; give a point on "
-            f"it. The nearest vertex is at {x}"
+            f"it. The nearest vertex is at {_place(mesh, vertex)}"
         )
     return vertex
+
+
+def _place(mesh: Mesh, vertex: int) -> str:
+    return ",".join(coordinate_text(x, mesh.diagonal) for x in mesh.vertices[vertex])

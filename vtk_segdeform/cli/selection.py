@@ -33,6 +33,7 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConstraintError
 from ..files import open_regular
+from .motion import coordinate_text
 
 Role = Literal["fixed", "handle"]
 
@@ -176,6 +177,8 @@ def _short(text: str) -> str:
 
 def _extent(points: FloatArray) -> str:
     low, high = points.min(axis=0), points.max(axis=0)
+    size = float(np.linalg.norm(high - low))
     return ", ".join(
-        f"{axis} {a:.6g}..{b:.6g}" for axis, a, b in zip("xyz", low, high, strict=True)
+        f"{axis} {coordinate_text(a, size)}..{coordinate_text(b, size)}"
+        for axis, a, b in zip("xyz", low, high, strict=True)
     )

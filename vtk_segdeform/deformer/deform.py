@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from .. import sizes
 from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
-from ..errors import Cancelled, SegDeformError
+from ..errors import Cancelled, ConstraintError, SegDeformError
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -69,7 +69,8 @@ def deform(
         None does so for meshes of at most 100,000 vertices, where it takes less time than all the
         rest; a pose that cannot be finished is returned as it is.
     progress : Progress, optional
-        Called while cages are fitted and bound, and before every step; may cancel.
+        Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
+        before every step.  It cancels by raising `Cancelled`.
 
     Returns
     -------
@@ -78,7 +79,9 @@ def deform(
     Raises
     ------
     ConstraintError
-        If *fixed*, *handle* or *targets* are invalid.
+        If *fixed*, *handle* or *targets* are invalid, or *handle* is empty.
+    Cancelled
+        If *progress* raised it.
     """
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
@@ -87,6 +90,10 @@ def deform(
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     stays, moves = checked_constraints(mesh, fixed, handle)
+    if not len(moves):
+        raise ConstraintError(
+            "deform requires at least one vertex in handle; got none. Select the vertices to move"
+        )
     places = checked_targets(targets, len(moves))
     regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices

@@ -267,7 +267,8 @@ class Deformer:
     cache : path, optional
         A folder in which bindings are kept and found again; see `binding_cache`.
     progress : Progress, optional
-        Called while binding; may cancel.
+        Called with the fraction done, 0 to 1, and a text, while binding.  It cancels by raising
+        `Cancelled`.
 
     Raises
     ------
@@ -277,6 +278,8 @@ class Deformer:
         If there is not one cage per region, or a cage does not enclose its region.
     RegionError
         If *regions* belong to another mesh, or *blend* is no partition of unity over them.
+    Cancelled
+        If *progress* raised it.
     """
 
     _lids: Lids
@@ -601,7 +604,8 @@ class Deformer:
             `Solution.targets`, or still the last one.  The next call continues.  Once these targets
             are reached, further calls converge as they do without *within*.
         progress : Progress, optional
-            Called before every step; may cancel, which restores the pose before the call.
+            Called before every step; may raise `Cancelled`, which restores the pose before the
+            call.
 
         Raises
         ------
@@ -649,7 +653,7 @@ class Deformer:
         solution : Solution
             That of the last solve, or a finished one, which is finished further.
         progress : Progress, optional
-            Called before every step; may cancel.
+            Called before every step; may raise `Cancelled`.
 
         Returns
         -------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, suggested_size
+from ..checks import as_flag
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import segment
@@ -35,6 +36,7 @@ def pull(
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     lids: bool | None = None,
+    avoid_contact: bool = False,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -64,10 +66,13 @@ def pull(
         Total number of cage vertices; by default it follows the number of regions.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
+    avoid_contact : bool
+        Keep parts of the surface from crossing each other; see `Deformer`.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
     progress : Progress, optional
-        Called while cages are fitted and bound, and before every step; may cancel.
+        Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
+        before every step.  It cancels by raising `Cancelled`.
 
     Returns
     -------
@@ -77,6 +82,8 @@ def pull(
     ------
     ConstraintError
         If *vertex*, *to*, *radius*, *pins* or *locality* are invalid.
+    Cancelled
+        If *progress* raised it.
 
     Examples
     --------
@@ -89,6 +96,7 @@ def pull(
     """
     require_mesh(mesh)
     as_lids(lids)
+    as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     vertex = checked_vertex(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [vertex], "pins")
@@ -102,8 +110,9 @@ def pull(
     cages = fit_cages(mesh, regions, size, density="thickness", progress=fitting)
     binding = part(progress, 0.7, 0.9)
     deformer = Deformer(
-        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, progress=binding
-    )
+        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,
+        progress=binding,
+    )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
     solution = deformer.solve(target, progress=part(progress, 0.9, 0.95))

@@ -241,5 +241,5 @@ def require_mesh(mesh: object) -> None:
     if not isinstance(mesh, Mesh):
         raise MeshError(
             f"mesh must be a Mesh; got {type(mesh).__name__}. Make one with Mesh(vertices, faces), "
-            "read_mesh(path) or convert.from_polydata(polydata)"
+            "read_mesh(path) or Surface(polydata).mesh"
         )

@@ -63,7 +63,7 @@ def segment(
     seed : int
         Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
-        Called with the fraction done; may raise `errors.Cancelled`.
+        Called with the fraction done; may raise `Cancelled`.
 
     Returns
     -------

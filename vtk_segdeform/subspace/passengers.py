@@ -96,7 +96,7 @@ def bind_passengers(
     points : (k, 3) float
         The passengers at rest; inside the body, on it, or not far from it.
     progress : Progress, optional
-        Called as the coordinates in each cage are computed; may cancel.
+        Called as the coordinates in each cage are computed; may raise `Cancelled`.
     """
     require_mesh(mesh)
     cages = all_of(cages, Cage, "cages")

@@ -96,7 +96,7 @@ class Film:
         fps : float
             Pictures per second.
         progress : Progress, optional
-            Called before every picture; may cancel, in which case nothing is written.
+            Called before every picture; may raise `Cancelled`, in which case nothing is written.
 
         Raises
         ------
