@@ -30,6 +30,7 @@ from vtk_segdeform.cages.simplify import (
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
 from vtk_segdeform.errors import Cancelled, MeshError
+from vtk_segdeform.finish import CellEnergy
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.local_volume import LocalVolume
 from vtk_segdeform.geometry.normals import VertexNormals
@@ -214,6 +215,16 @@ def test_the_same_faces_intersect(twin, monkeypatch, soup, seed, far):
     quick, slow = twin(lambda: np.unique(intersections_of(points, faces, some), axis=0))
     assert len(quick) > 1
     assert_array_equal(quick, slow)
+
+
+def test_energies_of_cells_agree(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.finish.cell_energy._PIECE", 500)
+    mesh = models.cactus(1500)  # its vertices have different degrees
+    energy = CellEnergy.of(mesh)
+    x = mesh.vertices + 0.05 * RNG.normal(size=mesh.vertices.shape)
+    (quick, steep), (slow, steeper) = twin(lambda: energy.value_and_slope(x))
+    assert quick == pytest.approx(slow, rel=1e-12)
+    assert_allclose(steep, steeper, atol=1e-12)
 
 
 @pytest.mark.parametrize("far", [0.0, 1e3])

@@ -211,12 +211,13 @@ def test_a_finished_pose_rotates_with_its_handles():
     # A handle made in a finished pose is where the cages do not put it.
     away = np.abs(plain - scene.mesh.vertices).sum(axis=1)
     away[session.state.handle] = 0.0
-    session.add_handle(np.argsort(away)[-12:], "more")
+    session.add_handle(np.argsort(away)[-6:], "more")
     assert rotated(session, rotation([0.0, 1.0, 0.0], 1.0)) < 1e-3
     session.finish()
     assert session.solution is not None
     assert session.solution.handle_error < 1e-12
-    assert rotated(session, rotation([0.0, 0.0, 1.0], 1.0)) < 1e-4
+    # The cages meet the places of a few single vertices less accurately.
+    assert rotated(session, rotation([0.0, 0.0, 1.0], 1.0)) < 1e-3
 
 
 def test_a_finish_fades_as_the_pose_is_bent_back_and_comes_again():

@@ -180,6 +180,7 @@ class _Volumes:
         joined = sparse.coo_array((np.ones(len(i)), (i, j)), (n, n))
         ring = joined + joined.T + sparse.eye_array(n)
         self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
+        self._average_back = self._average.T.tocsr()
         edge = float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
         rounds = (_WIDTH * float(np.median(diameter)) / edge) ** 2
         self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
@@ -208,7 +209,7 @@ class _Volumes:
         corners v of T, the sum of u_j L_j over j is one of P . (e x f) / 18 over the triangles.
         """
         for _ in range(self._rounds):
-            weights = np.asarray(self._average.T @ weights)
+            weights = np.asarray(self._average_back @ weights)
         share, faces = weights / 18.0, self._faces
         if kernels := compiled_kernels(len(faces)):
             kernels.opposite_slope(

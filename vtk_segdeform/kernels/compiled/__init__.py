@@ -6,7 +6,8 @@
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
     normals         `normals.VertexNormals`
-    rotations       `rotations.closest_rotations`
+    rotations       `rotations.closest_rotations`, `cell_energy.CellEnergy`
+    cells           `cell_energy.CellEnergy`
     factor          `hessian.Factor`
     collapses       `simplify.simplify`
     half_edges      `topology.HalfEdges`, `grouping.connected`,
@@ -25,6 +26,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .beams import beam_meets, beyond_sides
+from .cells import cell_loads, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import solve_factored
@@ -83,6 +85,8 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
+    "cell_loads",
+    "cell_sums",
     "collapse_costs",
     "convex_cuts",
     "corners_of_lines",
@@ -120,6 +124,7 @@ __all__ = [
     "shell_sums",
     "solve_factored",
     "sorted_edges",
+    "spread_cells",
     "touching_boxes",
     "used_vertices",
     "valid_collapses",

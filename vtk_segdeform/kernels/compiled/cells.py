@@ -1,0 +1,58 @@
+"""Sums over the cells of vertices, for `cell_energy`; `start` to `stop` are rows of outputs."""
+
+from __future__ import annotations
+
+from .kernels import kernel
+
+_compile = kernel()
+
+
+@_compile
+def cell_sums(sums, product, x, indptr, indices, weights, start, stop):
+    """Put sum_j k_ij x_j^T into *sums* (n, 9), and sum_j C_ij x_j into *product* (n, 3).
+
+    *weights* (m, 4) has C_ij and k_ij of each entry.
+    """
+    for i in range(start, stop):
+        for c in range(9):
+            sums[i, c] = 0.0
+        product[i, 0] = product[i, 1] = product[i, 2] = 0.0
+        for at in range(indptr[i], indptr[i + 1]):
+            j = indices[at]
+            a, b, c = x[j, 0], x[j, 1], x[j, 2]
+            for row in range(3):
+                k = weights[at, 1 + row]
+                sums[i, 3 * row] += k * a
+                sums[i, 3 * row + 1] += k * b
+                sums[i, 3 * row + 2] += k * c
+            product[i, 0] += weights[at, 0] * a
+            product[i, 1] += weights[at, 0] * b
+            product[i, 2] += weights[at, 0] * c
+
+
+@_compile
+def spread_cells(out, values, indptr, indices, given, taken, share, start, stop):
+    """Put (1 - share) v_i + share taken_i sum_j given_j v_j into *out* (n, 9), v being *values*."""
+    for i in range(start, stop):
+        for c in range(9):
+            out[i, c] = 0.0
+        for at in range(indptr[i], indptr[i + 1]):
+            j = indices[at]
+            for c in range(9):
+                out[i, c] += given[j] * values[j, c]
+        for c in range(9):
+            out[i, c] = (1.0 - share) * values[i, c] + share * taken[i] * out[i, c]
+
+
+@_compile
+def cell_loads(load, rotations, indptr, indices, transposed, start, stop):
+    """Put sum_i R_i^T k_ij of each j into *load* (n, 3); *transposed* (m, 3) has k_ij in row j."""
+    for j in range(start, stop):
+        a = b = c = 0.0
+        for at in range(indptr[j], indptr[j + 1]):
+            i = indices[at]
+            u, v, w = transposed[at, 0], transposed[at, 1], transposed[at, 2]
+            a += rotations[i, 0] * u + rotations[i, 1] * v + rotations[i, 2] * w
+            b += rotations[i, 3] * u + rotations[i, 4] * v + rotations[i, 5] * w
+            c += rotations[i, 6] * u + rotations[i, 7] * v + rotations[i, 8] * w
+        load[j, 0], load[j, 1], load[j, 2] = a, b, c
