@@ -76,7 +76,7 @@ class Controller:
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         load_late()
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
@@ -137,7 +137,8 @@ class Controller:
 
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
-        self.help.list_keys(self.keys.sections(), self.keys.sections(self._mode))
+        keys = self.keys
+        self.help.list_keys(keys.sections(), keys.sections(self._mode), keys.cap("help"))
 
     @property
     def is_on(self) -> bool:

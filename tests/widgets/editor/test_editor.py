@@ -551,12 +551,16 @@ def test_the_help_card_is_shown_and_hidden(bench):
     without, card = picture(bench.view), bench.editor.controller.help
     bench.type("h")
     assert (picture(bench.view) != without).any()
-    bench.type("h")
+    for _ in range(5):  # pages
+        bench.type("h")
+        picture(bench.view)
+        if not card.is_shown:
+            break
     assert_array_equal(picture(bench.view), without)
     for key in ("question", "F1"):
         bench.type(key)
         assert card.is_shown
-        bench.type("Escape" if key == "F1" else key)
+        bench.type("Escape")
         assert not card.is_shown
 
 
@@ -918,7 +922,7 @@ def test_a_window_of_one_pixel_is_drawn_without_warnings(bench, capfd):
     bench.type("h")
     for size in ((1, 300), (300, 1), (1, 1), (300, 300)):
         if size == (300, 300):
-            bench.type("h")  # laying out the card takes most of the time
+            bench.type("Escape")  # laying out the card takes most of the time
         bench.view.window.SetSize(*size)
         View.render(bench.view)
     assert capfd.readouterr() == ("", "")

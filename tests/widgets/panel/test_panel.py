@@ -211,7 +211,7 @@ def test_the_toolbar_and_the_menu_do_what_they_say():
         assert not editor.controller.shows_rest
         press(editor, "help")
         assert editor.controller.help.is_shown
-        press(editor, "help")
+        editor.run("cancel")
         for name in ("show_regions", "show_cages", "orthographic", "cube", "up_x"):
             name, now = f"view.{name}", entries(editor)
             assert now[name].kind == "toggle"
