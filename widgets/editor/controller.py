@@ -267,6 +267,9 @@ class Controller:
         self.refresh()
 
     def _gesture_began(self, *_: object) -> None:
+        marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
+        if marker is not None:
+            self.widgets.dragger.handle = marker  # which the panel selects
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if self._mode is Mode.PULL:
