@@ -149,6 +149,10 @@ class HandleDragger(Widget):
         """Whether that timer is running."""
         return self._live.is_refining
 
+    def stop_refining(self) -> None:
+        """Leave the current pose as it is, even if it has not converged."""
+        self._live.halt()
+
     def resume_refining(self) -> None:
         """Refine the current pose if it has not converged, the widget is on and it may refine."""
         if self.GetEnabled():
