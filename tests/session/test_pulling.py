@@ -377,7 +377,9 @@ def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for()
     session.change_options(n_cage_vertices=40)
     session.undo()
     session.change_options(n_cage_vertices=60)
-    prepared = session.preparation()
+    told = {}
+    prepared = session.preparation(lambda fraction, message: told.setdefault(message, fraction))
+    assert told["cages ready"] < 0.35  # measured: 17 to 50 % of the time, the less the larger
     assert session.regions is None
     assert sum(cage.n_vertices for cage in prepared.cages) == 60
     heard = []

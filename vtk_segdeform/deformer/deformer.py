@@ -51,7 +51,7 @@ from ..freezing import read_only
 from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
-from ..progress import Progress, tell
+from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import (
     LONGEST_MOVE,
@@ -117,6 +117,7 @@ _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
+_BOUND = 0.95  # of the progress bar, before the trial step
 _PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 1.0  # weight of `locality` from which a finish moves nothing: at 1.4 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -343,7 +344,7 @@ class Deformer:
         inputs = BindingInputs(
             self._rest, regions, cages, self._rest_cages, self._own_blend, stretch, rotation_groups
         )
-        self._binding = cached_binding(inputs, folder, progress)
+        self._binding = cached_binding(inputs, folder, part(progress, 0.0, _BOUND))
 
         at_origin = self._frame.about_origin(mesh.vertices)
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
@@ -351,7 +352,7 @@ class Deformer:
         self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
-            tell(progress, 0.99, "taking a trial step")
+            tell(progress, _BOUND, "taking a trial step")
             self._take_trial_step()
         tell(progress, 1.0, "ready")
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
 from ..mesh import Mesh, require_mesh
-from ..progress import Progress, part
+from ..progress import Progress
 from ..regions import segment
 from ..solver import Solution
 from .arguments import (
@@ -21,7 +21,7 @@ from .arguments import (
     checked_vertex,
     reach_and_follows,
 )
-from .deform import checked_refine, finished
+from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
 
 
@@ -104,16 +104,15 @@ def pull(
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
     if locality is None:
         locality = automatic_locality(len(fixed))
-    regions = segment(mesh, n_regions, progress=part(progress, 0.0, 0.2))
+    stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
+    regions = segment(mesh, n_regions, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
-    fitting = part(progress, 0.2, 0.7)
-    cages = fit_cages(mesh, regions, size, density="thickness", progress=fitting)
-    binding = part(progress, 0.7, 0.9)
+    cages = fit_cages(mesh, regions, size, density="thickness", progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,
-        progress=binding,
+        progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
-    solution = deformer.solve(target, progress=part(progress, 0.9, 0.95))
-    return finished(deformer, solution, refine, progress=part(progress, 0.95, 1.0))
+    solution = deformer.solve(target, progress=next(stages))
+    return finished(deformer, solution, refine, progress=next(stages))

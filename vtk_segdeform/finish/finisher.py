@@ -155,7 +155,7 @@ class Finisher:
             if not len(least):
                 break
             stays |= around(self._mesh, crossing, rings)
-            own = part(progress, *(0.8 * (turn + np.arange(2)) / len(_PARTLY)))
+            own = part(progress, *(0.5 * (turn + np.arange(2)) / len(_PARTLY)))
             held = self._held | stays
             places = begin[held] + share * (end[held] - begin[held])
             places[self._held[held]] = end[self._held]
@@ -167,8 +167,8 @@ class Finisher:
                 best, least = found, crossing
         if len(least) and not len(before):
             return Finish(begin, (), steps)
-        x = self._without_creases(best.vertices, part(progress, 0.8, 0.9))
-        opened = self._without_folds(x, part(progress, 0.9, 1.0))
+        x = self._without_creases(best.vertices, part(progress, 0.5, 0.75))
+        opened = self._without_folds(x, part(progress, 0.75, 1.0))
         if len(self._crossing(opened)) <= len(self._crossing(x)):
             x = opened
         return replace(best, vertices=x, steps=steps)

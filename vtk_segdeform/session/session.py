@@ -61,6 +61,9 @@ if TYPE_CHECKING:
     from ..io import Surface
 
 _ROUNDING = 1e-9  # diagonals: distance of cage vertices that are in the same place
+# Of the progress of a preparation, when it has regions and when it has cages.  Of the time it is a
+# quarter and a half for 5,000 vertices, and a tenth and a fifth for 300,000.
+_SEGMENTED, _FITTED = 0.15, 0.3
 
 
 class Effort(NamedTuple):
@@ -470,12 +473,12 @@ class Session(Timeline):
         """
         regions, options = self.regions, self.options
         if regions is None:
-            regions = segment(self.mesh, None, progress=part(progress, 0.0, 0.2))
+            regions = segment(self.mesh, None, progress=part(progress, 0.0, _SEGMENTED))
         cages = self.cages
         if not cages:
-            cages = self._cages_around(regions, part(progress, 0.2, 0.5))
+            cages = self._cages_around(regions, part(progress, _SEGMENTED, _FITTED))
         state = State(regions, cages, options=options)
-        deformer = PoseSolver(self.mesh).bind(state, part(progress, 0.5, 1.0))
+        deformer = PoseSolver(self.mesh).bind(state, part(progress, _FITTED, 1.0))
         return Preparation(regions, cages, deformer)
 
     def accept(self, preparation: Preparation) -> bool:

@@ -1,6 +1,7 @@
 """Saving the window's document: as a session, a mesh or a picture, with the dialogs before.
 
-Every function takes the `Window` and returns whether the file was written.
+Every function takes the `Window` and returns whether the file was written, or will be once the pose
+has settled.
 """
 
 from __future__ import annotations
@@ -29,20 +30,13 @@ def save_session(window: Any) -> bool:
     path = window.document.session_path
     if path is None:
         return save_session_as(window)
-    if not _done(window, saving(path)):
-        return False
-    window.set_document(window.document)
-    return True
+    return _done(window, saving(path, lambda: window.set_document(window.document)))
 
 
 def save_session_as(window: Any) -> bool:
     """Ask for a file and save the session there; it becomes the session's file."""
     path = _path(window, "Save session", _SESSIONS, SUFFIX)
-    if path is None or not _done(window, saving(path)):
-        return False
-    window.set_document(replace(window.document, session_path=path, name=path.name))
-    window.recent.add(path)
-    return True
+    return path is not None and _done(window, saving(path, lambda: _session_saved(window, path)))
 
 
 def save_mesh(window: Any) -> bool:
@@ -50,10 +44,7 @@ def save_mesh(window: Any) -> bool:
     path = window.document.mesh_path
     if path is None:
         return save_mesh_as(window)
-    done = _done(window, exporting(path))
-    if done:
-        window.mesh_state = window.session.state
-    return done
+    return _done(window, exporting(path, lambda: _mesh_saved(window, path)))
 
 
 def save_mesh_as(window: Any) -> bool:
@@ -61,11 +52,7 @@ def save_mesh_as(window: Any) -> bool:
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
     path = _path(window, "Save mesh", MESH_FILES, suffix)
-    if path is None or not _done(window, exporting(path)):
-        return False
-    window.set_document(replace(window.document, mesh_path=path))
-    window.mesh_state = window.session.state
-    return True
+    return path is not None and _done(window, exporting(path, lambda: _mesh_saved(window, path)))
 
 
 def export_picture(window: Any) -> bool:
@@ -80,7 +67,30 @@ def may_discard(window: Any) -> bool:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
-    return save_session(window) if answer is Answer.SAVE else answer is Answer.DISCARD
+    return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD
+
+
+def _saved_now(window: Any) -> bool:
+    """Save the session, and wait until that is done; the window is drawn meanwhile."""
+    if not save_session(window):
+        return False
+    events, settling = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller.settling
+    while settling.is_active:
+        QtWidgets.QApplication.processEvents(
+            events.ExcludeUserInputEvents | events.WaitForMoreEvents
+        )
+    settling.flush()
+    return not window.is_modified
+
+
+def _session_saved(window: Any, path: Path) -> None:
+    window.set_document(replace(window.document, session_path=path, name=path.name))
+    window.recent.add(path)
+
+
+def _mesh_saved(window: Any, path: Path) -> None:
+    window.set_document(replace(window.document, mesh_path=path))
+    window.mesh_state = window.session.state
 
 
 def _done(window: Any, action: Action) -> bool:

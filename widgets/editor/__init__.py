@@ -11,6 +11,7 @@ The files, in reading order:
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
+    settling         a pose that converges after its release, and saving after that
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to
     recordings       recordings of input and video

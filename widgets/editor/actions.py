@@ -94,7 +94,17 @@ def save(controller: Controller) -> None:
     place = controller.place
     question = f"{place} already exists. Save again to replace it"
     if controller.file.may_replace(place) or controller.messages.confirms(question):
-        controller.save()
+        once_settled(Controller.save)(controller)
+
+
+def once_settled(action: Action) -> Action:
+    """Return the action that waits until the pose has settled."""
+
+    def wait(controller: Controller) -> None:
+        if controller.settling.then(lambda: action(controller)):
+            controller.say("Saving once the pose has settled")
+
+    return wait
 
 
 def open_file(controller: Controller) -> None:

@@ -34,6 +34,7 @@ from .notices import Notices
 from .preparing import Preparing
 from .recordings import Recordings
 from .session_file import SessionFile, is_mesh, read_session
+from .settling import Settling, is_unsettled
 from .widget_set import WidgetSet
 
 T = TypeVar("T")
@@ -69,6 +70,8 @@ class Controller:
         The current recording of input and of video.
     camera : Camera
         Navigation, views and the orientation cube.
+    settling : Settling
+        A pose that converges after its release; saving waits for it.
     finishing : Finishing
         Finishes the pose on the mesh after each drag.
     """
@@ -76,7 +79,7 @@ class Controller:
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         load_late()
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
         self.messages.note(advice())
         self.notices = Notices(view, lambda: self.messages.height)
@@ -93,6 +96,7 @@ class Controller:
             self._prepare_pulls,
             self.refresh,
         )
+        self.settling = Settling(view, lambda: self.widgets, self.refresh)
         self.finishing = Finishing(
             view,
             lambda: self.session,
@@ -137,7 +141,8 @@ class Controller:
 
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
-        self.help.list_keys(self.keys.sections(), self.keys.sections(self._mode))
+        keys = self.keys
+        self.help.list_keys(keys.sections(), keys.sections(self._mode), keys.cap("help"))
 
     @property
     def is_on(self) -> bool:
@@ -152,6 +157,7 @@ class Controller:
             try:
                 if not on:
                     self.help.hide()
+                    self.settling.flush()
                     self._preparing.stop()
                     self.finishing.interrupt()
                     self._worker.cancel()
@@ -165,6 +171,7 @@ class Controller:
         self._stop_listening()
         self._stop_failures()
         self.recordings.remove()
+        self.settling.remove()
         self.finishing.remove()
         self.camera.remove()
         self.widgets.remove()
@@ -196,6 +203,7 @@ class Controller:
         """Update the status line."""
         mode = " · ".join([f"{self._mode.value} {self._mode.name}", *self.recordings.labels])
         job = self._worker.job
+        self.settling.follow()
         if job is not None:
             self.messages.show_progress(
                 mode, self._worker.text, job.fraction, is_cancelled=job.is_cancelled
@@ -204,8 +212,9 @@ class Controller:
             fraction = self._preparing.fraction
             preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
             work, fraction = "Preparing", preparing
-            if preparing is None and self.finishing.fraction is not None:
-                work, fraction = "Finishing", self.finishing.fraction
+            for running in (self.settling, self.finishing):
+                if fraction is None and running.fraction is not None:
+                    work, fraction = running.work, running.fraction
             self.messages.show(mode, self.hint, fraction, work=work)
         else:
             self.messages.hide()
@@ -266,6 +275,10 @@ class Controller:
         self.refresh()
 
     def _gesture_began(self, *_: object) -> None:
+        marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
+        if marker is not None:
+            self.widgets.dragger.handle = marker  # which the panel selects
+        self.settling.flush()
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if self._mode is Mode.PULL:
@@ -314,6 +327,7 @@ class Controller:
 
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
+            self.settling.flush()
             self._preparing.interrupt()
             self.finishing.interrupt()
             self._worker.start(name, work, deliver)
@@ -333,6 +347,10 @@ class Controller:
             pass
         elif self.help.is_shown:
             self.help.hide()
+        elif self.settling.is_active:
+            self.finishing.interrupt()
+            self.messages.note("Stopped. The pose has not settled")
+            self.settling.stop()
         elif self.finishing.interrupt():
             self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
@@ -420,7 +438,12 @@ class Controller:
         self.finishing.interrupt()
         place = self.place
         self.file.write(self.session, place, self.camera.settings(self._mode))
-        self.say(f"Saved to {place}")
+        self.say(f"Saved to {place}{self.pose_remark}")
+
+    @property
+    def pose_remark(self) -> str:
+        """What to say about a saved pose; "" if it has settled."""
+        return ". The pose had not settled" if is_unsettled(self.session) else ""
 
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""

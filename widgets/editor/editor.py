@@ -183,9 +183,13 @@ class DeformEditor:
         return self.do(binding.action, while_busy=binding.while_busy)  # type: ignore[arg-type]
 
     def save(self, path: str | os.PathLike[str] | None = None) -> None:
-        """Write the session to `path`, after setting it to *path* if given; see `save_session`."""
+        """Write the session to `path`, after setting it to *path* if given; see `save_session`.
+
+        A pose that still converges after its release is converged first.
+        """
         if path is not None:
             self.path = path
+        self._controller.settling.complete()
         self._controller.save()
 
     def load(self, path: str | os.PathLike[str]) -> None:
@@ -288,6 +292,8 @@ class DeformEditor:
                 return SessionError(controller.refusal)
             controller.widgets.finish()
         controller.messages.clear()
+        if not while_busy:
+            controller.settling.flush()
         self._stop_waiting()
         if action is not show_rest:
             controller.show_instead(None)

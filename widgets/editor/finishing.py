@@ -83,6 +83,11 @@ class Finishing:
         return self._fraction
 
     @property
+    def work(self) -> str:
+        """What `fraction` is about."""
+        return "Finishing"
+
+    @property
     def is_pending(self) -> bool:
         """Whether a pose is being finished, or will be in a moment."""
         return self._stop_waiting is not None or self._job is not None

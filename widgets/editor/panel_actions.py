@@ -6,7 +6,7 @@ move the camera work during a job and during a drag, too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from vtk_segdeform.errors import RegionError, SessionError
 
 from ..region_selector import Paint
-from .actions import Action, fit_cages, segment
+from .actions import Action, fit_cages, once_settled, segment
 from .controller import Controller
 from .mode import Mode
 
@@ -172,20 +172,25 @@ def opening(path: Path) -> Action:
     return lambda controller: controller.open(path)
 
 
-def saving(path: Path) -> Action:
-    """Return the action that saves the session to *path*, which becomes its file."""
+def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
+    """Return the action that saves the session to *path*, which becomes its file.
+
+    A pose that still converges is saved once it has settled, and *then* is called.
+    """
 
     def save(controller: Controller) -> None:
         controller.file.path = path
         controller.save()
+        then()
 
-    return save
+    return once_settled(save)
 
 
-def exporting(path: Path) -> Action:
+def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
-    The suffix selects the format, which may not support all arrays: see `io.write_mesh`.
+    The suffix selects the format, which may not support all arrays: see `io.write_mesh`.  A pose
+    that still converges is written once it has settled, and *then* is called.
     """
 
     def export(controller: Controller) -> None:
@@ -194,9 +199,10 @@ def exporting(path: Path) -> Action:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
         session.write_deformed(path)
-        controller.say(f"Mesh saved to {path}")
+        controller.say(f"Mesh saved to {path}{controller.pose_remark}")
+        then()
 
-    return export
+    return once_settled(export)
 
 
 # The camera.

@@ -173,7 +173,7 @@ class WidgetSet:
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""
-        self.session.bind(part(progress, 0.0, 0.9))
+        self.session.bind(part(progress, 0.0, 0.75))  # share of the time
         self.overlay.prepare()
 
     def measure(self, progress: Progress) -> None:

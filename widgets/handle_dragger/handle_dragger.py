@@ -149,6 +149,10 @@ class HandleDragger(Widget):
         """Whether that timer is running."""
         return self._live.is_refining
 
+    def stop_refining(self) -> None:
+        """Leave the current pose as it is, even if it has not converged."""
+        self._live.halt()
+
     def resume_refining(self) -> None:
         """Refine the current pose if it has not converged, the widget is on and it may refine."""
         if self.GetEnabled():
@@ -307,8 +311,8 @@ class HandleDragger(Widget):
     # Display.
 
     def _changed(self, change: Change) -> None:
-        if change & Change.CONSTRAINTS:
-            self._update_handle()
+        if change & (Change.CONSTRAINTS | Change.HISTORY) and not self.session.is_dragging:
+            self._update_handle()  # a pull adds its handle at its first move, but may be cancelled
         if self.GetEnabled():
             if change & (Change.CONSTRAINTS | Change.CAGES):
                 self._marks.show(self.session.is_ready)
@@ -317,17 +321,26 @@ class HandleDragger(Widget):
             self._update_gizmo()
 
     def _update_handle(self) -> None:
-        """Keep the active handle, even if renamed; otherwise activate the first one, if any."""
-        before, now = self._last_handles.get(self._handle or ""), self.session.handles
+        """Keep the active handle, even if renamed, unless there is a new one: activate that.
+
+        Instead of a handle that was removed the newest one is active; at first it is the oldest.
+        """
+        last, now = self._last_handles, self.session.handles
         names = {id(ids): name for name, ids in now.items()}
+        known = {id(ids) for ids in last.values()}
+        new = [name for name, ids in now.items() if name not in last and id(ids) not in known]
         self._locked, self._marks.hidden = (
-            frozenset(names.get(id(self._last_handles.get(name)), name) for name in some)
+            frozenset(names.get(id(last.get(name)), name) for name in some)
             for some in (self._locked, self.hidden)
         )
         self._last_handles = now
-        if self._handle not in now:
-            renamed = (name for name, ids in now.items() if ids is before)
-            self._handle = next(renamed, next(iter(now), None))
+        if new:
+            self._handle = new[-1]
+        elif self._handle is None:
+            self._handle = next(iter(now), None)
+        elif self._handle not in now:
+            renamed = names.get(id(last.get(self._handle)))
+            self._handle = renamed or (list(now)[-1] if now else None)
 
     def _update_gizmo(self) -> None:
         """Place the gizmo at the active handle, or hide it."""

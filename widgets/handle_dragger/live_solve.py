@@ -54,6 +54,7 @@ class LiveSolve:
         self._view, self._session, self._failed = view, session, failed
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
+        self._halted: Solution | None = None  # of the pose that is not to be refined
         self._budget = StepBudget(view.interactor)
         self._draft = Draft.of(view)
 
@@ -83,7 +84,12 @@ class LiveSolve:
         """
         solution = self._session.solution
         is_final = solution is None or solution.status is not Status.STEP_LIMIT
-        if is_final or not self.is_enabled or not self._session.is_bound:
+        if (
+            is_final
+            or solution is self._halted
+            or not self.is_enabled
+            or not self._session.is_bound
+        ):
             self._stop_refining()
         elif self._stop is None:
             self._stop = self._view.every(_PERIOD, self._tick)
@@ -97,6 +103,11 @@ class LiveSolve:
         """Stop refining until `resume`, and draw in full quality."""
         self._draft.end()
         self._stop_refining()
+
+    def halt(self) -> None:
+        """Refine the current pose no more, and draw in full quality."""
+        self._halted = self._session.solution
+        self.pause()
 
     def remove(self) -> None:
         """Stop permanently."""

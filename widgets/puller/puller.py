@@ -142,6 +142,10 @@ class Puller(Widget):
         """Whether a timer refines the pose at present."""
         return self._live.is_refining
 
+    def stop_refining(self) -> None:
+        """Leave the current pose as it is, even if it has not converged."""
+        self._live.halt()
+
     @property
     def marked(self) -> tuple[str, ...]:
         """The names of the pins and pulled points."""
@@ -152,11 +156,12 @@ class Puller(Widget):
         return self._markers.at(self.view.pointer(Phase.HOVER))
 
     def On(self) -> None:  # noqa: N802 - VTK's word
-        """Start handling events, and show pins and pulled points."""
+        """Start handling events, show the pins, and refine a pose that has not converged."""
         if not self.GetEnabled():
             super().On()
             self._stops.append(self.view.observe("LeaveEvent", self._left))
             self._markers.show(True)
+            self._live.resume()
 
     def Off(self) -> None:  # noqa: N802
         """Stop handling events and refining; finish an ongoing gesture."""

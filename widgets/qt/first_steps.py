@@ -1,7 +1,8 @@
 """The first steps, as three cards over the view: pin, pull, done.
 
 They are shown once to each user who has not seen them, in applications that ask for it, until a
-click on them, Escape, or the first pull.  Pictures and videos of the view lack them.
+click on them, Escape, or the first pull; while the keys are listed they make room.  Pictures and
+videos of the view lack them.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ class FirstSteps(QtWidgets.QWidget):
             _Card(self, _DRAWINGS[card.name], card.title, card.sentence) for card in first_steps()
         ]
         self._stop: Callable[[], None] = _nothing
+        self._makes_room = False  # for the list of keys
         self.hide()
         view.installEventFilter(self)
 
@@ -61,9 +63,11 @@ class FirstSteps(QtWidgets.QWidget):
 
     def dismiss(self) -> None:
         """Hide the cards, and do not show them to this user again."""
-        if self.isHidden():
+        if self.isHidden() and not self._makes_room:
             return
+        self._makes_room = False
         self.hide()
+        self._stop()
         if self._settings is not None:
             self._settings.setValue(_KEY, True)
             self._settings.sync()
@@ -84,17 +88,19 @@ class FirstSteps(QtWidgets.QWidget):
         QtWidgets.QApplication.sendEvent(self._view, press)
 
     def showEvent(self, event: Any) -> None:  # noqa: N802
-        """Place the cards, and wait for a pull."""
+        """Place the cards instead of the list of keys, and wait for a pull or for that list."""
         super().showEvent(event)
+        self._editor.controller.help.hide()
         self._place()
         self.raise_()
         self._stop()
-        self._stop = self._editor.controller.messages.on_change(self._dismiss_at_pull)
+        self._stop = self._editor.controller.messages.on_change(self._follow)
 
     def hideEvent(self, event: Any) -> None:  # noqa: N802
-        """Unsubscribe from the editor."""
+        """Unsubscribe from the editor, unless the cards will return."""
         super().hideEvent(event)
-        self._stop()
+        if not self._makes_room:
+            self._stop()
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802
         """Follow the size of the view; dismiss the cards when Escape is pressed there."""
@@ -113,9 +119,13 @@ class FirstSteps(QtWidgets.QWidget):
         if event.type() == QtCore.QEvent.Type.FontChange:
             self._place()
 
-    def _dismiss_at_pull(self) -> None:
+    def _follow(self) -> None:
+        """Dismiss the cards at a pull; hide them while the keys are listed."""
         if self._editor.session.is_dragging or self._editor.widgets.puller.is_waiting:
             self.dismiss()
+        elif self._editor.controller.help.is_shown != self._makes_room:
+            self._makes_room = not self._makes_room
+            self.setVisible(not self._makes_room)
 
     def _place(self) -> None:
         """Put the cards where they hide least of the body; without sentences in a small view."""

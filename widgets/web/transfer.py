@@ -9,6 +9,7 @@ names a file of the server: of NAME only the suffix is used, and the text is sho
 
 from __future__ import annotations
 
+import asyncio
 import re
 import shutil
 import tempfile
@@ -28,6 +29,7 @@ from ..editor import DeformEditor, opening
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
 _LONGEST = 80  # letters of a name
+_PERIOD = 0.05  # seconds between two looks at whether the pose has settled
 UPLOAD_LIMIT = 1 << 30  # bytes
 _COMMON = (".ply", ".obj", ".stl", ".glb", ".off")  # first in the list
 _LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
@@ -106,12 +108,14 @@ class Transfer:
         return _refusal(409, str(error)) if error is not None else web.Response()
 
     async def download(self, request: web.Request) -> web.Response:
-        """Send the session, or the surface in its pose."""
+        """Send the session, or the surface in its pose, once that has settled."""
         suffix = f".{request.match_info['suffix']}"
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may download files.")
         if suffix != _SESSION and suffix not in writable_suffixes():
             return _refusal(404, f"There is no format {suffix}.")
+        while self._editor.controller.settling.is_active:
+            await asyncio.sleep(_PERIOD)
         place = self._new_folder() / f"download{suffix}"
         try:
             self._write(place)

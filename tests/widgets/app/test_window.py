@@ -31,10 +31,12 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import convert
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app import documents
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
 from vtk_segdeform.widgets.editor import preparing
+from vtk_segdeform.widgets.handle_dragger import LiveSolve
 
 BALL = models.sphere(300)
 PREPARED = preparing.lacking
@@ -246,6 +248,36 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
     assert not again.window.isVisible()
     assert slots(tmp_path) == []
     assert start().page is not None  # no recovery is offered
+
+
+@BLANK
+def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes):
+    hand = start(arm_file)
+    session, settling = hand.window.session, hand.window.editor.controller.settling
+    tick, rests = LiveSolve._tick, [True]
+    monkeypatch.setattr(LiveSolve, "_tick", lambda live: None if rests else tick(live))
+    hand.window.editor.mode = Mode.DEFORM
+    hand.settle()
+
+    def bend(by):
+        session.drag({"handle 1": session.targets["handle 1"] + by}, max_steps=1)
+        session.commit()
+        hand.window.editor.widgets.dragger.resume_refining()
+        assert settling.is_active
+
+    bend([0.0, 0.0, 0.4])
+    hand.choose("File", "Save session")
+    assert "Saving once the pose has settled" in hand.window.editor.status
+    rests.clear()
+    until(lambda: not hand.window.is_modified, "the file")
+    assert_array_equal(load_session(arm_file).vertices, session.vertices)
+    rests.append(True)
+    bend([0.0, 0.3, -0.2])
+    rests.clear()
+    boxes.answers.append("Save")
+    assert hand.window.close()
+    assert session.solution.status is not Status.STEP_LIMIT
+    assert_array_equal(load_session(arm_file).vertices, session.vertices)
 
 
 @BLANK

@@ -159,7 +159,7 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     View.render(bench.view)
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert np.array_equal(bench.camera, before)
-    bench.hand.key("F1")
+    bench.hand.key("Escape")
     View.render(bench.view)
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.undo_label is None

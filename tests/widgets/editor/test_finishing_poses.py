@@ -17,7 +17,16 @@ from test_editor import pull_handle as pull_handle_in
 from vtk_segdeform import load_session, read_mesh
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session import save_session
-from vtk_segdeform.widgets.editor import exporting, finishing, finishing_after_drags, opening
+from vtk_segdeform.solver import Status
+from vtk_segdeform.widgets.editor import (
+    exporting,
+    finishing,
+    finishing_after_drags,
+    opening,
+    saving,
+)
+from vtk_segdeform.widgets.editor import settling as settling_poses
+from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.scene import glide
 
@@ -124,6 +133,91 @@ def test_what_is_saved_is_what_was_shown_and_is_not_changed_later(bench, tmp_pat
         bench.hand.tick()
     assert np.array_equal(bench.editor.widgets.surface.points, shown)
     assert bench.editor.controller.file.is_modified(bench.session) == (write == "mesh")
+
+
+@pytest.fixture
+def settling(bench, monkeypatch):  # noqa: F811
+    """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
+    monkeypatch.setattr(settling_poses, "_SHOWN_AFTER", 0.0)
+    bench.editor.do(finishing_after_drags(False))
+    bench.type("4")
+    pull_handle(bench, (-40, 90))
+    assert bench.session.solution.status is Status.STEP_LIMIT
+    assert bench.editor.controller.settling.is_active
+    return bench.editor.controller.settling
+
+
+def test_a_pose_that_settles_after_its_release_shows_how_far_it_is(bench, settling):  # noqa: F811
+    bench.editor.controller.refresh()
+    now, shares = status(bench.editor), []
+    assert (now.work, now.progress, now.is_busy) == ("Settling", 0.0, False)
+    assert now.cancel.visible
+    assert now.cancel.tip == "Stop at this pose"
+    assert bench.editor.controller.messages._line.aside == "Settling ... 0 % (Esc)"
+    while settling.is_active:
+        shares.append(settling.fraction)
+        bench.hand.tick()
+    assert shares == sorted(shares)
+    assert max(shares) > 0.4
+    until(bench, lambda: bench.editor.controller.messages._line.aside == "")
+    assert bench.session.solution.status is not Status.STEP_LIMIT
+    assert not status(bench.editor).cancel.visible
+
+
+def test_escape_stops_a_pose_that_settles(bench, settling, tmp_path):  # noqa: F811
+    shown, bench.editor.path = bench.session.vertices, tmp_path / "work.segdeform"
+    bench.type("escape")
+    assert not settling.is_active
+    assert "Stopped. The pose has not settled" in bench.editor.status
+    bench.type("0", "4")
+    for _ in range(5):
+        bench.hand.tick()
+    assert bench.session.vertices is shown
+    bench.type("ctrl+s")
+    assert "The pose had not settled" in bench.editor.status
+    assert np.array_equal(load_session(bench.editor.path).vertices, shown)
+    pull_handle(bench, (5, 5))
+    until(bench, lambda: bench.session.solution.status is not Status.STEP_LIMIT)
+
+
+@pytest.mark.parametrize("write", ["session", "mesh"])
+def test_saving_waits_until_the_pose_has_settled(bench, settling, tmp_path, write):  # noqa: F811
+    path = tmp_path / ("posed.ply" if write == "mesh" else "work.segdeform")
+    bench.editor.do(exporting(path) if write == "mesh" else saving(path))
+    assert "Saving once the pose has settled" in bench.editor.status
+    assert status(bench.editor).work == "Saving"
+    until(bench, path.exists)
+    assert not settling.is_active
+    assert bench.session.solution.status is not Status.STEP_LIMIT
+    assert f"aved to {path}" in bench.editor.status
+    read = read_mesh if write == "mesh" else load_session
+    assert np.allclose(read(path).vertices, bench.session.vertices, rtol=0.0, atol=1e-6)
+    assert bench.editor.controller.file.is_modified(bench.session) == (write == "mesh")
+
+
+@pytest.mark.parametrize("change", ["escape", "undo", "press", "off", "another mode"])
+def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, change):  # noqa: F811
+    bench.editor.path = tmp_path / "work.segdeform"
+    shown = bench.session.vertices
+    bench.type("ctrl+s")
+    assert settling.is_active
+    assert not bench.editor.path.exists()
+    ends = {
+        "escape": lambda: bench.type("escape"),
+        "undo": lambda: bench.type("z"),
+        "press": lambda: pull_handle(bench, (5, 5)),
+        "off": bench.editor.Off,
+        "another mode": lambda: bench.type("3"),
+    }
+    ends[change]()
+    assert np.array_equal(load_session(bench.editor.path).vertices, shown)
+
+
+def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, tmp_path):  # noqa: F811
+    bench.editor.save(tmp_path / "work.segdeform")
+    assert not settling.is_active
+    assert bench.session.solution.status is not Status.STEP_LIMIT
+    assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
 
 
 def grabbed(bench, fraction=0.6):  # noqa: F811

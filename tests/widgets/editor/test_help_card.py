@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from campaign import every
 from hands import picture, plain_view
 
+from vtk_segdeform.widgets import Mode
+from vtk_segdeform.widgets.editor import help_card, keys_of
 from vtk_segdeform.widgets.editor.help_card import HelpCard
 
 SECTIONS = [
@@ -67,3 +71,38 @@ def test_the_card_is_laid_out_again_when_the_window_grows():
     assert not card.is_shown
     card.remove()
     view.remove_foreground()
+
+
+def test_in_a_small_window_the_keys_fill_pages_through_which_the_key_turns():
+    keys = keys_of("pyvista")
+    view = plain_view((300, 220))
+    card = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), "F1")
+    blank, pages = picture(view), []
+    card.toggle()
+    while card.is_shown:
+        pages.append(picture(view))
+        changed = (pages[-1] != blank).any(axis=2)
+        assert not changed[[0, -1]].any()
+        assert not changed[:, [0, -1]].any()
+        card.toggle()
+    assert 2 < len(pages) < 7
+    assert all((one != other).any() for one, other in pairwise(pages))
+    card.toggle()
+    assert (picture(view) == pages[0]).all()
+    view.window.SetSize(900, 700)
+    picture(view)
+    card.toggle()
+    assert not card.is_shown  # all of them are on one page
+    card.remove()
+    view.remove_foreground()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
+def test_columns_have_all_rows_in_order_under_their_headings(count):
+    sections = keys_of("pyvista").sections()
+    columns = help_card._broken(sections, count)
+    assert 1 <= len(columns) <= count
+    broken = [(heading, row) for column in columns for heading, rows in column for row in rows]
+    assert broken == [(heading, row) for heading, rows in sections for row in rows]
+    lengths = [help_card._n_lines(column) for column in columns]
+    assert max(lengths) - sum(lengths) / count < 6

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from bad_values import BAD
-from hands import draw_seldom, plain_view
+from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 
 from vtk_segdeform import Session
@@ -211,7 +211,7 @@ def test_the_toolbar_and_the_menu_do_what_they_say():
         assert not editor.controller.shows_rest
         press(editor, "help")
         assert editor.controller.help.is_shown
-        press(editor, "help")
+        editor.run("cancel")
         for name in ("show_regions", "show_cages", "orthographic", "cube", "up_x"):
             name, now = f"view.{name}", entries(editor)
             assert now[name].kind == "toggle"
@@ -273,6 +273,35 @@ def test_rows_are_selected_renamed_and_checked():
         assert [row.selected for row in regions()] == [False, False, True]
         with pytest.raises(ArgumentError, match="cannot be renamed"):
             press(editor, "regions.list.rename", ("2", "x"))
+
+
+def test_the_newest_pull_is_selected_or_the_one_that_is_pulled_again():
+    with editing(Mode.PULL) as editor:
+        session, x = editor.session, editor.session.mesh.vertices
+        middle = np.flatnonzero(np.abs(x[:, 0]) < 0.2 * np.ptp(x[:, 0]))
+
+        def selected():
+            table = table_of(editor, "handles.list")
+            return [row.label for row in table.rows if row.selected]
+
+        for n, vertex in enumerate((x[middle, 2].argmax(), x[middle, 2].argmin()), 1):
+            pull = functools.partial(session.pull, middle[vertex], x[middle[vertex]] * 1.1)
+            before = selected()
+            pull()
+            session.revert()
+            assert selected() == before
+            pull()
+            session.commit()
+            assert selected() == [f"pull {n}"]
+        hand, (dot,) = Hand(editor.view), session.targets["pull 1"]
+        editor.view.render()
+        hand.click(hand.at(dot))
+        assert selected() == ["pull 1"]
+        press(editor, "handles.list.select", ["handle:pull 2"])
+        press(editor, "handles.remove")
+        assert "pull 1" in session.handles
+        assert "pull 2" not in session.handles
+        assert selected() == ["pull 1"]
 
 
 def test_a_job_disables_all_sections_until_it_ends():

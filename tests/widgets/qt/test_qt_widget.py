@@ -638,6 +638,30 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
     again.widget.close()
 
 
+def test_the_first_steps_make_room_for_the_list_of_keys(state, tmp_path):
+    settings = QtCore.QSettings(str(tmp_path / "a.ini"), QtCore.QSettings.Format.IniFormat)
+    seen = Seen(DeformWidget(Session(state[0], state=state[1]), first_run=settings))
+    cards, listed = seen.widget.first_steps, seen.editor.controller.help
+    seen.editor.run("help")
+    assert listed.is_shown
+    assert not cards.isVisible()
+    seen.editor.run("cancel")
+    assert not listed.is_shown
+    assert cards.isVisible()
+    seen.editor.run("help")
+    cards.show()
+    assert not listed.is_shown
+    assert cards.isVisible()
+    seen.editor.run("help")
+    bend(seen)
+    seen.editor.run("cancel")
+    assert not cards.isVisible()
+    assert settings.contains("first steps seen")
+    cards.show()
+    seen.editor.run("help")
+    seen.widget.close()
+
+
 @pytest.mark.campaign
 def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
     seen.mode(Mode.DEFORM)

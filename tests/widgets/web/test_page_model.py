@@ -13,7 +13,7 @@ pytest.importorskip("trame")
 
 from vtk_segdeform import Regions, Session, fit_cages, models
 from vtk_segdeform.kernels import compiled_kernels
-from vtk_segdeform.session import State
+from vtk_segdeform.session import State, load_session
 from vtk_segdeform.widgets.editor import Mode, keys_of
 from vtk_segdeform.widgets.editor.hints import hint
 from vtk_segdeform.widgets.panel.status import words_of
@@ -179,3 +179,26 @@ def test_while_the_hand_drags_only_the_status_of_the_page_follows(web):
 
     asyncio.run(dragged())
     settle(editor)
+
+
+def test_a_download_waits_until_the_pose_has_settled(web, tmp_path):
+    editor, session = web.editor, web.session
+    settle(editor)
+    top = int(session.vertices[:, 2].argmax())
+    session.pull(top, session.vertices[top] + [0.0, 0.3, 0.0], max_steps=1)
+    session.commit()
+    editor.mode = Mode.REGIONS
+    editor.mode = Mode.PULL  # which refines the pose
+    assert editor.controller.settling.is_active
+
+    async def downloaded():
+        request = SimpleNamespace(match_info={"suffix": "segdeform"}, headers={"X-Segdeform": "1"})
+        download = asyncio.create_task(web._transfer.download(request))
+        await asyncio.sleep(0.1)
+        assert not download.done()
+        settle(editor)
+        return await download
+
+    (tmp_path / "a.segdeform").write_bytes(asyncio.run(downloaded()).body)
+    saved = load_session(tmp_path / "a.segdeform")
+    np.testing.assert_array_equal(saved.vertices, session.vertices)
