@@ -26,7 +26,7 @@ A mesh of 100,000 faces has five checks, which take 25 ms in numpy and 4 ms comp
 numba takes 0.2 s."""
 
 PARALLEL_SEARCH = 2_000
-"""Points whose nearest cluster centres are searched in several threads.
+"""Points whose nearest others, such as cluster centres, are searched in several threads.
 
 SciPy starts new threads at every search: with them clustering 500 points takes 1.8 ms instead of
 1.1, 8,000 points as long as in one thread."""

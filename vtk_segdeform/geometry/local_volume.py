@@ -33,7 +33,7 @@ from scipy.spatial import cKDTree
 
 from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..kernels import compiled_kernels, in_parallel, inputs
+from ..kernels import compiled_kernels, in_parallel, inputs, n_threads
 from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
@@ -307,12 +307,15 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     length = np.linalg.norm(inward, axis=1, keepdims=True)
     inward = np.divide(inward, length, where=length > 0, out=np.zeros_like(inward))
     tree = cKDTree(x)
+    workers = n_threads() if len(x) > sizes.PARALLEL_SEARCH else 1
     radius = np.full(len(x), np.linalg.norm(np.ptp(x, axis=0)))
-    opposite = np.asarray(tree.query(x + radius[:, None] * inward)[1], dtype=np.int64)
+    opposite = np.asarray(
+        tree.query(x + radius[:, None] * inward, workers=workers)[1], dtype=np.int64
+    )
     active = np.arange(len(x))
     for _ in range(_MOST_SHRINKS):
         centre = x[active] + radius[active, None] * inward[active]
-        distance, touched = (np.asarray(found) for found in tree.query(centre))
+        distance, touched = (np.asarray(found) for found in tree.query(centre, workers=workers))
         chord = x[touched] - x[active]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, inward[active])

@@ -12,6 +12,7 @@ The files, in reading order:
     soup             a mesh from any triangles, and the map between both
     shells           orientation of closed shells
     inside           winding numbers, points inside a surface, distance to it
+    near_faces       pairs of triangles that may do so: a tree of boxes
     intersections    pairs of triangles that cross or touch
     triangles        angles and normals of triangles
     grouping         connected components, equal rows and ragged ranges in linear time

@@ -59,7 +59,7 @@ class Settling:
             return None
         if time.monotonic() < self._since + _SHOWN_AFTER:
             return None
-        share = 1.0 - _distance(self._widgets().session) / (self._distance or 1.0)
+        share = 1.0 - _distance(self._widgets().session) / self._distance if self._distance else 0.0
         return _STEP * int(max(share, 0.0) / _STEP)
 
     @property
