@@ -91,8 +91,9 @@ of them 60."""
 FINISHED = 100_000
 """Vertices up to which `deform` and `pull` finish a pose on the mesh by themselves.
 
-A finish takes 0.3 s of processor time for 5,000 vertices and 3.4 s for 100,000, the rest of
-`deform` 4.6 s.  Beyond, the factor of the Laplacian grows faster: 11 s for 200,000 vertices."""
+A finish takes 0.2 s of processor time for 5,000 vertices and 6 s for 100,000 if all of the body
+bends, the rest of `deform` 5 s.  Beyond, the factor of the Laplacian grows faster: 16 s for 200,000
+vertices."""
 
 SCALED_VOLUME = 20_000
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
