@@ -33,6 +33,7 @@ Z. Levi, C. Gotsman, "Smooth rotation enhanced as-rigid-as-possible mesh animati
 
 from __future__ import annotations
 
+from copy import copy
 from functools import partial
 from typing import Any
 
@@ -50,10 +51,10 @@ from .volume_band import VolumeBand
 # that of the start.  Of 12 poses of other bodies: 1.04, 1.05, 1.08 times, and 1.31, 1.27, 1.22
 # times.
 SHARE = 0.05
-_RINGS = 4  # about moving vertices: their triangles, and the cells that have a part in their forces
-_TIMES = 20  # as long as a face of a volume takes a cell
+_RINGS = 4  # around moving vertices, with all cells that affect the forces on them
+_TIMES = 20  # a cell takes as long as the volume of so many faces
 _PIECE = 8_000  # cells to a task
-_MOST = 0.7  # share of the vertices up to which leaving the other ones out pays
+_MOST = 0.7  # share of the triangles up to which it pays to leave out the others
 
 
 class CellEnergy:
@@ -117,14 +118,19 @@ class CellEnergy:
         return cls(*given, mesh.adjacency, band)
 
     def near(self, moving: BoolArray) -> CellEnergy:
-        """Return the energy near the vertices that are *moving* (n,), all else being rigid."""
+        """Return the energy near the vertices that are *moving* (n,), for one thread.
+
+        It changes by the same amount, and has the same gradient at these vertices.
+        """
         rest, faces, cotangents, gradients, graph, band = self._given
         near = moving.astype(float)
         for _ in range(_RINGS):
             near = np.minimum(near + graph @ near, 1.0)
         some: BoolArray = np.asarray((near > 0.0)[faces].all(axis=1))
         if not 0 < np.count_nonzero(some) <= _MOST * len(some):
-            return self
+            own = copy(self)
+            own._rooms = None
+            return own
         return CellEnergy(rest, faces[some], cotangents[some], gradients[some], graph, band)
 
     @property

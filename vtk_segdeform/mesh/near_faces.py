@@ -20,10 +20,10 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs
 
-_TIMES = 500  # as long as a check of a face takes each
+_TIMES = 500  # the search takes as long as so many checks of each face
 _LEAF = 8  # faces in a leaf of the tree, at most
 _PIECE = 8_192  # faces to a task
-_NEAR = 10  # pairs of touching boxes for each face, if it is no more
+_NEAR = 10  # pairs of touching boxes per face for which space is reserved at first
 _FACES = 10_000  # faces whose neighbourhoods are searched at once
 _WIDER = 1.0 + 1e-12  # for rounding
 _BITS = 10  # of each coordinate in the Morton order

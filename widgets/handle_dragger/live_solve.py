@@ -105,7 +105,7 @@ class LiveSolve:
         self._stop_refining()
 
     def halt(self) -> None:
-        """Refine the current pose no more, and draw in full quality."""
+        """Stop refining the current pose and draw it in full quality."""
         self._halted = self._session.solution
         self.pause()
 

@@ -1,7 +1,7 @@
 """Pairs of triangles that may meet, for `near_faces`: a tree of boxes, and planes that separate.
 
-Few pairs remain, so that the equivalent in numpy decides.  Whatever that may count as touching,
-with any rounding, is no reason to leave a pair out.
+The few pairs that remain are tested in numpy (`intersections`).  A pair is left out only if it is
+apart by more than that test's tolerance and rounding.
 """
 
 from __future__ import annotations
