@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from vtk_segdeform.checks import as_path, as_text, shown
 from vtk_segdeform.deformer import deform
-from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
 from vtk_segdeform.io import Surface, repair_surface, triangles_of
 from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
@@ -55,10 +55,22 @@ _HANDLE_MET = 1e-3  # of the diagonal
 
 
 @overload
-def edit(mesh: Mesh, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...) -> Mesh: ...
+def edit(
+    mesh: Mesh,
+    *,
+    path: _Path = None,
+    title: str = ...,
+    keys: KeyChoice = ...,
+    progress: Progress | None = ...,
+) -> Mesh: ...
 @overload
 def edit(
-    mesh: Session, *, path: _Path = None, title: str = ..., keys: KeyChoice = ...
+    mesh: Session,
+    *,
+    path: _Path = None,
+    title: str = ...,
+    keys: KeyChoice = ...,
+    progress: Progress | None = ...,
 ) -> Session: ...
 @overload
 def edit(
@@ -67,11 +79,20 @@ def edit(
     path: _Path = None,
     title: str = ...,
     keys: KeyChoice = ...,
+    progress: Progress | None = ...,
 ) -> pv.PolyData: ...
 def edit(
-    mesh: Any, *, path: _Path = None, title: str = "segdeform", keys: KeyChoice = "pyvista"
+    mesh: Any,
+    *,
+    path: _Path = None,
+    title: str = "segdeform",
+    keys: KeyChoice = "pyvista",
+    progress: Progress | None = None,
 ) -> Any:
     """Open a window to deform *mesh*; return the deformed mesh when the window closes.
+
+    A pose that was still settling, or was not finished yet, is completed first, which may take
+    seconds.  Ctrl+C stops that, and the pose is returned as far as it is.
 
     In a notebook the editor is in the output of the cell instead, and a `NotebookEditor` is
     returned at once: its ``session`` and ``mesh`` follow what is done by hand.
@@ -87,6 +108,8 @@ def edit(
         Title of the window, if there is one.
     keys : str or mapping of str to str or sequence of str
         "pyvista", "Blender" or the keys of some actions, as in ``{"undo": "Ctrl+Z"}``.
+    progress : Progress, optional
+        Called while a pose is completed; raising `Cancelled` is like Ctrl+C.
 
     Returns
     -------
@@ -120,7 +143,18 @@ def edit(
         plotter.show()
     finally:
         plotter.close()
+    _complete(editor, progress)
     return edited(mesh, editor.session)
+
+
+def _complete(editor: DeformEditor, progress: Progress | None) -> None:
+    """Complete the pose, or log why not: what was done in the window is never lost."""
+    try:
+        editor.complete(progress)
+    except (Cancelled, KeyboardInterrupt):
+        _log.warning("interrupted: the pose is not finished")
+    except SegDeformError as error:
+        _log.warning("the pose is not finished: %s", error)
 
 
 def _name_of(path: Path | None) -> str:

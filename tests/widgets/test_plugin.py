@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import configparser
+import functools
 import importlib
 import logging
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -22,10 +24,13 @@ from solids import OCTAHEDRON
 import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
+from vtk_segdeform.cli.progress_bar import ProgressBar
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert
 from vtk_segdeform.pictures import canvas
+from vtk_segdeform.session.finishing import Finish
+from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import plugin
 from vtk_segdeform.widgets.hosting import session_of
 from vtk_segdeform.widgets.scene.view import View
@@ -245,14 +250,20 @@ def test_it_is_registered_in_any_order_and_nothing_else_loads_pyvistas_plotters(
 # The window of `edit`.
 
 
-def pull(hand: Hand, editor) -> None:
-    """Switch to the deform mode and drag the centre of the handle."""
+def pull(hand: Hand, editor, shift=(12, 21), *, releases: bool = True) -> None:
+    """Switch to the deform mode and drag the centre of the handle by *shift* pixels."""
     editor.wait()
     hand.key("4")
     editor.wait()
     session = editor.session
     x, y = hand.at(session.vertices[session.handles["handle 1"]].mean(axis=0))
-    hand.drag([(x, y), (x + 6, y + 9), (x + 12, y + 21)])
+    way = [(x + share * shift[0], y + share * shift[1]) for share in (0.0, 0.45, 1.0)]
+    if releases:
+        hand.drag(way)
+        return
+    hand.press(way[0])
+    for position in way[1:]:
+        hand.move(position)
 
 
 @pytest.mark.parametrize("kind", every(2, [pv.PolyData, sd.Session, sd.Mesh]))
@@ -290,7 +301,7 @@ def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, ca
     saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
     sd.save_session(saved, session)
 
-    def edit(session, *, path, title):
+    def edit(session, *, path, title, progress):
         assert path == saved
         assert "work.segdeform" in title
         session.drag(SCENE.turned(20.0))
@@ -302,6 +313,96 @@ def test_the_command_writes_the_deformed_mesh(tmp_path, session, monkeypatch, ca
     assert "volume change   " in capsys.readouterr().out
     session.drag(SCENE.turned(20.0))
     assert_array_equal(convert.read_polydata(out).points, session.vertices)
+
+
+@pytest.fixture
+def closed_early(tmp_path, session, monkeypatch):
+    """Return a function that runs the command, drags in its window, and closes that at once.
+
+    It calls ``before_closing(hand, editor)``, and returns the session, the vertices shown before
+    the window closed and those that the command wrote.
+    """
+    saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
+    sd.save_session(saved, session)
+    for each in ("_EVENT_TIME", "_REFINE_TIME"):  # the fewest steps, however fast the machine is
+        monkeypatch.setattr(f"vtk_segdeform.widgets.handle_dragger.live_solve.{each}", 0.0)
+    monkeypatch.setattr("vtk_segdeform.cli.commands.require_screen", lambda: None)
+    show = pv.Plotter.show
+
+    def run(before_closing=lambda *_: None):
+        seen = []
+
+        def show_and_work(plotter):
+            (editor,) = plotter.segdeform.added
+            show(plotter, auto_close=False, interactive=False)
+            hand = Hand(editor.view)
+            pull(hand, editor, (-40, 90))
+            assert editor.session.solution.status is Status.STEP_LIMIT
+            before_closing(hand, editor)
+            assert hand.failures == []
+            seen.extend([editor.session, editor.session.vertices])
+            plotter.close()  # as the real one does when its window is closed
+
+        monkeypatch.setattr(pv.Plotter, "show", show_and_work)
+        assert main(["edit", str(saved), "-o", str(out)]) == 0
+        return *seen, np.asarray(convert.read_polydata(out).points)
+
+    return run
+
+
+def test_a_window_closed_while_the_pose_settles_completes_it_first(closed_early, capfd):
+    session, shown, written = closed_early()
+    assert session.solution.status is not Status.STEP_LIMIT
+    assert not session.can_finish
+    assert session.solution.handle_error < 1e-12
+    assert abs(session.volume_change) < 1e-12
+    assert_array_equal(written, session.vertices)
+    assert np.abs(written - shown).max() > 1e-3
+    told = capfd.readouterr()
+    assert "finishing after the window was closed; Ctrl+C to stop" in told.out
+    assert told.err == ""
+
+
+def test_a_window_closed_during_the_drag_completes_its_pose_as_well(closed_early):
+    session, _, written = closed_early(functools.partial(pull, shift=(30, -40), releases=False))
+    assert not session.can_finish
+    assert session.solution.handle_error < 1e-12
+    assert_array_equal(written, session.vertices)
+
+
+def test_a_pose_stopped_by_escape_is_written_as_it_was_shown(closed_early, capfd):
+    _, shown, written = closed_early(lambda hand, _: hand.key("Escape"))
+    assert_array_equal(written, shown)
+    assert "finishing" not in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(("stage", "settled"), [(0.0, False), (0.5, True)])
+def test_ctrl_c_while_the_pose_is_completed_writes_what_there_is(
+    closed_early, capfd, monkeypatch, stage, settled
+):
+    def press_ctrl_c(bar, fraction, text):
+        if fraction >= stage:
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(ProgressBar, "__call__", press_ctrl_c)
+    session, shown, written = closed_early()
+    assert session.can_finish
+    assert (session.solution.status is not Status.STEP_LIMIT) == settled
+    assert np.array_equal(written, shown) != settled
+    assert_array_equal(written, session.vertices)
+    assert abs(session.volume_change) < 1e-12
+    assert "interrupted: the pose is not finished" in capfd.readouterr().err
+
+
+def test_a_pose_that_cannot_be_finished_is_written_all_the_same(closed_early, capfd, monkeypatch):
+    def fail(*_, **__):
+        raise MeshError("the matrix is singular")
+
+    monkeypatch.setattr(Finish, "__call__", fail)
+    session, _, written = closed_early()
+    assert session.solution.status is not Status.STEP_LIMIT
+    assert_array_equal(written, session.vertices)
+    assert "the pose is not finished: the matrix is singular" in capfd.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a screen")

@@ -95,13 +95,24 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     """Edit a mesh or a saved session in a window; write the deformed mesh."""
     from ..widgets import plugin  # loads pyvista's plotters, which other commands do not need
 
-    del progress  # the window shows progress itself
+    is_told = False
+
+    def completing(fraction: float, text: str) -> None:
+        nonlocal is_told
+        if not is_told:
+            is_told = True
+            say("pose            finishing after the window was closed; Ctrl+C to stop")
+        progress(fraction, text)
+
     if options.output is not None:
         io.require_writable(options.output)
     session = opened(options.input)
     require_screen()
     session = plugin.edit(
-        session, path=options.input.with_suffix(SESSION), title=f"segdeform {options.input.name}"
+        session,
+        path=options.input.with_suffix(SESSION),
+        title=f"segdeform {options.input.name}",
+        progress=completing,
     )
     report_volume(session.volume_change, say)
     if options.output is not None:

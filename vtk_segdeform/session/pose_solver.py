@@ -177,6 +177,8 @@ class PoseSolver:
         targets: Mapping[str, FloatArray],
         max_steps: int | None,
         within: float | None = None,
+        *,
+        progress: Progress | None = None,
     ) -> tuple[Pose, Solution]:
         """Solve for *targets* (k, 3) of every handle, starting from the pose of *state*.
 
@@ -201,7 +203,7 @@ class PoseSolver:
                 own = shift[deformer.handle]
                 aim = _Aim(wanted, own) if aim is None else aim.turned(wanted, own)
                 places = wanted - aim.shift
-            solution = deformer.solve(places, max_steps=max_steps, within=within)
+            solution = deformer.solve(places, max_steps=max_steps, within=within, progress=progress)
             if not np.isfinite(solution.vertices).all():
                 raise ConstraintError("no finite pose for these targets; move the handles less")
             cages, finished = solution.cage_vertices, None if before is None else before.finished

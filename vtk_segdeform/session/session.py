@@ -787,14 +787,21 @@ class Session(Timeline):
         """Return *points* (k, 3), given at rest, moved along with the mesh to the current pose."""
         return self._pose_solver.bind(self._state).passengers(points).moved(self.cage_vertices)
 
-    def refine(self, *, max_steps: int | None = None, within: float | None = None) -> Solution:
+    def refine(
+        self,
+        *,
+        max_steps: int | None = None,
+        within: float | None = None,
+        progress: Progress | None = None,
+    ) -> Solution:
         """Continue solving for the current targets, for example after a drag with *max_steps*.
 
         With *within*, as in `drag`, until the targets are reached; then until it has converged.
+        *progress* is called before every step and may cancel; then nothing changes.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
-        pose, solution = self._solve(self._state, self.targets, (max_steps, within))
+        pose, solution = self._solve(self._state, self.targets, (max_steps, within), progress)
         here = self._state.pose
         # Converged already: keep the same pose object.  But even without a step, the final pose can
         # have other weights of handles than the one before.
@@ -817,16 +824,18 @@ class Session(Timeline):
         Parameters
         ----------
         progress : Progress, optional
-            May cancel; then nothing changes.
+            May cancel; then nothing changes, except that the pose may have converged.
 
         Raises
         ------
         SessionError
             If there is no pose, or nothing is fixed or in a handle.
         """
+        begun = 0.0
         if self.solution is not None and self.solution.status is Status.STEP_LIMIT:
-            self.refine()
-        result = self.finishing()(progress)
+            begun = 0.5
+            self.refine(progress=part(progress, 0.0, begun))
+        result = self.finishing()(part(progress, begun, 1.0))
         self.accept_finish(result)
         return result.solution
 
@@ -909,9 +918,11 @@ class Session(Timeline):
         state: State,
         targets: Mapping[str, FloatArray],
         limits: tuple[int | None, float | None],
+        progress: Progress | None = None,
     ) -> tuple[Pose, Solution]:
         began = time.perf_counter()
-        pose, solution = self._pose_solver.solve(state, MappingProxyType({**targets}), *limits)
+        wanted = MappingProxyType({**targets})
+        pose, solution = self._pose_solver.solve(state, wanted, *limits, progress=progress)
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
         return pose, solution

@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice, load_early, load_late
-from vtk_segdeform.progress import Progress
+from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
 from ..recording import confined_path
@@ -87,6 +87,7 @@ class Controller:
         self.recordings = Recordings(view)
         self._mode = Mode.PULL
         self._is_on = False
+        self._left = False, False  # by turning off: as `_ahead`
         self._instead = ""
         self._worker = Worker(view_timer(view), self._job_changed)
         self._preparing = Preparing(
@@ -151,11 +152,14 @@ class Controller:
 
     @is_on.setter
     def is_on(self, on: bool) -> None:
-        self._is_on = on
+        was_on, self._is_on = self._is_on, on
         with self.view.drawing_once():
             self.camera.navigation.SetEnabled(on)
             try:
                 if not on:
+                    self.widgets.finish()  # a drag that ends now is completed as any other
+                    if was_on:
+                        self._left = self._ahead
                     self.help.hide()
                     self.settling.flush()
                     self._preparing.stop()
@@ -164,6 +168,24 @@ class Controller:
                     self.wait()
             finally:
                 self._apply_mode()
+
+    @property
+    def _ahead(self) -> tuple[bool, bool]:
+        """Whether the pose is settling, and whether it will be finished."""
+        return self.settling.is_active, self.finishing.is_pending
+
+    def complete(self, progress: Progress | None = None) -> None:
+        """Settle and finish the pose now, as it would have been soon, had the editor stayed on.
+
+        The part that is done when *progress* cancels remains.
+        """
+        settles, finishes = self._ahead if self._is_on else self._left
+        self._left = False, False
+        session = self.session
+        if settles:
+            session.refine(progress=part(progress, 0.0, 0.5))
+        if finishes and session.can_finish and not is_unsettled(session):
+            session.finish(progress=part(progress, 0.5, 1.0))
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""

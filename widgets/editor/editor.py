@@ -25,6 +25,7 @@ from typing import Any
 from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, require, shown
 from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..recording import recorded_keys
@@ -191,6 +192,19 @@ class DeformEditor:
             self.path = path
         self._controller.settling.complete()
         self._controller.save()
+
+    def complete(self, progress: Progress | None = None) -> None:
+        """Settle and finish the pose, which otherwise happens while the hand rests after a drag.
+
+        Also after `Off` and `remove`, which interrupt that.  Nothing happens if the pose has been
+        finished, or shall not be: see `finishing`.
+
+        Parameters
+        ----------
+        progress : Progress, optional
+            May raise `Cancelled`; then the pose has converged at most, and is not finished.
+        """
+        self._controller.complete(progress)
 
     def load(self, path: str | os.PathLike[str]) -> None:
         """Edit the session or the mesh in a file; see `load_session`, `read_mesh`."""
