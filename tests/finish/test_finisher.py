@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +15,9 @@ from scenes import sausage
 from scipy import optimize
 from solids import exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import ArgumentError, Cancelled
-from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds
+from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds, cell_energy
 from vtk_segdeform.finish import finisher as finishing
 from vtk_segdeform.finish.creases import smoothed
 from vtk_segdeform.finish.unfolding import unfolded
@@ -393,6 +397,37 @@ def test_the_finish_of_a_pull_moves_its_reach_only():
     assert moved[away < 0.04 * size].max() < 1e-5 * size
     assert moved.max() > 1e-4 * size
     assert abs(found.volume_change) < 1e-13
+
+
+def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_other(monkeypatch):
+    """Both threads have run each kernel before either of them continues with its result."""
+    pytest.importorskip("numba")
+    monkeypatch.setattr(sizes, "COMPILED", 0)
+    deformer = SCENE.held()
+    solution = deformer.solve(SCENE.turned(40))
+    starts = solution, deformer.finish(solution)  # a finished pose is finished further
+    expected = [deformer.finish(start).vertices for start in starts]
+    assert np.abs(expected[0] - expected[1]).max() > 1e-6
+    together, met = threading.Barrier(2, timeout=20.0), []
+    run_kernel = cell_energy.in_parallel
+
+    def in_turns(*task):
+        run_kernel(*task)
+        with suppress(threading.BrokenBarrierError):  # the other finish has ended
+            met.append(together.wait())
+
+    def finish(start):
+        try:
+            return deformer.finish(start).vertices
+        finally:
+            together.abort()
+
+    monkeypatch.setattr(cell_energy, "in_parallel", in_turns)
+    with ThreadPoolExecutor(2) as threads:
+        found = [*threads.map(finish, starts)]
+    assert len(met) > 20
+    for each, alone in zip(found, expected, strict=True):
+        assert_array_equal(each, alone)
 
 
 def test_a_pose_whose_volume_a_finish_would_lose_is_returned_as_it_is():
