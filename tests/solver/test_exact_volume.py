@@ -20,13 +20,19 @@ from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
 SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
+VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
 
 
 @pytest.fixture
-def scaled(monkeypatch):
-    """Scale small meshes to their volume, as large ones are."""
+def coarse(monkeypatch):
+    """Compute the volume of small meshes over a coarse surface in each step, as of larger ones."""
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
+
+
+@pytest.fixture
+def scaled(coarse, monkeypatch):
+    """Scale small meshes to their volume, as large ones are."""
     monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)
 
 
@@ -52,6 +58,16 @@ def test_a_surface_that_is_inside_out_stays_as_it_is():
     x = mirrored.copy()
     assert scale_to_volume(constraint, x, np.zeros(3)) == 1.0
     assert_array_equal(x, mirrored)
+
+
+@pytest.mark.usefixtures("coarse")
+def test_a_mesh_with_a_coarse_volume_is_moved_onto_its_own_and_its_cages_with_it():
+    deformer = SCENE.deformer()
+    solution = deformer.solve(TARGETS)
+    assert solution.status is Status.CONVERGED
+    assert abs(signed_volume(solution.vertices, SCENE.mesh.faces) / VOLUME - 1.0) < 1e-14
+    assert abs(solution.volume_change) < 1e-14
+    assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
 
 
 @pytest.mark.usefixtures("scaled")
