@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from campaign import every
 from hands import picture, plain_view
+from solids import OCTAHEDRON
 
-from vtk_segdeform.widgets import Mode
+from vtk_segdeform import Mesh
+from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import help_card, keys_of
 from vtk_segdeform.widgets.editor.help_card import HelpCard
 
@@ -95,6 +97,43 @@ def test_in_a_small_window_the_keys_fill_pages_through_which_the_key_turns():
     assert not card.is_shown  # all of them are on one page
     card.remove()
     view.remove_foreground()
+
+
+def texts(view):
+    """Return all texts over the view and their heights in pixels."""
+    actors = [each for each in view.foreground.GetViewProps() if each.IsA("vtkTextActor")]
+    return {each.GetInput(): each.GetTextProperty().GetFontSize() for each in actors}
+
+
+def test_where_all_keys_would_be_too_small_those_of_the_mode_are_listed():
+    keys = keys_of("pyvista")
+    view = plain_view((1400, 1000))
+    editor = DeformEditor(view, Mesh(*OCTAHEDRON))
+    editor.On()
+    try:
+        editor.run("help")
+        everything = {name for name, _ in keys.sections()}
+        view.render()
+        large = texts(view)
+        assert everything <= set(large)
+        assert min(large[name] for name in everything) >= 12
+        for size in ((900, 650), (330, 260)):  # on one page, and on several
+            view.window.SetSize(*size)
+            seen = []
+            for mode in (Mode.HANDLES, Mode.PULL):
+                editor.mode = mode
+                view.render()
+                own, found = keys.sections(mode), texts(view)
+                headings = {name for name, _ in own}
+                assert headings & set(found)
+                assert not (everything - headings) & set(found)
+                seen.append({label for _, rows in own for _, label in rows} & set(found))
+            assert seen[0] != seen[1]
+        view.window.SetSize(1400, 1000)
+        view.render()
+        assert everything <= set(texts(view))
+    finally:
+        editor.remove()
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 8])
