@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +106,23 @@ def _upload(served: Served, page: Page, file: Path) -> None:
     page.wait(f"document.querySelector('.sd-name').textContent == '{file.name}'")
 
 
+def _step_by_step(
+    served: Served, page: Page, positions: Iterable[int], key: str, button: str
+) -> None:
+    """Undo or redo with the key and with the button in turn, one step each."""
+    session, seen = served.web.session, list[int]()
+    stop = served.call(lambda: session.on_change(lambda _: seen.append(session.position)))
+    for turn, position in enumerate(positions):
+        seen.clear()
+        if turn % 2:
+            page.click(f"[data-name={button}]")
+        else:
+            page.key(key)
+        served.wait(lambda: seen and served.is_at_rest and not len(served.web.stream.inputs))
+        assert set(seen) == {position}
+    served.call(stop)
+
+
 def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options: int) -> None:
     """Upload, pull, regions, cages, a handle, drag, turn, undo, redo, download, upload again.
 
@@ -161,15 +178,9 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
 
     served.wait(lambda: not editor.controller.finishing.is_pending)  # which changes the last step
     posed, steps = session.vertices, session.position
-    while session.position:
-        here = session.position
-        page.key("z")
-        served.wait(lambda here=here: session.position < here and served.is_at_rest)
+    _step_by_step(served, page, range(steps - 1, -1, -1), "z", "undo")
     np.testing.assert_array_equal(session.vertices, rest)
-    while session.position < steps:
-        here = session.position
-        page.key("y")
-        served.wait(lambda here=here: session.position > here and served.is_at_rest)
+    _step_by_step(served, page, range(1, steps + 1), "y", "redo")
     np.testing.assert_array_equal(session.vertices, posed)
 
     page.save_downloads(folder)
