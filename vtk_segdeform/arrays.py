@@ -108,7 +108,7 @@ def as_numbers(values: ArrayLike, name: str) -> FloatArray:
     if array.dtype.kind == "O":  # the conversion checks each entry
         try:
             return array.astype(np.float64)
-        except Exception as fault:
+        except Exception as fault:  # any of an entry, which may be of any class
             raise ArgumentError(f"{name} must contain numbers; got {array.dtype}") from fault
     if array.dtype.kind not in "biuf":
         raise ArgumentError(f"{name} must contain numbers; got {array.dtype}")
@@ -152,7 +152,7 @@ def _require_bounded(values: object, name: str) -> None:
     if isinstance(inner, Sized) and not hasattr(inner, "__array__"):
         try:
             count = len(inner)
-        except Exception as fault:
+        except Exception as fault:  # any of its __len__
             raise ArgumentError(f"{name} must be an array; got {shown(inner)}") from fault
         if count > _LONGEST:
             raise ArgumentError(f"{name} has more than {_LONGEST:.0e} entries; got {shown(inner)}")

@@ -40,7 +40,7 @@ def open_regular(path: str | os.PathLike[str], *, own: bool = False) -> BinaryIO
         if what := fault_of(os.fstat(handle), own=own):
             raise OSError(errno.EINVAL, f"is {what}", name)
         return open(handle, "rb")
-    except BaseException:
+    except BaseException:  # Ctrl+C as well: nobody else would close it
         os.close(handle)
         raise
 

@@ -173,7 +173,7 @@ class DeformEditor:
         with self.view.guarded(), self.view.drawing_once():
             try:
                 error = self._do(action, while_busy)
-            except Exception as raised:
+            except Exception as raised:  # any of an action; `guarded` shows it and decides
                 error = raised
                 raise
         return error

@@ -188,7 +188,7 @@ def film(
             made = Film(window.view)
             try:
                 _shoot(made, session, frames)
-            except BaseException:
+            except BaseException:  # Ctrl+C as well: no half a drag may remain
                 session.revert()
                 raise
             session.commit()

@@ -187,7 +187,7 @@ class Widget(abc.ABC):
     def _send(self, phase: Phase, event: str) -> None:
         try:
             self._grab.send(self.view.pointer(phase))
-        except BaseException:
+        except BaseException:  # Ctrl+C as well: every start of an interaction has an end
             self._invoke("EndInteractionEvent")
             raise
         self._invoke(event if self._grab.is_active else "EndInteractionEvent")
