@@ -28,15 +28,15 @@ Bad input
 
 .. Generated from the tests by `SEGDEFORM_ZOO=1 python -m pytest tests/whole/test_zoo.py`.
 
-This page lists input with faults: damaged meshes, cages that do not fit, targets out of range. For
-each, either the result is correct: finite, of exact volume, with the handles at their targets or a
-status that says they are not. Or an error of :mod:`vtk_segdeform.errors` names the fault and says
+This page lists faulty input: damaged meshes, cages that do not fit, targets out of range. In each
+case, either the result is correct (finite, of exact volume, with the handles at their targets or a
+status that says they are not), or an error of :mod:`vtk_segdeform.errors` names the fault and says
 what to do. There are no other exceptions, no warnings, and no computations of many minutes.
 
-Any surface can be deformed as it is: with holes, branching edges, seams, turned or repeated faces,
-points in no face, and of one side only. A :class:`~vtk_segdeform.Mesh` may have holes,
-branching edges and triangles without area as well. What it refuses, the operations on surfaces
-accept: "Surface", "filter", "segdeform check" and "segdeform deform".
+Any surface can be deformed as it is: with holes, branching edges, seams, flipped or duplicate
+faces, unused points, or only one side. A :class:`~vtk_segdeform.Mesh` may have holes, branching
+edges and triangles without area as well. What it refuses is accepted by the operations on surfaces:
+"Surface", "filter", "segdeform check" and "segdeform deform".
 
 Each input is tested with each operation that accepts its type, in {cases} cases: {answered} return
 a result and {refused} raise an error that names the fault.

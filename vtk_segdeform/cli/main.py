@@ -79,8 +79,11 @@ examples:
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
-exit codes: 0 success, and of check: the surface can be deformed; 1 it cannot, or the command
-failed; 2 usage error
+exit codes:
+  0    success; for check: the surface can be deformed, or was repaired to a closed mesh
+  1    the command failed; for check: it cannot be deformed, or the repair left it open
+  2    usage error
+  130  interrupted by Ctrl+C
 """
 
 
@@ -248,7 +251,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = add_command("replay", "replay a recording made with Ctrl+R", _REPLAYS)
     sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
     _input_output(sub, "the deformed mesh at the end", session=True)
-    text = "render off-screen to a .gif or .mp4 file"
+    text = "film the replay, off-screen, to a .gif or .mp4 file"
     sub.add_argument("--film", type=Path, metavar="OUT", help=text)
     text = "folder for files that recorded keys save; by default, saving fails"
     sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
@@ -285,13 +288,13 @@ def _serve(parser: argparse.ArgumentParser) -> None:
     text = "address to listen on (default: 127.0.0.1, this machine only)"
     add("--host", default="127.0.0.1", metavar="HOST", help=text)
     add("--open", action="store_true", help="open the page in the browser")
-    text = "clients at the same time, each with its own process (default: 4)"
+    text = "maximum number of clients, each in its own process (default: 4)"
     add("--clients", type=_count, default=4, metavar="N", help=text)
-    text = "largest upload (default: 500)"
+    text = "maximum size of an upload (default: 500)"
     add("--upload-limit", type=_count, default=500, metavar="MB", help=text)
-    text = "largest memory of a client; Linux only (default: 4000)"
+    text = "memory limit of each client; Linux only (default: 4000)"
     add("--memory", type=_count, default=4000, metavar="MB", help=text)
-    text = "keep a client this long after its page was closed (default: 600)"
+    text = "time to keep a client after its page is closed (default: 600)"
     add("--keep", type=_count, default=600, metavar="SECONDS", help=text)
 
 
@@ -339,24 +342,27 @@ def _regions(parser: argparse.ArgumentParser) -> None:
 
 def _cages(parser: argparse.ArgumentParser) -> None:
     _regions(parser)
-    text = "total cage vertices (default: by the number of regions)"
+    text = "total cage vertices (default: depends on the number of regions)"
     parser.add_argument("--cage-vertices", type=_count, default=None, metavar="N", help=text)
 
 
 def _pull(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    text = "a point on the surface, where it is grabbed"
+    text = "point on the surface to grab"
     add("--at", required=True, metavar="X,Y,Z", help=text)
-    add("--to", required=True, metavar="X,Y,Z", help="where this point is pulled to")
-    text = "radius of the pulled surface (default: 15 %% of the diagonal)"
+    add("--to", required=True, metavar="X,Y,Z", help="target of this point")
+    text = "radius of the pull (default: 15 %% of the diagonal)"
     add("--radius", type=float, default=None, metavar="R", help=text)
-    text = "1: the rest stays; 0: all of it follows (default: 0.2; 1 or 2 pins 0.05; more 0)"
+    text = (
+        "how local the pull is: 1 keeps the rest in place, 0 leaves all of it free (default: 0.2; "
+        "with 1 or 2 pins 0.05, with more 0)"
+    )
     add("--local", type=float, default=None, metavar="S", help=text)
-    text = "a point on the surface that stays in place; may be repeated"
+    text = "point on the surface to keep in place; may be repeated"
     add("--pin", action="append", default=[], metavar="X,Y,Z", help=text)
     text = "number of regions (default: auto)"
     add("--regions", type=_count, default=None, metavar="N", help=text)
-    text = "total cage vertices (default: by the number of regions)"
+    text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     _contact_and_lids(parser)
     _refine(parser)
