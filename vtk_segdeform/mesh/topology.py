@@ -349,8 +349,8 @@ class HalfEdges:
         """
         if not flip.any():
             return self
-        if (known := self.__dict__.get("oriented", self)) is not self:
-            return known.flipped(flip ^ self.sides[1])
+        if "oriented" in self.__dict__ and self.oriented is not self:
+            return self.oriented.flipped(flip ^ self.sides[1])
         turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
         known = self.__dict__
         turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
