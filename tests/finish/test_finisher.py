@@ -414,6 +414,7 @@ def test_the_finish_of_a_huge_or_tiny_mesh_is_that_of_the_mesh(scale):
     assert one.steps == other.steps
     assert_allclose(other.vertices / scale, one.vertices, rtol=0, atol=1e-9)
 
+
 def test_cancelling_at_any_step_changes_nothing_of_the_solution():
     deformer = SCENE.held()
     targets = SCENE.turned(40)
