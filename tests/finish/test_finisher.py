@@ -15,7 +15,7 @@ from scenes import sausage
 from scipy import optimize
 from solids import exact_volume_change, icosphere, rotation
 
-from vtk_segdeform import sizes
+from vtk_segdeform import deform, sizes
 from vtk_segdeform.errors import ArgumentError, Cancelled
 from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds, cell_energy
 from vtk_segdeform.finish import finisher as finishing
@@ -436,6 +436,17 @@ def test_a_pose_whose_volume_a_finish_would_lose_is_returned_as_it_is():
     solution = deformer.solve(SCENE.mesh.vertices[SCENE.handle] + [0.02, 0.0, 0.0])
     assert abs(solution.volume_change) < 1e-13
     assert deformer.finish(solution) is solution
+
+
+@pytest.mark.parametrize("scale", [2.0**200, 2.0**-200])
+def test_the_finish_of_a_huge_or_tiny_mesh_is_that_of_the_mesh(scale):
+    mesh, ends = SCENE.mesh, (SCENE.fixed, SCENE.handle)
+    options = {"n_regions": 1, "n_cage_vertices": 40}
+    one = deform(mesh, *ends, SCENE.turned(30), **options)
+    scaled = mesh.with_vertices(scale * mesh.vertices)
+    other = deform(scaled, *ends, scale * SCENE.turned(30), **options)
+    assert one.steps == other.steps
+    assert_allclose(other.vertices / scale, one.vertices, rtol=0, atol=1e-9)
 
 
 def test_cancelling_at_any_step_changes_nothing_of_the_solution():

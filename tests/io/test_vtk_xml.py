@@ -15,7 +15,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from vtk_segdeform import Mesh
-from vtk_segdeform.io.convert import to_polydata
+from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.vtk_xml import read_plain_xml
 
 
@@ -200,3 +200,22 @@ def test_more_bytes_than_a_share_of_the_file_are_left_to_vtk(monkeypatch):
     assert read_plain_xml(text) is not None
     monkeypatch.setattr("vtk_segdeform.io.vtk_xml._DENSEST", 0)
     assert read_plain_xml(text) is None
+
+
+@pytest.mark.parametrize("suffix", [".vtp", ".vtu"])
+@pytest.mark.parametrize("is_ours", [True, False])
+def test_integers_whose_norms_overflow_are_read_back(tmp_path, suffix, is_ours):
+    surface = pv.Cube()
+    values = np.full((surface.n_points, 3), 2**31 - 9, dtype=np.int32)
+    surface.point_data["ids"] = values
+    surface.field_data["text"] = ["left to VTK"]
+    surface.field_data["large"] = values[:2]
+    path = tmp_path / f"a{suffix}"
+    if is_ours:
+        write_mesh(path, surface)
+        assert b"L2_NORM" not in path.read_bytes()
+    else:
+        (surface if suffix == ".vtp" else surface.cast_to_unstructured_grid()).save(path)
+    again = read_polydata(path)
+    assert_array_equal(again.point_data["ids"], values)
+    assert list(again.field_data["text"]) == ["left to VTK"]

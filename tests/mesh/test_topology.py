@@ -13,6 +13,7 @@ from numpy.testing import assert_array_equal
 from vtk_segdeform import sizes
 from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import topology
+from vtk_segdeform.mesh.grouping import two_sides
 from vtk_segdeform.mesh.topology import HalfEdges
 
 
@@ -93,6 +94,19 @@ def test_any_few_triangles_have_the_properties_of_the_definitions(seed):
             shell = [shell[owners[0]] if s in {shell[o] for o in owners} else s for s in shell]
         first = {s: k for k, s in enumerate(dict.fromkeys(shell))}
         assert half_edges.shells.tolist() == [first[s] for s in shell]
+        pairs = np.array([o for h, o in enumerate(at) if len(o) == 2 and h == o[0]], int)
+        one, other = pairs.reshape(-1, 2).T
+        differ = np.isin(one, turned)
+        expected = two_sides(len(faces), one // 3, other // 3, differ)
+        for found, each in zip(half_edges.sides, expected, strict=True):
+            assert_array_equal(found, each)
+        flipped = half_edges.flipped(half_edges.sides[1])
+        assert_array_equal(half_edges.oriented.faces, flipped.faces)
+        assert half_edges.is_oriented == (not turned)
+        if half_edges.one_fan_after_flips:
+            assert not pinched
+            assert not several
+            assert flipped.is_oriented
 
 
 def test_renumbered_half_edges_are_those_of_the_renumbered_faces():

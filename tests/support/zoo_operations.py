@@ -20,10 +20,12 @@ import vtk_segdeform as sd
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError, SegDeformError
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
+from vtk_segdeform.filters.surfaces import surface
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io import triangles_of
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.polygons import polydata_of
+from vtk_segdeform.mesh import mesh_of
 
 
 class ReportedError(SegDeformError):
@@ -222,7 +224,9 @@ def filtered(polydata, *, cages=None, **options):
     if errors:
         raise ReportedError(errors[0])
     bent_surface = pv.wrap(bend.GetOutputDataObject(0))
-    require_right_surface(sd.Surface(polydata), bent_surface)
+    # The filter needs no pyvista: VTK cuts its polygons, which are cut otherwise from files.
+    own = sd.Surface.of(polydata, mesh_of(*surface(polydata)))
+    require_right_surface(own, bent_surface)
 
 
 def as_off(vertices, faces):

@@ -13,9 +13,9 @@ handle are point arrays, where nonzero, or point indices.  The handle moves to g
 rotated about its centre and translated.  Points at a seam follow one vertex of the mesh.
 
 The output depends on inputs and settings only, not on earlier executions; it equals that of
-`vtk_segdeform.deform`.  Only the parts that changed are computed again: new targets need a solve, a
-new handle some milliseconds more, and only a new surface, regions, cages or stretch resistance
-needs a new binding (counted by `rebinds`).
+`vtk_segdeform.deform` without `refine`.  Polygons are cut into triangles by VTK.  Only the parts
+that changed are computed again: new targets need a solve, a new handle some milliseconds more, and
+only a new surface, regions, cages or stretch resistance needs a new binding (counted by `rebinds`).
 
 Errors are reported as in VTK, by an ErrorEvent with a text or in the output window, and the output
 is empty.  Requires numpy, scipy and VTK's modules, but not pyvista.

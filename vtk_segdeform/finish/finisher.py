@@ -262,11 +262,17 @@ class Finisher:
         return Finish(here.x, tuple(merits), len(merits) - 1)
 
     def _directions(self, x: FloatArray) -> list[FloatArray]:
-        """Return Z = H^-1 G^T at *x*, (n, 3) for each constraint."""
+        """Return Z = H^-1 G^T at *x*, (n, 3) for each constraint, up to a power of two.
+
+        They are about as long as the mesh, so that cubics along them overflow no sooner than
+        volumes; a power of two changes no digit of a step.
+        """
         directions = []
         for constraint in self._constraints:
             direction = np.zeros_like(x)
             direction[self._free] = self._solve(constraint.gradient(x)[self._free])
+            exponent = math.frexp(np.abs(direction).max() / self._size)[1]
+            direction = np.ldexp(direction, -exponent)
             directions.append(direction)
         return directions
 

@@ -192,11 +192,14 @@ def cut_into_triangles(
     polygon, others = np.repeat(number, n_triangles), np.flatnonzero(~is_cut)
     if len(others):
         clipped, owner = _clipped(points, counts[others], corners[np.repeat(~is_cut, counts)])
-        kept = faces[is_cut[polygon]]
-        n_triangles[others] = np.bincount(owner, minlength=len(others))
-        polygon = np.repeat(number, n_triangles)
-        faces, is_kept = np.empty((len(polygon), 3), dtype=np.int64), is_cut[polygon]
-        faces[is_kept], faces[~is_kept] = kept, clipped
+        n_clipped = np.bincount(owner, minlength=len(others))
+        if (n_clipped != n_triangles[others]).any():
+            kept = faces[is_cut[polygon]]
+            n_triangles[others] = n_clipped
+            polygon = np.repeat(number, n_triangles)
+            faces = np.empty((len(polygon), 3), dtype=np.int64)
+            faces[is_cut[polygon]] = kept
+        faces[np.flatnonzero(np.repeat(~is_cut, n_triangles))] = clipped
     is_other = counts > 3
     is_other[quads] = (cut == _NOT_CUT) | (cut == _OF_EQUAL_LENGTH)
     some = np.flatnonzero(is_other & (n_triangles == counts - 2))

@@ -17,6 +17,8 @@ import logging
 import re
 import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -41,6 +43,10 @@ _XML = frozenset({".vtp", ".vtu"})
 _PLAIN = {".vtk": read_plain_legacy, **dict.fromkeys(_XML, read_plain_xml)}
 _DENSEST = 1100  # most bytes out of one compressed byte
 _COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
+_NORM_RANGE = re.compile(
+    rb'\s*<InformationKey\s[^<>]*name="L2_NORM_(?:FINITE_)?RANGE"[^<>]*>.*?</InformationKey>',
+    re.DOTALL,
+)
 _BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
 _BEGINS = {
     ".vtk": re.compile(rb"# vtk DataFile"),
@@ -73,8 +79,10 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         if suffix in _XML:
             _require_plausible_counts(data)
     try:
-        with read_isolated("vtk", path) as folder:
+        with _without_ranges_of(path) as source, read_isolated("vtk", source) as folder:
             pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
+            for piece in pieces:
+                piece.write_bytes(_without_ranges(piece.read_bytes()))
             parts = [_validated(pv.get_reader(piece).read()) for piece in pieces]
     except (MeshError, RuntimeError) as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
@@ -83,6 +91,30 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     if suffix == ".vtkhdf":  # it does not store which arrays are active
         _activate_normals(surface)
     return surface
+
+
+def _without_ranges(data: bytes) -> bytes:
+    """Return a file in XML without the ranges of norms, which VTK computes again when needed.
+
+    VTK computes norms of integers with integers, writes "-nan" where these overflow, and cannot
+    read that.
+    """
+    end = data.find(b"<AppendedData")
+    head, rest = (data, b"") if end < 0 else (data[:end], data[end:])
+    return _NORM_RANGE.sub(b"", head) + rest
+
+
+@contextmanager
+def _without_ranges_of(path: Path) -> Iterator[Path]:
+    """Yield *path*, or that of a copy without ranges of norms if it has some."""
+    data = path.read_bytes() if path.suffix.lower() in _XML else b""
+    if (plain := _without_ranges(data)) == data:
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="segdeform-") as folder:
+        copy = Path(folder) / f"copy{path.suffix}"
+        copy.write_bytes(plain)
+        yield copy
 
 
 def _activate_normals(surface: pv.PolyData) -> None:
@@ -234,7 +266,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()
         writer.Write()
-        path.write_text(writer.GetOutputString(), encoding="utf-8")
+        path.write_bytes(_without_ranges(writer.GetOutputString().encode()))
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):

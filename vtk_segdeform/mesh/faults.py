@@ -153,13 +153,13 @@ class Search:
     @cached_property
     def flat(self) -> IntArray:
         """(k,) int: the faces without area."""
-        return _flat_faces(self.points, self.triangles)
+        return flat_faces(self.points, self.triangles)
 
     @cached_property
     def all_flat(self) -> bool:
         """Whether no face has an area."""
         few = self.triangles[:_FEW]  # usually enough
-        return len(_flat_faces(self.points, few)) == len(few) and (
+        return len(flat_faces(self.points, few)) == len(few) and (
             len(self.flat) == len(self.triangles)
         )
 
@@ -333,7 +333,7 @@ def _without_repeated(
     return degenerate, duplicate, half_edges
 
 
-def _flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
+def flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
     """Return the faces without area, (k,) int."""
     flat = np.zeros(len(faces), dtype=bool)
 
@@ -362,7 +362,7 @@ def _edge_notes(half_edges: HalfEdges) -> Iterator[Fault]:
     yield from _some(Kind.HOLE, corners[hole])
     yield from _some(Kind.NON_MANIFOLD_EDGE, half_edges.branching, half_edges)
     yield from _some(Kind.NON_MANIFOLD_VERTEX, half_edges.pinched)
-    if len(half_edges.turned):
+    if not half_edges.is_oriented:
         first = first_members(half_edges.shells)
         yield from _some(Kind.ONE_SIDED, half_edges.faces[first[half_edges.one_sided], 0])
 

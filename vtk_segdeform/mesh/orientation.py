@@ -46,7 +46,7 @@ def faces_to_flip(
     if flip.any():
         n_flipped = np.bincount(unit, flip)
         minority = n_flipped > np.bincount(unit) - n_flipped
-        flip ^= minority[unit] & two_sided[patch]
+        flip = flip ^ (minority[unit] & two_sided[patch])
     if not two_sided.all():
         one_sided[unit[~two_sided[patch]]] = True
     faces = flipped_faces(half_edges.faces, flip) if flip.any() else half_edges.faces
@@ -60,7 +60,7 @@ def faces_to_flip(
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
     """Return the patch of each face, (m,), the faces to flip, and which patches have two sides."""
-    if not len(half_edges.turned) and not len(half_edges.crowded):
+    if half_edges.is_oriented and not len(half_edges.crowded):
         patch = half_edges.shells
         flip = np.zeros(len(patch), dtype=bool)
         return patch, flip, np.ones(int(patch.max(initial=-1)) + 1, dtype=bool)

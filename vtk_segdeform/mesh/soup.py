@@ -27,8 +27,8 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
 from .edges import components, repeats_vertex
-from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces
-from .grouping import connected, first_equal_row
+from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces, flat_faces
+from .grouping import connected, first_equal_row, first_members
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
@@ -142,31 +142,36 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         if not used.all():  # points in no face must not matter
             other = points[used.argmax()] if used.any() else 0.0
             found = found.at(np.where(used[:, None], points, other))
-    valid = found.points
     _require_usable(found)
-    if found.half_edges.all_twins and found.is_closed:
-        return Soup(points, Mesh.of(found), np.arange(len(points)))
-    target, kept, half_edges = _welded(valid, found)
+    target = np.arange(len(points))
+    if (sewn := _sewn(found)) is not None:
+        target, found = sewn
+    elif found.half_edges.all_twins and found.is_closed:
+        return Soup(points, Mesh.of(found), target)
+    valid = found.points
+    welded, kept, half_edges = _welded(valid, found)
+    target = welded[target]
     without_area = _without_area(found, kept, half_edges)
     flat = np.flatnonzero(kept)[without_area] if without_area.any() else _NONE
     if len(flat):
         kept[flat] = False
-        half_edges = HalfEdges(half_edges.faces[~without_area], len(points))
+        half_edges = HalfEdges(half_edges.faces[~without_area], len(valid))
     sums = None
-    if half_edges is found.half_edges and not len(half_edges.turned) + len(half_edges.crowded):
+    is_found = half_edges is found.half_edges
+    if is_found and half_edges.is_oriented and not len(half_edges.crowded):
         sums = found.shell_sums
     flip, sums = faces_to_flip(valid, half_edges, sums)
     left = found.used
-    if not (same := half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
-        left = np.zeros(len(points), dtype=bool)
+    if not (same := is_found and found.n_repeating == 0 and kept.all()):
+        left = np.zeros(len(valid), dtype=bool)
         left[half_edges.faces] = True
     vertex_of, loose, flipped = target, _NONE, half_edges.flipped(flip)
     if left.all():
-        mesh = Mesh.of(found if same and not flip.any() else Search.known(points, flipped, sums))
+        mesh = Mesh.of(found if same and not flip.any() else Search.known(valid, flipped, sums))
     else:
         number = np.cumsum(left) - 1
         flipped = flipped.renumbered(number, int(left.sum()))
-        mesh = Mesh.of(Search.known(points[left], flipped, sums))
+        mesh = Mesh.of(Search.known(valid[left], flipped, sums))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)
@@ -183,6 +188,31 @@ def _require_usable(found: Search) -> None:
     if faults:
         reasons = "; ".join(f"{fault}; {fault.kind.advice}" for fault in faults)
         raise MeshError(f"this surface cannot be deformed: {reasons}")
+
+
+def _sewn(found: Search) -> tuple[IntArray, Search] | None:
+    """Return the vertex of each point (p,) if all of equal position are welded, and these vertices.
+
+    None if `_welded` may weld fewer points.  It does not if all faces at each vertex are one fan:
+    the faces at a point inside a surface are a whole fan, so all points were on borders.
+    """
+    may_have_seams = 2 * len(found.points) > len(found.triangles) + 4  # than a closed surface has
+    if not may_have_seams or found.n_repeating != 0 or not found.used.all():
+        return None
+    is_first = found.first_at == np.arange(len(found.points))
+    if is_first.all():
+        return None
+    target = (np.cumsum(is_first) - 1)[found.first_at]
+    faces = target.take(found.triangles)
+    vertices = found.points.take(np.flatnonzero(is_first), axis=0)
+    if repeats_vertex(faces).any():
+        return None
+    half_edges = HalfEdges(faces, len(vertices))
+    if not half_edges.one_fan_after_flips:
+        return None
+    sewn = Search.known(vertices, half_edges, None)
+    sewn.__dict__["first_at"] = np.arange(len(vertices))
+    return target, sewn
 
 
 def _welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges]:
@@ -238,6 +268,9 @@ def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
 
 def _without_area(found: Search, kept: BoolArray, half_edges: HalfEdges) -> BoolArray:
     """Return which faces *kept* are in a component of flat faces only, connected at any vertex."""
+    few = half_edges.faces[first_members(half_edges.shells)]  # usually enough
+    if not len(flat_faces(found.points, few)):
+        return np.zeros(len(half_edges.faces), dtype=bool)
     is_flat = np.zeros(len(found.triangles), dtype=bool)
     is_flat[found.flat] = True
     is_flat = is_flat[kept]
@@ -312,7 +345,7 @@ def _workarounds(
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
         there = at(np.append(half_edges.tail[crowded], half_edges.head_of(crowded)))
         yield Workaround(text, there, Kind.NON_MANIFOLD_EDGE, len(crowded))
-    if len(half_edges.turned) and half_edges.one_sided.any():
+    if not half_edges.is_oriented and half_edges.one_sided.any():
         one_sided = half_edges.one_sided
         there = at(half_edges.faces[one_sided[half_edges.shells]])
         yield _workaround(Kind.ONE_SIDED, int(one_sided.sum()), "# one-sided component", there)

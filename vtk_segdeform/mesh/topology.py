@@ -27,6 +27,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import BoolArray, IntArray
+from ..freezing import read_only
 from ..kernels import compiled_checks, in_parallel, inputs, scratch
 from .edges import edge_keys, flipped_faces, next_half_edge
 from .grouping import (
@@ -40,8 +41,8 @@ from .grouping import (
 
 _NAMELESS = (
     "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
-    "repeated", "shells", "sides", "one_sided", "crowded", "turned", "neighbours", "_parallel",
-    "_alone", "_paired",
+    "repeated", "shells", "sides", "one_sided", "crowded", "is_oriented", "turned", "neighbours",
+    "_parallel", "_alone", "_paired",
 )  # fmt: skip
 _UNDIRECTED = ("first", "counts", "shells")  # the same if faces are flipped
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
@@ -118,20 +119,20 @@ class HalfEdges:
         return self._by_edge(alone)
 
     @cached_property
-    def _paired(self) -> tuple[IntArray, bool] | None:
-        """`opposite`, and whether all are twins; None without compiled kernels."""
+    def _paired(self) -> tuple[IntArray, tuple[int, int, int]] | None:
+        """`opposite`, and the counts of `pair_half_edges`; None without compiled kernels."""
         m, n = len(self.faces), self.n_vertices
         kernels = compiled_checks(m) if m < _MOST else None
         if kernels is None:
             return None
         opposite, others = np.empty(3 * m, dtype=np.int64), scratch(np.int64, n + 2, n, 3 * m)
-        return opposite, not any(kernels.pair_half_edges(opposite, *others, *inputs(self.faces)))
+        return opposite, kernels.pair_half_edges(opposite, *others, *inputs(self.faces))
 
     @cached_property
     def twin(self) -> IntArray | None:
         """(3m,) int: the twin of each half-edge; None unless every half-edge has one."""
         if self._paired is not None:
-            return self._paired[0] if self._paired[1] else None
+            return None if any(self._paired[1]) else self._paired[0]
         one, other = self.order[: len(self.order) // 2 * 2].reshape(-1, 2).T
         tail, head = self.tail[one], self.head[one]
         if not (
@@ -203,7 +204,8 @@ class HalfEdges:
         if self._only_alone:
             return _NONE
         if self._paired is not None:
-            return self._by_edge(np.flatnonzero(self.opposite == -2))
+            n_crowded = self._paired[1][1]
+            return self._by_edge(np.flatnonzero(self.opposite == -2)) if n_crowded else _NONE
         crowded: IntArray = self.order[np.repeat(self.counts > 2, self.counts)]
         return crowded
 
@@ -213,9 +215,16 @@ class HalfEdges:
         return self.crowded[begins(self.keys_of(self.crowded))]
 
     @cached_property
+    def is_oriented(self) -> bool:
+        """Whether the half-edges of all pairs have opposite directions."""
+        if self._only_alone:
+            return True
+        return not (self._parallel.any() if self._paired is None else self._paired[1][2])
+
+    @cached_property
     def turned(self) -> IntArray:
         """(t,) int: the first half-edges of inconsistent pairs, in the order of edges."""
-        if self._only_alone:
+        if self.is_oriented:
             return _NONE
         return self._by_edge(self.neighbours[self._parallel, 0])
 
@@ -309,10 +318,14 @@ class HalfEdges:
         """
         if self._alone is not None:
             return np.zeros(len(self.faces), dtype=bool)
-        a, b, c = self.across.T
-        same = (a == b) | (b == c) | (c == a)
-        some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         repeated = np.zeros(len(self.faces), dtype=bool)
+        if self._paired is not None and (kernels := compiled_checks(len(repeated))):
+            kernels.same_across(repeated, *inputs(self.opposite))
+            some = np.flatnonzero(repeated)
+        else:
+            a, b, c = self.across.T
+            same = (a == b) | (b == c) | (c == a)
+            some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         if len(some):
             first = first_equal_row(np.sort(self.faces[some], axis=1))
             repeated[some] = first != np.arange(len(some))
@@ -336,6 +349,8 @@ class HalfEdges:
         """
         if not flip.any():
             return self
+        if "oriented" in self.__dict__ and self.oriented is not self:
+            return self.oriented.flipped(flip ^ self.sides[1])
         turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
         known = self.__dict__
         turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
@@ -368,8 +383,27 @@ class HalfEdges:
 
         A patch is connected across pairs, and its faces agree after the flips; see `two_sides`.
         """
+        m = len(self.faces)
+        if self._paired is not None and (kernels := compiled_checks(m)):
+            patch = np.empty(m, dtype=np.int64)
+            flip, one_sided = np.empty((2, m), dtype=bool)
+            given = inputs(self._paired[0], self.faces)
+            count = kernels.face_sides(patch, flip, one_sided, *scratch(np.int64, m), *given)
+            return read_only((patch, flip, one_sided[:count].copy()))
         one, other = self.neighbours.T
-        return two_sides(len(self.faces), one // 3, other // 3, self._parallel)
+        return read_only(two_sides(m, one // 3, other // 3, self._parallel))
+
+    @cached_property
+    def oriented(self) -> HalfEdges:
+        """The half-edges after the flips of `sides`."""
+        return self.flipped(self.sides[1])
+
+    @property
+    def one_fan_after_flips(self) -> bool:
+        """Whether every vertex of `oriented` has one fan; False if that is not known."""
+        if self._alone is not None or self._paired is None or self.is_oriented:
+            return self._alone is not None
+        return self.oriented._alone is not None
 
     @cached_property
     def one_sided(self) -> BoolArray:

@@ -70,6 +70,8 @@ def products(matrices: Any, vectors: Any) -> FloatArray:
     >>> products(np.diag([2.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0]]))
     array([[2., 2., 3.]])
     """
+    if np.array_equal(matrices, np.eye(3)):
+        return np.asarray(vectors, dtype=np.float64)
     result, each = np.empty(vectors.shape), np.broadcast_to(matrices, (len(vectors), 3, 3))
     for start in range(0, len(vectors), _PIECE):
         rows = slice(start, start + _PIECE)

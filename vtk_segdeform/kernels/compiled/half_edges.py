@@ -141,6 +141,56 @@ def pair_half_edges(opposite, starts, edges, bucket, faces):
 
 
 @_compile
+def same_across(same, opposite):
+    """Mark the faces without an edge alone that have one face, or several, across two edges.
+
+    *opposite* (3m,) is as of `pair_half_edges`; *same* is (m,) bool.
+    """
+    for f in range(len(same)):
+        a, b, c = opposite[3 * f], opposite[3 * f + 1], opposite[3 * f + 2]
+        a = a // 3 if a >= 0 else a
+        b = b // 3 if b >= 0 else b
+        c = c // 3 if c >= 0 else c
+        same[f] = (a == b or b == c or c == a) and a != -1 and b != -1 and c != -1
+
+
+@_compile
+def face_sides(patch, flip, one_sided, pending, opposite, faces):
+    """Put the patch of each face into *patch* (m,), and whether to flip it into *flip* (m,) bool.
+
+    Return the number of patches.  *opposite* (3m,) is as of `pair_half_edges`; a patch is connected
+    across pairs, and no face of a patch with one side is flipped.  *one_sided* (m,) bool gets
+    whether each patch has one side; *pending* (m,) int64 is of any values.
+    """
+    count = 0
+    patch[:] = -1
+    for first in range(len(faces)):
+        if patch[first] >= 0:
+            continue
+        patch[first], flip[first], one_sided[count] = count, False, False
+        pending[0], left = first, 1
+        while left:
+            left -= 1
+            f = pending[left]
+            for c in range(3):
+                h = opposite[3 * f + c]
+                if h < 0:
+                    continue
+                g = h // 3
+                turned = flip[f] ^ (faces[f, c] == faces[g, h - 3 * g])
+                if patch[g] < 0:
+                    patch[g], flip[g] = count, turned
+                    pending[left] = g
+                    left += 1
+                elif flip[g] != turned:
+                    one_sided[count] = True
+        count += 1
+    for f in range(len(faces)):
+        flip[f] &= not one_sided[patch[f]]
+    return count
+
+
+@_compile
 def link(parent, one, other):
     """Join the trees of items one[i] and other[i]; *parent* (n,) of each is at most itself."""
     for i in range(len(one)):

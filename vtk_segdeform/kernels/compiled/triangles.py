@@ -155,52 +155,59 @@ def convex_cuts(faces, is_cut, least, points, first, starts, counts, corners):
     that are not convex are not changed.  The ear with the shortest diagonal is cut first, of equal
     ones the first.  *least* is the square of the least sine of a corner.
     """
-    spoke = np.empty((counts.max() if len(counts) else 0, 3))
-    ring = np.empty(len(spoke), dtype=np.int64)
+    most = counts.max() if len(counts) else 0
+    sx, sy, sz, length = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    ring = np.empty(most, dtype=np.int64)
     for q in range(len(counts)):
         n, start, row = counts[q], starts[q], first[q]
-        ux = uy = uz = 0.0
+        o = corners[start]
         for k in range(n):
+            i = corners[start + k]
             ring[k] = k
-            for d in range(3):
-                spoke[k, d] = points[corners[start + k], d] - points[corners[start], d]
+            sx[k], sy[k], sz[k] = (
+                points[i, 0] - points[o, 0],
+                points[i, 1] - points[o, 1],
+                points[i, 2] - points[o, 2],
+            )
+        ux = uy = uz = 0.0
         for k in range(1, n - 1):
-            a, b = spoke[k], spoke[k + 1]
-            ux += a[1] * b[2] - a[2] * b[1]
-            uy += a[2] * b[0] - a[0] * b[2]
-            uz += a[0] * b[1] - a[1] * b[0]
+            ux += sy[k] * sz[k + 1] - sz[k] * sy[k + 1]
+            uy += sz[k] * sx[k + 1] - sx[k] * sz[k + 1]
+            uz += sx[k] * sy[k + 1] - sy[k] * sx[k + 1]
         size = (ux * ux + uy * uy) + uz * uz
         convex = True
         for k in range(1, n - 1):
-            a, b = spoke[k], spoke[k + 1]
-            x, y = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2]
-            z = a[0] * b[1] - a[1] * b[0]
+            x, y = sy[k] * sz[k + 1] - sz[k] * sy[k + 1], sz[k] * sx[k + 1] - sx[k] * sz[k + 1]
+            z = sx[k] * sy[k + 1] - sy[k] * sx[k + 1]
             convex &= (x * ux + y * uy) + z * uz > 0.0
         for k in range(n):
-            here, after, before = spoke[k], spoke[(k + 1) % n], spoke[k - 1 if k else n - 1]
-            ax, ay, az = after[0] - here[0], after[1] - here[1], after[2] - here[2]
-            bx, by, bz = before[0] - here[0], before[1] - here[1], before[2] - here[2]
+            i, j = (k + 1 if k + 1 < n else 0), (k - 1 if k else n - 1)
+            ax, ay, az = sx[i] - sx[k], sy[i] - sy[k], sz[i] - sz[k]
+            bx, by, bz = sx[j] - sx[k], sy[j] - sy[k], sz[j] - sz[k]
             x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
             up = (x * ux + y * uy) + z * uz
             lengths = ((ax * ax + ay * ay) + az * az) * ((bx * bx + by * by) + bz * bz)
             convex &= up > 0.0 and up * up >= least * (size * lengths)
+            x, y, z = sx[i] - sx[j], sy[i] - sy[j], sz[i] - sz[j]
+            length[k] = (x * x + y * y) + z * z  # of the diagonal of ear k
         is_cut[q] = convex
         left = n if convex else 0
         while left > 3:
-            shortest, ear = np.inf, 0
-            for k in range(left):
-                a, b = spoke[ring[k - 1 if k else left - 1]], spoke[ring[(k + 1) % left]]
-                x, y, z = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-                length = (x * x + y * y) + z * z
-                if length < shortest:
-                    shortest, ear = length, k
+            ear = 0
+            for k in range(1, left):
+                if length[k] < length[ear]:
+                    ear = k
             faces[row, 0] = corners[start + ring[ear - 1 if ear else left - 1]]
             faces[row, 1] = corners[start + ring[ear]]
-            faces[row, 2] = corners[start + ring[(ear + 1) % left]]
+            faces[row, 2] = corners[start + ring[ear + 1 if ear + 1 < left else 0]]
             row += 1
             left -= 1
             for k in range(ear, left):
-                ring[k] = ring[k + 1]
+                ring[k], length[k] = ring[k + 1], length[k + 1]
+            for k in (ear - 1 if ear else left - 1, ear if ear < left else 0):
+                i, j = ring[k + 1 if k + 1 < left else 0], ring[k - 1 if k else left - 1]
+                x, y, z = sx[i] - sx[j], sy[i] - sy[j], sz[i] - sz[j]
+                length[k] = (x * x + y * y) + z * z
         if convex:
             for k in range(3):
                 faces[row, k] = corners[start + ring[k]]
