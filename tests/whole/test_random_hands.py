@@ -15,8 +15,8 @@ from monkey import Monkey
     [
         (5, 30),
         pytest.param(5, 60, marks=pytest.mark.campaign),
-        pytest.param(1, 150, marks=pytest.mark.campaign),
-        pytest.param(9, 300, marks=pytest.mark.campaign),
+        pytest.param(2, 150, marks=pytest.mark.campaign),
+        pytest.param(8, 300, marks=pytest.mark.campaign),
         pytest.param(3, 10_000, marks=pytest.mark.campaign),
     ],
 )

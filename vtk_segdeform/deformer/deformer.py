@@ -119,7 +119,7 @@ _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
 _PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
-_STAYS = 1.0  # weight of `locality` from which a finish moves nothing: at 1.4 times the reach
+_STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
@@ -641,7 +641,7 @@ class Deformer:
         as-rigid-as-possible: triangles are less distorted, joints bend in less space, and the
         handles and fixed vertices are exact.  The volume is preserved as before.  The next solve
         starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
-        only the surface within the reach is finished: it stays from 1.4 times the reach on, and
+        only the surface within the reach is finished: it stays from 1.15 times the reach on, and
         next to a handle of one vertex, which would become a spike.  A pose that would lose its
         volume, because hardly a vertex is free, is returned unchanged.  Of the finish of a pull
         half is used, or a quarter, if all of it would add energy or folds; if these do as well,
