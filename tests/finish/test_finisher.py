@@ -393,7 +393,7 @@ def test_the_finish_of_a_pull_moves_its_reach_only():
     found = pulled.finish(solution)
     away = np.linalg.norm(x - x[tip], axis=1)
     moved = np.linalg.norm(found.vertices - solution.vertices, axis=1)
-    assert moved[away > 0.25 * size].max() == 0.0
+    assert moved[away > 0.23 * size].max() == 0.0
     assert moved[away < 0.04 * size].max() < 1e-5 * size
     assert moved.max() > 1e-4 * size
     assert abs(found.volume_change) < 1e-13
