@@ -39,7 +39,7 @@ from scipy.sparse.linalg import splu
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
 from ..kernels import one_blas_thread
-from ..mesh import Mesh, new_crossings
+from ..mesh import Crossings, Mesh
 from ..progress import Progress, cancellable, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
@@ -115,6 +115,7 @@ class Finisher:
         anchored = np.bincount(mesh.components, held) > 0.0
         free = anchored[mesh.components] & ~held
         self._mesh, self._energy = mesh, energy.near(free)
+        self._crossing = Crossings(mesh.vertices, mesh.faces).at
         self._held, self._free = held, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
@@ -199,10 +200,6 @@ class Finisher:
         folds = Folds.of(self._mesh)
         before, after = (self._evaluated(x).value for x in (begin, end))
         return after < before and bool(folds.at(end).sum() <= folds.at(begin).sum())
-
-    def _crossing(self, x: FloatArray) -> IntArray:
-        """Return the faces that cross others in the pose *x*, but not at rest."""
-        return new_crossings(x, self._mesh.vertices, self._mesh.faces)
 
     def _run(self, begin: FloatArray, progress: Progress | None) -> Finish:
         """Return the finish of a pose whose held vertices are in their places."""
