@@ -44,6 +44,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import IntrinsicTriangulation, area_gradients, closest_rotations
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import Mesh
+from .folds import Folds
 from .volume_band import VolumeBand
 
 # t.  Medians of 15 poses of limbs for t = 0.03, 0.05, 0.1: distortion 1.22, 1.23, 1.25 times that
@@ -76,6 +77,8 @@ class CellEnergy:
         With an entry for each pair of neighbours in the mesh.
     band : VolumeBand
         Of the mesh.
+    folds : Folds
+        Of the mesh.
     """
 
     def __init__(
@@ -86,9 +89,10 @@ class CellEnergy:
         gradients: FloatArray,
         graph: sparse.csr_array,
         band: VolumeBand,
+        folds: Folds,
     ) -> None:
-        self._given = rest, faces, cotangents, gradients, graph, band
-        self.band = band
+        self._given = rest, faces, cotangents, gradients, graph
+        self.band, self.folds = band, folds
         inside = np.zeros(len(rest), dtype=bool)
         inside[faces] = True
         self._own = np.flatnonzero(inside)  # its vertices, in the order of all rows below
@@ -113,16 +117,15 @@ class CellEnergy:
     def of(cls, mesh: Mesh) -> CellEnergy:
         """Return the energy of *mesh*, on its intrinsic triangulation."""
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-        gradients, band = area_gradients(surface), VolumeBand.of(mesh)
-        given = mesh.vertices, surface.faces, surface.cotangents, gradients
-        return cls(*given, mesh.adjacency, band)
+        given = mesh.vertices, surface.faces, surface.cotangents, area_gradients(surface)
+        return cls(*given, mesh.adjacency, VolumeBand.of(mesh), Folds.of(mesh))
 
     def near(self, moving: BoolArray) -> CellEnergy:
         """Return the energy near the vertices that are *moving* (n,), for one thread.
 
         It changes by the same amount, and has the same gradient at these vertices.
         """
-        rest, faces, cotangents, gradients, graph, band = self._given
+        rest, faces, cotangents, gradients, graph = self._given
         near = moving.astype(float)
         for _ in range(_RINGS):
             near = np.minimum(near + graph @ near, 1.0)
@@ -131,7 +134,8 @@ class CellEnergy:
             own = copy(self)
             own._rooms = None
             return own
-        return CellEnergy(rest, faces[some], cotangents[some], gradients[some], graph, band)
+        chosen = faces[some], cotangents[some], gradients[some]
+        return CellEnergy(rest, *chosen, graph, self.band, self.folds)
 
     @property
     def laplacian(self) -> sparse.csr_array:

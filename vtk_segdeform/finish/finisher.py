@@ -44,7 +44,6 @@ from ..progress import Progress, cancellable, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .creases import smoothed
-from .folds import Folds
 from .gradients import around
 from .unfolding import unfolded
 
@@ -197,7 +196,7 @@ class Finisher:
 
     def is_better(self, begin: FloatArray, end: FloatArray) -> bool:
         """Return whether *end* has lower energy than *begin* without additional folds."""
-        folds = Folds.of(self._mesh)
+        folds = self._energy.folds
         before, after = (self._evaluated(x).value for x in (begin, end))
         return after < before and bool(folds.at(end).sum() <= folds.at(begin).sum())
 
@@ -322,7 +321,7 @@ class Finisher:
 
     def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:
         """Return *x* with as few folds as its places and volumes allow."""
-        folds = Folds.of(self._mesh)
+        folds = self._energy.folds
         free = np.zeros(len(x), dtype=bool)
         free[self._free] = True
         best, least = x, np.count_nonzero(folds.at(x))
