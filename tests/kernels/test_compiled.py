@@ -472,7 +472,6 @@ def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twi
 def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
     pytest.importorskip("numba")
     from vtk_segdeform.kernels.compiled import add_packed_adjoint, map_packed, solve_factored
-    from vtk_segdeform.kernels.compiled.rotations import _minor
     from vtk_segdeform.kernels.compiled.text import _number
 
     rows = np.arange(2500), np.arange(1500, 4000)
@@ -490,7 +489,7 @@ def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
         Factor(np.eye(180), coupled).solve(np.ones((60 if coupled else 180, 3)))
     closest_rotations(SHAPES["any"])
     numbers_of(1000 * b"1.5 2\n", float)
-    for kernel in (map_packed, add_packed_adjoint, solve_factored, _minor, _number):
+    for kernel in (map_packed, add_packed_adjoint, solve_factored, _number):
         assert len(kernel.signatures) <= 1, kernel  # none if in the cache with its caller
 
 

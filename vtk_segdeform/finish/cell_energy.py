@@ -39,11 +39,13 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import IntrinsicTriangulation, area_gradients, closest_rotations
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import Mesh
+from .folds import Folds
 from .volume_band import VolumeBand
 
 # t.  Medians of 15 poses of limbs for t = 0.03, 0.05, 0.1: distortion 1.22, 1.23, 1.25 times that
@@ -74,7 +76,11 @@ class CellEnergy:
         See `geometry.area_gradients`.
     graph : (n, n) sparse
         With an entry for each pair of neighbours in the mesh.
+    order : (n,) int
+        The vertices in an order in which neighbours are near each other.
     band : VolumeBand
+        Of the mesh.
+    folds : Folds
         Of the mesh.
     """
 
@@ -85,14 +91,17 @@ class CellEnergy:
         cotangents: FloatArray,
         gradients: FloatArray,
         graph: sparse.csr_array,
+        order: IntArray,
         band: VolumeBand,
+        folds: Folds,
     ) -> None:
-        self._given = rest, faces, cotangents, gradients, graph, band
-        self.band = band
+        self._given = rest, faces, cotangents, gradients, graph, order
+        self.band, self.folds = band, folds
         inside = np.zeros(len(rest), dtype=bool)
         inside[faces] = True
-        self._own = np.flatnonzero(inside)  # its vertices, in the order of all rows below
-        number = np.cumsum(inside) - 1
+        self._own = order[inside[order]]  # its vertices, in the order of all rows below
+        number = np.zeros(len(rest), dtype=np.int64)
+        number[self._own] = np.arange(len(self._own))
         n, corners = len(self._own), number[faces]
         i, j = np.repeat(corners, 3, axis=1).ravel(), np.tile(corners, 3).ravel()
         thirds = np.repeat(gradients[:, None] / 3.0, 3, axis=1).reshape(-1, 3)
@@ -107,22 +116,22 @@ class CellEnergy:
         self._shares = 1.0 / np.maximum(np.diff(self._graph.indptr), 1)
         x = rest[self._own] - rest[self._own].mean(axis=0)
         self.constant = float(np.vdot(x, entries[0] @ x))
-        self._rooms: tuple[FloatArray, FloatArray] | None = None
+        self._rooms: tuple[FloatArray, ...] | None = None
 
     @classmethod
     def of(cls, mesh: Mesh) -> CellEnergy:
         """Return the energy of *mesh*, on its intrinsic triangulation."""
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-        gradients, band = area_gradients(surface), VolumeBand.of(mesh)
-        given = mesh.vertices, surface.faces, surface.cotangents, gradients
-        return cls(*given, mesh.adjacency, band)
+        given = mesh.vertices, surface.faces, surface.cotangents, area_gradients(surface)
+        order = np.asarray(reverse_cuthill_mckee(mesh.adjacency, symmetric_mode=True))
+        return cls(*given, mesh.adjacency, order, VolumeBand.of(mesh), Folds.of(mesh))
 
     def near(self, moving: BoolArray) -> CellEnergy:
         """Return the energy near the vertices that are *moving* (n,), for one thread.
 
         It changes by the same amount, and has the same gradient at these vertices.
         """
-        rest, faces, cotangents, gradients, graph, band = self._given
+        rest, faces, cotangents, gradients, graph, order = self._given
         near = moving.astype(float)
         for _ in range(_RINGS):
             near = np.minimum(near + graph @ near, 1.0)
@@ -131,7 +140,8 @@ class CellEnergy:
             own = copy(self)
             own._rooms = None
             return own
-        return CellEnergy(rest, faces[some], cotangents[some], gradients[some], graph, band)
+        chosen = faces[some], cotangents[some], gradients[some]
+        return CellEnergy(rest, *chosen, graph, order, self.band, self.folds)
 
     @property
     def laplacian(self) -> sparse.csr_array:
@@ -142,17 +152,16 @@ class CellEnergy:
 
     def value_and_slope(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return E + V at *x* (n, 3), and half its gradient (n, 3)."""
-        own = x[self._own]
-        product, load = self._product_and_load(own)
-        value = np.einsum("ij,ij->", own, product - 2.0 * load) + self.constant
+        own = np.take(x, self._own, axis=0)
+        terms, forces = self._terms_and_forces(own)
         beyond, slope = self.band.value_and_slope(x)
-        slope[self._own] += product - load
-        return float(value) + beyond, slope
+        slope[self._own] += forces
+        return float(terms.sum()) + self.constant + beyond, slope
 
-    def _product_and_load(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return C x and l, (a, 3) each, of the a vertices at *x*."""
+    def _terms_and_forces(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return x . (C x - 2 l) and C x - l of the a vertices at *x*, (a,) and (a, 3)."""
         if kernels := compiled_kernels(_TIMES * len(x)):
-            return self._compiled_product_and_load(kernels, x)
+            return self._compiled_terms_and_forces(kernels, x)
         n, ones = len(x), np.ones(len(x))
         laplacian, *fans = (self._matrix(column) for column in self._weights.T)
         sums = np.stack([fan @ x for fan in fans], axis=1).reshape(n, 9)
@@ -161,8 +170,9 @@ class CellEnergy:
         cells = self._spread(cells, ones, self._shares)
         fans = [self._matrix(column) for column in self._transposed.T]
         turned = cells.reshape(n, 3, 3)
-        load = sum(fan @ turned[:, :, axis] for axis, fan in enumerate(fans))
-        return laplacian @ x, np.asarray(load)
+        load = np.asarray(sum(fan @ turned[:, :, axis] for axis, fan in enumerate(fans)))
+        forces = laplacian @ x - load
+        return np.einsum("ij,ij->i", x, forces - load), forces
 
     def _spread(self, values: FloatArray, given: FloatArray, taken: FloatArray) -> FloatArray:
         """Return (1 - t) v_i + t taken_i sum of given_j v_j over the neighbours j of i."""
@@ -172,13 +182,14 @@ class CellEnergy:
         )
         return (1.0 - SHARE) * values + SHARE * taken[:, None] * (graph @ (given[:, None] * values))
 
-    def _compiled_product_and_load(
+    def _compiled_terms_and_forces(
         self, kernels: Any, x: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         n = len(x)
         if self._rooms is None:  # of large arrays, new pages take as long as all of this
-            self._rooms = np.empty((3, n, 9)), np.empty((2, n, 3))
-        (sums, other, cells), (product, load) = self._rooms
+            self._rooms = np.empty((2, n, 9)), np.empty((n, 3)), np.empty(n)
+        (cells, other), forces, terms = self._rooms
+        (x,) = inputs(x)
         links = inputs(self._starts, self._at)
         graph = inputs(self._graph.indptr, self._graph.indices)
         degrees, ones = inputs(self._shares, np.ones(n))
@@ -186,8 +197,8 @@ class CellEnergy:
         def run(kernel: Any, *given: Any) -> None:
             in_parallel(partial(kernel, *given), n, _PIECE)
 
-        run(kernels.cell_sums, sums, product, *inputs(x), *links, *inputs(self._weights))
-        run(kernels.spread_cells, other, *inputs(sums), *graph, degrees, ones, SHARE)
+        run(kernels.cell_sums, cells, forces, x, *links, *inputs(self._weights))
+        run(kernels.spread_cells, other, *inputs(cells), *graph, degrees, ones, SHARE)
 
         def turn(start: int, stop: int) -> None:
             some = other[start:stop].reshape(-1, 3, 3)
@@ -195,8 +206,9 @@ class CellEnergy:
 
         in_parallel(turn, n, _PIECE)
         run(kernels.spread_cells, other, *inputs(cells), *graph, ones, degrees, SHARE)
-        run(kernels.cell_loads, load, *inputs(other), *links, *inputs(self._transposed))
-        return product, load
+        spread, transposed = inputs(other, self._transposed)
+        run(kernels.cell_forces, forces, terms, x, spread, *links, transposed)
+        return terms, forces
 
     def _matrix(self, entries: FloatArray) -> sparse.csr_array:
         n = len(self._own)

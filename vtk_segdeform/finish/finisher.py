@@ -39,12 +39,11 @@ from scipy.sparse.linalg import splu
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..errors import MeshError
 from ..kernels import one_blas_thread
-from ..mesh import Mesh, new_crossings
+from ..mesh import Crossings, Mesh
 from ..progress import Progress, cancellable, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .creases import smoothed
-from .folds import Folds
 from .gradients import around
 from .unfolding import unfolded
 
@@ -115,6 +114,7 @@ class Finisher:
         anchored = np.bincount(mesh.components, held) > 0.0
         free = anchored[mesh.components] & ~held
         self._mesh, self._energy = mesh, energy.near(free)
+        self._crossing = Crossings(mesh.vertices, mesh.faces).at
         self._held, self._free = held, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
@@ -196,13 +196,9 @@ class Finisher:
 
     def is_better(self, begin: FloatArray, end: FloatArray) -> bool:
         """Return whether *end* has lower energy than *begin* without additional folds."""
-        folds = Folds.of(self._mesh)
+        folds = self._energy.folds
         before, after = (self._evaluated(x).value for x in (begin, end))
         return after < before and bool(folds.at(end).sum() <= folds.at(begin).sum())
-
-    def _crossing(self, x: FloatArray) -> IntArray:
-        """Return the faces that cross others in the pose *x*, but not at rest."""
-        return new_crossings(x, self._mesh.vertices, self._mesh.faces)
 
     def _run(self, begin: FloatArray, progress: Progress | None) -> Finish:
         """Return the finish of a pose whose held vertices are in their places."""
@@ -331,7 +327,7 @@ class Finisher:
 
     def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:
         """Return *x* with as few folds as its places and volumes allow."""
-        folds = Folds.of(self._mesh)
+        folds = self._energy.folds
         free = np.zeros(len(x), dtype=bool)
         free[self._free] = True
         best, least = x, np.count_nonzero(folds.at(x))

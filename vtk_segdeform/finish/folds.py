@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import HalfEdges, Mesh
+from ..mesh import HalfEdges, Mesh, cross_rows
 
 _FLAT = 0.1
 _TURNED, _CHANGED = np.radians(150.0), np.radians(90.0)
@@ -49,13 +49,17 @@ class Folds:
         a, b, d = self.inverses
         one, shear, other = length * a, length * b + along * d, height * d
         area = one * other
-        total = one * one + shear * shear + other * other
+        total = one * one + shear * shear + other * other  # s1^2 + s2^2
+        folded: BoolArray = self.good & (area * area < _FLAT * _FLAT * total)
+        thin = np.flatnonzero(folded)
+        area, total = area[thin], total[thin]
         largest = 0.5 * (total + np.sqrt(np.maximum(total * total - 4.0 * area * area, 0.0)))
-        folded: BoolArray = self.good & (area * area < _FLAT * _FLAT * largest)
-        now = _angles(x, normals, self.edges, self.sides)
-        suspects = np.flatnonzero(np.abs(now) > _TURNED)
-        change = (now[suspects] - self.angles[suspects] + np.pi) % (2.0 * np.pi) - np.pi
-        folded[self.sides[suspects[np.abs(change) > _CHANGED]].ravel()] = True
+        folded[thin] = area * area < _FLAT * _FLAT * largest
+        left, right = (np.take(normals, side, axis=0) for side in self.sides.T)
+        turned = np.flatnonzero(np.einsum("ij,ij->i", left, right) < np.cos(_TURNED))
+        now = _angles(x, normals, self.edges[turned], self.sides[turned])
+        change = (now - self.angles[turned] + np.pi) % (2.0 * np.pi) - np.pi
+        folded[self.sides[turned[np.abs(change) > _CHANGED]].ravel()] = True
         return folded
 
 
@@ -65,7 +69,7 @@ def _frames(
     """Return the first edge's length, the second along it, its height, and the unit normals."""
     a, b, c = (np.take(x, corner, axis=0) for corner in faces.T)
     first, second = b - a, c - a
-    normals = np.cross(first, second)
+    normals = cross_rows(first, second)
     tiny = np.finfo(float).tiny
     length = np.sqrt(np.einsum("ij,ij->i", first, first))
     double = np.sqrt(np.einsum("ij,ij->i", normals, normals))
@@ -79,6 +83,6 @@ def _angles(x: FloatArray, normals: FloatArray, edges: IntArray, sides: IntArray
     along = x[edges[:, 1]] - x[edges[:, 0]]
     length = np.sqrt(np.einsum("ij,ij->i", along, along))
     left, right = normals[sides[:, 0]], normals[sides[:, 1]]
-    sines = np.einsum("ij,ij->i", np.cross(left, right), along)
+    sines = np.einsum("ij,ij->i", cross_rows(left, right), along)
     sines /= np.maximum(length, np.finfo(float).tiny)
     return np.asarray(np.arctan2(sines, np.einsum("ij,ij->i", left, right)))

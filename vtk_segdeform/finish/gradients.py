@@ -46,6 +46,7 @@ class Patch:
         columns = np.repeat(self.faces, 2, axis=0)
         places = np.repeat(rows, 3), columns.ravel()
         self._gradient = sparse.csr_array((values.ravel(), places), (len(rows), mesh.n_vertices))
+        self._own = self._gradient[:, self._moving]
 
     def edges(self, folds: Folds) -> tuple[BoolArray, IntArray]:
         """Return which edges are between two of the triangles, and their numbers there (e, 2)."""
@@ -61,11 +62,10 @@ class Patch:
 
     def fitted(self, x: FloatArray, wanted: FloatArray, weights: FloatArray) -> FloatArray:
         """Return the pose *x* (n, 3) with gradients close to *wanted* (m, 3, 2); *weights* (m,)."""
-        own = self._gradient[:, self._moving]
-        weighted = own.T * np.repeat(self._areas * weights, 2)
+        weighted = self._own.T * np.repeat(self._areas * weights, 2)
         off = np.swapaxes(wanted - self.at(x), 1, 2).reshape(-1, 3)
         x = x.copy()
-        normal = weighted @ own
+        normal = weighted @ self._own
         # A vertex of flat triangles only is in no equation, and stays.
         stay = _STAY * float(normal.diagonal().mean()) + _TINY
         normal = normal + stay * sparse.eye_array(len(self._moving))

@@ -23,6 +23,8 @@ _RINGS = 3, 6, 12  # around folded triangles, that move; one after the other
 _STEPS = 30  # with one of them, at most
 _LEAST, _MOST = 0.3, 4.0  # singular values of gradients
 _TURNED, _CHANGED = np.radians(115.0), np.radians(60.0)  # as in `folds`, of triangles far from it
+# It ends half way between these bounds and a fold.
+_ENOUGH, _SLACK = 0.2, np.radians(17.5)
 _HEAVY = 10.0  # weight of changed triangles
 _TINY = 1e-300
 
@@ -52,15 +54,15 @@ class _Opening:
         """Return the pose *x* (n, 3) with its folds opened, as far as that is possible."""
         heavy = np.zeros(len(self._patch.triangles), dtype=bool)
         for _ in range(_STEPS):
-            wanted, changed = self._wanted(x, self._patch.at(x))
-            if not changed.any():
+            wanted, changed, is_open = self._wanted(x, self._patch.at(x))
+            if is_open:
                 break
             heavy |= changed
             x = self._patch.fitted(x, wanted, np.where(heavy, _HEAVY, 1.0))
         return x
 
-    def _wanted(self, x: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Return J* (m, 3, 2), and which of them differ from *j*."""
+    def _wanted(self, x: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
+        """Return J* (m, 3, 2), which of them differ from *j*, and whether *j* are far from folds."""
         a, b, c = (x[corner] for corner in self._patch.faces.T)
         normals = np.cross(b - a, c - a)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)
@@ -83,7 +85,8 @@ class _Opening:
         u, s, v = np.linalg.svd(turned, full_matrices=False)
         bounded = np.clip(s, _LEAST, _MOST)
         changed |= (bounded != s).any(axis=1)
-        return (u * bounded[:, None, :]) @ v, changed
+        is_open = bool((excess <= _SLACK).all() and (s[:, 1] >= _ENOUGH).all())
+        return (u * bounded[:, None, :]) @ v, changed, is_open
 
 
 def _rotated(turn: FloatArray, j: FloatArray) -> FloatArray:

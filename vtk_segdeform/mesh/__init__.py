@@ -30,6 +30,7 @@ from .grouping import (
 )
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import (
+    Crossings,
     flat_faces,
     intersections_of,
     new_crossings,
@@ -44,6 +45,7 @@ from .triangles import corner_angles, cross_rows, least_angle, normals
 
 __all__ = [
     "UNREPAIRABLE",
+    "Crossings",
     "HalfEdges",
     "Kind",
     "Mesh",

@@ -30,6 +30,7 @@ _TOUCH = 1e-12  # of a pair's extent: at smaller distances triangles touch and p
 _FOLD = 1e-9  # radians between two faces folded over their common edge
 _NEEDLE = 1e-10  # height over longest edge; the plane of a flatter face is undefined
 _BATCH = 200_000  # pairs tested at once
+_KNOWN = 4  # poses that are kept besides the last and the rest pose
 
 _EDGES = ((0, 1), (1, 2), (2, 0))
 _OPPOSITE = ((1, 2),)  # the edge opposite to a shared corner, which is rolled to the front
@@ -69,8 +70,37 @@ def new_crossings(vertices: FloatArray, rest: FloatArray, faces: IntArray) -> In
     A face counts if it is in a pair of `self_intersections` at *vertices* that is none at *rest*.
     Pairs of which neither face has moved are not tested.
     """
-    pairs = _meeting(vertices, faces, (vertices != rest).any(axis=1)[faces].any(axis=1))
-    return np.unique(pairs[~_meet(rest, faces[pairs[:, 0]], faces[pairs[:, 1]])])
+    return Crossings(rest, faces).at(vertices)
+
+
+class Crossings:
+    """The faces that cross or touch others in poses of a mesh, but not at rest.
+
+    A pose is tested only where it differs from one of the last few poses.
+
+    Parameters
+    ----------
+    rest : (n, 3) float
+        All vertices at rest.
+    faces : (m, 3) int
+        The triangles.
+    """
+
+    def __init__(self, rest: FloatArray, faces: IntArray) -> None:
+        self._rest, self._faces = rest, faces
+        self._known = [(rest, np.empty((0, 2), dtype=np.int64))]  # poses, and pairs that cross
+
+    def at(self, x: FloatArray) -> IntArray:
+        """Return the faces (k,) of `new_crossings` in the pose *x* (n, 3), not changed later."""
+        differences = [(x != pose).any(axis=1) for pose, _ in self._known]
+        least = int(np.argmin([np.count_nonzero(each) for each in differences]))
+        moved = differences[least][self._faces].any(axis=1)
+        known = self._known[least][1]
+        found = _meeting(x, self._faces, moved)
+        found = found[~_meet(self._rest, self._faces[found[:, 0]], self._faces[found[:, 1]])]
+        pairs = np.concatenate([known[~moved[known].any(axis=1)], found])
+        self._known = [self._known[0], *self._known[1:][-_KNOWN:], (x, pairs)]
+        return np.unique(pairs)
 
 
 def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> IntArray:

@@ -22,7 +22,7 @@ from ..kernels import compiled_checks, in_parallel, inputs
 
 _TIMES = 500  # the search takes as long as so many checks of each face
 _LEAF = 8  # faces in a leaf of the tree, at most
-_PIECE = 8_192  # faces to a task
+_PIECE = 1_024  # leaves to a task
 _NEAR = 10  # pairs of touching boxes per face for which space is reserved at first
 _FACES = 10_000  # faces whose neighbourhoods are searched at once
 _WIDER = 1.0 + 1e-12  # for rounding
@@ -41,14 +41,14 @@ def near_faces(points: FloatArray, faces: IntArray, asked: BoolArray) -> Iterato
     if not asked.any():
         return
     if kernels := compiled_checks(_TIMES * int(asked.sum())):
-        yield from _near_in_tree(kernels, points, faces, asked)
+        yield _near_in_tree(kernels, points, faces, asked)
     else:
         yield from _near_centres(points, faces, asked)
 
 
 def _near_in_tree(
     kernels: Any, points: FloatArray, faces: IntArray, asked: BoolArray
-) -> list[IntArray]:
+) -> IntArray:
     order = _morton_order(points, faces)
     m = len(order)
     leaves = 1 << max(-(-m // _LEAF) - 1, 0).bit_length()
@@ -59,7 +59,7 @@ def _near_in_tree(
     found: dict[int, IntArray] = {}
 
     def work(start: int, stop: int) -> None:
-        pairs = np.empty((_NEAR * (stop - start), 2), dtype=np.int64)
+        pairs = np.empty((_NEAR * _LEAF * (stop - start), 2), dtype=np.int64)
         count = kernels.touching_boxes(pairs, boxes, tree, is_asked, start, stop)
         if count > len(pairs):
             pairs = np.empty((count, 2), dtype=np.int64)
@@ -68,13 +68,15 @@ def _near_in_tree(
         kernels.may_meet(chosen := np.empty(count, dtype=bool), pairs, planes, *mesh)
         found[start] = order[pairs[chosen]]
 
-    in_parallel(work, m, _PIECE)
-    return [found[start] for start in sorted(found)]
+    in_parallel(work, leaves, _PIECE)
+    pairs = np.concatenate([found[start] for start in sorted(found)])
+    return np.where(asked[pairs[:, :1]], pairs, pairs[:, ::-1])
 
 
 def _morton_order(points: FloatArray, faces: IntArray) -> IntArray:
     """Return the faces (m,) along a curve through their centres that stays in each cube."""
-    centres = points[faces].mean(axis=1)
+    a, b, c = (np.take(points, corner, axis=0) for corner in faces.T)
+    centres = a + b + c
     low, extent = centres.min(axis=0), float(np.ptp(centres, axis=0).max())
     scale = (len(_SPREAD) - 1) / extent if extent > 0.0 else 0.0
     x, y, z = ((centres - low) * scale).astype(np.int64).T

@@ -26,7 +26,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
 from .beams import beam_meets, beyond_sides
-from .cells import cell_loads, cell_sums, spread_cells
+from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import solve_factored
@@ -87,7 +87,7 @@ __all__ = [
     "beam_meets",
     "beyond_sides",
     "border_half_edges",
-    "cell_loads",
+    "cell_forces",
     "cell_sums",
     "collapse_costs",
     "convex_cuts",

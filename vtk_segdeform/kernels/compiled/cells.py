@@ -34,19 +34,29 @@ def cell_sums(sums, product, x, indptr, indices, weights, start, stop):
 def spread_cells(out, values, indptr, indices, given, taken, share, start, stop):
     """Put (1 - share) v_i + share taken_i sum_j given_j v_j into *out* (n, 9), v being *values*."""
     for i in range(start, stop):
-        for c in range(9):
-            out[i, c] = 0.0
+        a = b = c = d = e = f = g = h = k = 0.0
         for at in range(indptr[i], indptr[i + 1]):
             j = indices[at]
-            for c in range(9):
-                out[i, c] += given[j] * values[j, c]
-        for c in range(9):
-            out[i, c] = (1.0 - share) * values[i, c] + share * taken[i] * out[i, c]
+            w = given[j]
+            a += w * values[j, 0]
+            b += w * values[j, 1]
+            c += w * values[j, 2]
+            d += w * values[j, 3]
+            e += w * values[j, 4]
+            f += w * values[j, 5]
+            g += w * values[j, 6]
+            h += w * values[j, 7]
+            k += w * values[j, 8]
+        for at, total in enumerate((a, b, c, d, e, f, g, h, k)):
+            out[i, at] = (1.0 - share) * values[i, at] + share * taken[i] * total
 
 
 @_compile
-def cell_loads(load, rotations, indptr, indices, transposed, start, stop):
-    """Put sum_i R_i^T k_ij of each j into *load* (n, 3); *transposed* (m, 3) has k_ij in row j."""
+def cell_forces(forces, terms, x, rotations, indptr, indices, transposed, start, stop):
+    """Subtract l_j = sum_i R_i^T k_ij from *forces* (n, 3), and put x_j . (C x - 2 l)_j into *terms*.
+
+    *forces* is C x before; *transposed* (m, 3) has k_ij in row j.
+    """
     for j in range(start, stop):
         a = b = c = 0.0
         for at in range(indptr[j], indptr[j + 1]):
@@ -55,4 +65,6 @@ def cell_loads(load, rotations, indptr, indices, transposed, start, stop):
             a += rotations[i, 0] * u + rotations[i, 1] * v + rotations[i, 2] * w
             b += rotations[i, 3] * u + rotations[i, 4] * v + rotations[i, 5] * w
             c += rotations[i, 6] * u + rotations[i, 7] * v + rotations[i, 8] * w
-        load[j, 0], load[j, 1], load[j, 2] = a, b, c
+        p, q, r = forces[j, 0] - a, forces[j, 1] - b, forces[j, 2] - c
+        forces[j, 0], forces[j, 1], forces[j, 2] = p, q, r
+        terms[j] = x[j, 0] * (p - a) + x[j, 1] * (q - b) + x[j, 2] * (r - c)

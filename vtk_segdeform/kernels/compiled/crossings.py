@@ -56,32 +56,37 @@ def grow_tree(boxes, tree, planes, points, faces):
 def touching_boxes(pairs, boxes, tree, asked, start, stop):
     """Put the pairs of faces whose boxes touch into *pairs* (k, 2); return their number.
 
-    The first of a pair is one of start..stop, and *asked* (m,) bool; the second is another face
-    that is not, or a later one that is.  *pairs* is filled as far as it goes.
+    The first face is in one of the leaves start..stop and before the second, and one of both is
+    *asked* (m,).  *pairs* is filled as far as it goes.
     """
-    k, count = len(tree) // 2, 0
-    size = -(-len(boxes) // k)
-    stack = np.empty(_DEEPEST, dtype=np.int64)
-    for i in range(start, stop):
-        if not asked[i]:
-            continue
-        stack[0], top = 1, 1
+    k, m, count = len(tree) // 2, len(boxes), 0
+    size = -(-m // k)
+    nodes, lasts = np.empty(_DEEPEST, dtype=np.int64), np.empty(_DEEPEST, dtype=np.int64)
+    for leaf in range(start, stop):
+        begin, end = size * leaf, min(size * (leaf + 1), m)
+        nodes[0], lasts[0], top = 1, k - 1, 1
         while top:
             top -= 1
-            node = stack[top]
-            if _are_apart(tree, node, boxes, i):
+            node, last = nodes[top], lasts[top]
+            if last < leaf or _are_apart(tree, node, tree, k + leaf):
                 continue
             if node < k:
-                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+                half = 1
+                while node * 2 * half < k:
+                    half *= 2
+                nodes[top], lasts[top] = 2 * node, last - half
+                nodes[top + 1], lasts[top + 1] = 2 * node + 1, last
                 top += 2
                 continue
             first = size * (node - k)
-            for j in range(first, min(first + size, len(boxes))):
-                if j == i or (asked[j] and j < i) or _are_apart(boxes, j, boxes, i):
+            for i in range(begin, end):
+                if _are_apart(boxes, i, tree, node):
                     continue
-                if count < len(pairs):
-                    pairs[count, 0], pairs[count, 1] = i, j
-                count += 1
+                for j in range(max(first, i + 1), min(first + size, m)):
+                    if (asked[i] or asked[j]) and not _are_apart(boxes, i, boxes, j):
+                        if count < len(pairs):
+                            pairs[count, 0], pairs[count, 1] = i, j
+                        count += 1
     return count
 
 
