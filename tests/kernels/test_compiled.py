@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from open_surfaces import bottle, moebius, sheet
+from scipy import sparse
 from solids import OCTAHEDRON, icosphere, together, torus
 
 from vtk_segdeform import Mesh, Surface, models, sizes
@@ -31,6 +32,7 @@ from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
 from vtk_segdeform.errors import Cancelled, MeshError
 from vtk_segdeform.finish import CellEnergy
+from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.local_volume import LocalVolume
 from vtk_segdeform.geometry.normals import VertexNormals
@@ -225,6 +227,20 @@ def test_energies_of_cells_agree(twin, monkeypatch):
     (quick, steep), (slow, steeper) = twin(lambda: energy.value_and_slope(x))
     assert quick == pytest.approx(slow, rel=1e-12)
     assert_allclose(steep, steeper, atol=1e-12)
+
+
+@pytest.mark.parametrize("spread", [0.0, 3.0])
+@pytest.mark.parametrize("n", [0, 1, 700])
+def test_sparse_factors_solve_their_matrix(twin, monkeypatch, n, spread):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
+    links = sparse.random_array((n, n), density=0.01, rng=np.random.default_rng(0))
+    ring = links + links.T
+    scale = sparse.diags_array(10.0 ** RNG.uniform(-spread, spread, size=n))
+    matrix = (scale @ (sparse.diags_array(ring.sum(axis=1) + 1e-3) - ring) @ scale).tocsr()
+    right = scale @ RNG.normal(size=(n, 3))
+    quick, slow = twin(lambda: scale @ factored(matrix)(right))
+    assert_allclose(quick, slow, rtol=1e-9, atol=1e-9)
+    assert_allclose(quick, scale @ np.linalg.solve(matrix.toarray(), right), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("far", [0.0, 1e3])

@@ -27,23 +27,20 @@ place; so do vertices in no triangle.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
-from scipy.sparse.linalg import splu
+from scipy.sparse.csgraph import connected_components
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..errors import MeshError
 from ..kernels import one_blas_thread
 from ..mesh import Crossings, Mesh
-from ..progress import Progress, cancellable, part, tell
+from ..progress import Progress, part, tell
 from ..solver import Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .creases import smoothed
+from .factor import factored
 from .gradients import around
 from .unfolding import unfolded
 
@@ -118,7 +115,7 @@ class Finisher:
         self._held, self._free = held, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
-        self._solve = _factored(rows[:, self._free], progress)
+        self._solve = factored(rows[:, self._free], progress)
         corners = (each.faces[each.faces < len(free)] for each in constraints)
         self._constraints = [
             each for each, own in zip(constraints, corners, strict=True) if free[own].any()
@@ -342,33 +339,3 @@ class Finisher:
                 break
             best, least = x, folded
         return best
-
-
-def _factored(
-    matrix: sparse.csr_array, progress: Progress | None
-) -> Callable[[FloatArray], FloatArray]:
-    """Return the solution of the symmetric positive definite *matrix* as a function.
-
-    Minimum degree takes minutes for the vertex order of a subdivided mesh: 45 s and more for
-    120,000 vertices, and 2 s from the order of Cuthill and McKee.
-    """
-    if not matrix.shape[0]:
-        return np.zeros_like
-    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
-    sorted_matrix = matrix[order][:, order].tocsc()
-    options = {"SymmetricMode": True}
-
-    def factorise() -> Any:
-        try:
-            return splu(sorted_matrix, permc_spec="MMD_AT_PLUS_A", options=options)
-        except RuntimeError as fault:
-            raise MeshError(f"the pose cannot be finished on this mesh: {fault}") from fault
-
-    factor = cancellable(factorise, progress, "finishing on the mesh")
-
-    def solve(right: FloatArray) -> FloatArray:
-        result = np.empty_like(right)
-        result[order] = factor.solve(right[order])
-        return result
-
-    return solve

@@ -62,7 +62,7 @@ class _Opening:
         return x
 
     def _wanted(self, x: FloatArray, j: FloatArray) -> tuple[FloatArray, BoolArray, bool]:
-        """Return J* (m, 3, 2), which of them differ from *j*, and whether *j* are far from folds."""
+        """Return J* (m, 3, 2), which differ from *j*, and whether *j* is far from folds."""
         a, b, c = (x[corner] for corner in self._patch.faces.T)
         normals = np.cross(b - a, c - a)
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), _TINY)

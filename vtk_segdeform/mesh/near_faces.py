@@ -46,9 +46,7 @@ def near_faces(points: FloatArray, faces: IntArray, asked: BoolArray) -> Iterato
         yield from _near_centres(points, faces, asked)
 
 
-def _near_in_tree(
-    kernels: Any, points: FloatArray, faces: IntArray, asked: BoolArray
-) -> IntArray:
+def _near_in_tree(kernels: Any, points: FloatArray, faces: IntArray, asked: BoolArray) -> IntArray:
     order = _morton_order(points, faces)
     m = len(order)
     leaves = 1 << max(-(-m // _LEAF) - 1, 0).bit_length()

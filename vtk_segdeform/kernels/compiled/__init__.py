@@ -8,7 +8,7 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`, `cell_energy.CellEnergy`
     cells           `cell_energy.CellEnergy`
-    factor          `hessian.Factor`
+    factor          `hessian.Factor`, `finish.factor.factored`
     collapses       `simplify.simplify`
     half_edges      `topology.HalfEdges`, `grouping.connected`,
                     `grouping.first_members`, `Mesh.adjacency`
@@ -29,7 +29,7 @@ from .beams import beam_meets, beyond_sides
 from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
-from .factor import solve_factored
+from .factor import solve_factored, solve_sparse
 from .half_edges import (
     border_half_edges,
     edge_lengths,
@@ -127,6 +127,7 @@ __all__ = [
     "shell_boxes",
     "shell_sums",
     "solve_factored",
+    "solve_sparse",
     "sorted_edges",
     "spread_cells",
     "touching_boxes",

@@ -53,9 +53,9 @@ def spread_cells(out, values, indptr, indices, given, taken, share, start, stop)
 
 @_compile
 def cell_forces(forces, terms, x, rotations, indptr, indices, transposed, start, stop):
-    """Subtract l_j = sum_i R_i^T k_ij from *forces* (n, 3), and put x_j . (C x - 2 l)_j into *terms*.
+    """Subtract l_j = sum_i R_i^T k_ij from *forces* (n, 3), which are C x.
 
-    *forces* is C x before; *transposed* (m, 3) has k_ij in row j.
+    *terms* (n,) become x_j . (C x - 2 l)_j; *transposed* (m, 3) has k_ij in row j.
     """
     for j in range(start, stop):
         a = b = c = 0.0

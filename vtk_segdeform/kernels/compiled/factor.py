@@ -1,4 +1,4 @@
-"""Triangular solves for a few right-hand sides, for `hessian`.
+"""Triangular solves for a few right-hand sides, for `hessian` and `finish.factor`.
 
 LAPACK is optimised for many right-hand sides; for two it takes twice as long.
 """
@@ -37,3 +37,24 @@ def solve_factored(columns, y):
                 t += column[j] * rest_b[j]
             a[i] = (a[i] - s) / column[0]
             b[i] = (b[i] - t) / column[0]
+
+
+@_compile
+def solve_sparse(y, indptr, indices, values, d):
+    """Replace *y* (n, 3) by (L D L^T)^-1 y; the sparse columns of L begin with 1."""
+    n = len(d)
+    for j in range(n):
+        a, b, c = y[j, 0], y[j, 1], y[j, 2]
+        for at in range(indptr[j] + 1, indptr[j + 1]):
+            i, value = indices[at], values[at]
+            y[i, 0] -= value * a
+            y[i, 1] -= value * b
+            y[i, 2] -= value * c
+    for j in range(n - 1, -1, -1):
+        a, b, c = y[j, 0] / d[j], y[j, 1] / d[j], y[j, 2] / d[j]
+        for at in range(indptr[j] + 1, indptr[j + 1]):
+            i, value = indices[at], values[at]
+            a -= value * y[i, 0]
+            b -= value * y[i, 1]
+            c -= value * y[i, 2]
+        y[j, 0], y[j, 1], y[j, 2] = a, b, c
