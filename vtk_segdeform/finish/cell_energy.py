@@ -123,7 +123,7 @@ class CellEnergy:
         """Return the energy of *mesh*, on its intrinsic triangulation."""
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
         given = mesh.vertices, surface.faces, surface.cotangents, area_gradients(surface)
-        order = np.asarray(reverse_cuthill_mckee(mesh.adjacency, symmetric_mode=True))
+        order = reverse_cuthill_mckee(mesh.adjacency, symmetric_mode=True).astype(np.int64)
         return cls(*given, mesh.adjacency, order, VolumeBand.of(mesh), Folds.of(mesh))
 
     def near(self, moving: BoolArray) -> CellEnergy:
