@@ -16,6 +16,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWrit
 
 from vtk_segdeform import Mesh
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.vtk_formats import _without_ranges
 from vtk_segdeform.io.vtk_xml import read_plain_xml
 
 
@@ -219,3 +220,13 @@ def test_integers_whose_norms_overflow_are_read_back(tmp_path, suffix, is_ours):
     again = read_polydata(path)
     assert_array_equal(again.point_data["ids"], values)
     assert list(again.field_data["text"]) == ["left to VTK"]
+
+
+def test_unclosed_ranges_of_norms_take_no_quadratic_time():
+    begun = b'<InformationKey name="L2_NORM_RANGE" location="vtkDataArray" length="2">'
+    for data in (100_000 * begun, 10_000_000 * b" "):
+        assert _without_ranges(data) == data
+    closed = begun + b"<Value> -nan </Value></InformationKey>"
+    assert _without_ranges(b"a" + closed + b"b<AppendedData>" + closed) == (
+        b"ab<AppendedData>" + closed
+    )

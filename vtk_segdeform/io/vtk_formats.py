@@ -43,8 +43,9 @@ _XML = frozenset({".vtp", ".vtu"})
 _PLAIN = {".vtk": read_plain_legacy, **dict.fromkeys(_XML, read_plain_xml)}
 _DENSEST = 1100  # most bytes out of one compressed byte
 _COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
-_NORM_RANGE = re.compile(
-    rb'\s*<InformationKey\s[^<>]*name="L2_NORM_(?:FINITE_)?RANGE"[^<>]*>.*?</InformationKey>',
+_NORM_RANGE = re.compile(  # of bounded length, so that no file takes quadratic time
+    rb'<InformationKey\s[^<>]{0,200}name="L2_NORM_(?:FINITE_)?RANGE"[^<>]{0,200}>'
+    rb".{0,1000}?</InformationKey>",
     re.DOTALL,
 )
 _BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
@@ -82,7 +83,8 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         with _without_ranges_of(path) as source, read_isolated("vtk", source) as folder:
             pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
             for piece in pieces:
-                piece.write_bytes(_without_ranges(piece.read_bytes()))
+                if (plain := _without_ranges(data := piece.read_bytes())) != data:
+                    piece.write_bytes(plain)
             parts = [_validated(pv.get_reader(piece).read()) for piece in pieces]
     except (MeshError, RuntimeError) as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None

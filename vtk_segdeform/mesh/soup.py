@@ -191,10 +191,10 @@ def _require_usable(found: Search) -> None:
 
 
 def _sewn(found: Search) -> tuple[IntArray, Search] | None:
-    """Return the vertex of each point (p,) if all of equal position are welded, and these vertices.
+    """Weld all points of equal position: return the vertex of each (p,), and the search after that.
 
-    None if `_welded` may weld fewer points.  It does not if all faces at each vertex are one fan:
-    the faces at a point inside a surface are a whole fan, so all points were on borders.
+    None if `_welded` might weld fewer points.  It welds the same ones if the faces at each vertex
+    are one fan: a point inside a surface has a complete fan, so all welded points were on borders.
     """
     may_have_seams = 2 * len(found.points) > len(found.triangles) + 4  # than a closed surface has
     if not may_have_seams or found.n_repeating != 0 or not found.used.all():
