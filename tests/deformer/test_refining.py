@@ -65,7 +65,7 @@ def test_a_pose_that_cannot_be_finished_is_returned_as_it_is(monkeypatch):
     def factor(*_, **__):
         raise RuntimeError("Factor is exactly singular")
 
-    monkeypatch.setattr("vtk_segdeform.finish.finisher.splu", factor)
+    monkeypatch.setattr("vtk_segdeform.finish.factor.splu", factor)
     assert_array_equal(bent().vertices, bent(False).vertices)
     with pytest.raises(MeshError, match="cannot be finished on this mesh: Factor is exactly"):
         bent(True)
@@ -90,7 +90,7 @@ def test_a_finish_is_cancelled_even_while_its_matrix_is_factored(monkeypatch):
         if began.is_set():
             raise Cancelled(text)
 
-    monkeypatch.setattr("vtk_segdeform.finish.finisher.splu", factor)
+    monkeypatch.setattr("vtk_segdeform.finish.factor.splu", factor)
     deformer = Deformer(
         SCENE.mesh, SCENE.regions, SCENE.cages, fixed=SCENE.fixed, handle=SCENE.handle
     )
