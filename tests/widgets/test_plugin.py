@@ -385,7 +385,11 @@ def test_ctrl_c_while_the_pose_is_completed_writes_what_there_is(
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(ProgressBar, "__call__", press_ctrl_c)
-    session, shown, written = closed_early()
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job has none
+    try:
+        session, shown, written = closed_early()
+    finally:
+        signal.signal(signal.SIGINT, handler)
     assert session.can_finish
     assert (session.solution.status is not Status.STEP_LIMIT) == settled
     assert np.array_equal(written, shown) != settled
