@@ -639,13 +639,13 @@ class Deformer:
 
         A few steps over all vertices, which take as long as 10 to 35 iterations of
         as-rigid-as-possible, or longer where parts cross: triangles are less distorted, joints bend
-        in less space, and the handles and fixed vertices are exact.  The volume is preserved as before.  The next solve
-        starts from the cages, as if the pose had not been finished.  Of a deformer made by `local`
-        only the surface within the reach is finished: it stays from 1.15 times the reach on, and
-        next to a handle of one vertex, which would become a spike.  A pose that would lose its
-        volume, because hardly a vertex is free, is returned unchanged.  Of the finish of a pull
-        half is used, or a quarter, if all of it would add energy or folds; if these do as well,
-        the pose is returned unchanged.
+        in less space, and the handles and fixed vertices are exact.  The volume is preserved as
+        before.  The next solve starts from the cages, as if the pose had not been finished.  Of a
+        deformer made by `local` only the surface within the reach is finished: it stays from 1.15
+        times the reach on, and next to a handle of one vertex, which would become a spike.  A pose
+        that would lose its volume, because hardly a vertex is free, is returned unchanged.  Of the
+        finish of a pull half is used, or a quarter, if all of it would add energy or folds; if
+        these do as well, the pose is returned unchanged.
 
         Where *solution* has no crossings there are none after it, either.
 
