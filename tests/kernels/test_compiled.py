@@ -108,11 +108,15 @@ def test_kernels_are_loaded_early_in_another_thread_and_only_once(monkeypatch):
 
 def test_small_arrays_do_not_wait_for_late_kernels(monkeypatch):
     loaded = object()
+    monkeypatch.delitem(sys.modules, "vtk_segdeform.kernels.compiled", raising=False)
+    monkeypatch.setattr(dispatch, "_checked", [sizes.COMPILED_CHECKS])
     kernels = functools.cache(lambda: loaded)
     monkeypatch.setattr(dispatch, "_kernels", kernels)
     monkeypatch.setattr(dispatch, "_is_late", [False])
     dispatch.load_late()
     assert dispatch.compiled_kernels(sizes.COMPILED_LATE - 1) is None
+    for _ in range(2):  # nor do checks, however many of them there are
+        assert dispatch.compiled_checks(sizes.COMPILED_LATE - 1) is None
     assert not kernels.cache_info().currsize
     assert dispatch.compiled_kernels(sizes.COMPILED_LATE) is loaded
     assert dispatch.compiled_kernels(sizes.COMPILED) is loaded

@@ -45,9 +45,11 @@ def compiled_checks(size: int) -> Any:
     """Return the compiled kernels for checks of meshes; None while importing numba does not pay.
 
     Many programs check a few meshes and need no other kernel.  So numba is imported only after the
-    equivalents in numpy have processed so many faces that they have taken as long as the import.
-    Both give the same results.
+    equivalents in numpy have processed so many faces that they have taken as long as the import,
+    and after `load_late` not for a small array.  Both give the same results.
     """
+    if _is_late[0] and size < sizes.COMPILED_LATE:
+        return None
     if f"{__package__}.compiled" not in sys.modules:
         _checked[0] += size
         if _checked[0] < sizes.COMPILED_CHECKS:
