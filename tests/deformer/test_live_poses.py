@@ -6,6 +6,8 @@ import numpy as np
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
+from vtk_segdeform.cli.live_pulls import converged
+from vtk_segdeform.session import Session
 
 
 def test_every_pose_shown_is_within_a_hundredth_of_the_one_it_converges_to():
@@ -25,3 +27,25 @@ def test_every_pose_shown_is_within_a_hundredth_of_the_one_it_converges_to():
     print(f"{worst / mesh.diagonal:.1%} away, {behind / mesh.diagonal:.1%} behind the hand")
     assert worst < 0.01 * mesh.diagonal
     assert behind < 0.3 * mesh.diagonal
+
+
+def test_a_fast_pull_shows_no_pose_that_a_step_with_an_old_matrix_took_for_converged():
+    """The neck of the dinosaur is soft: poses of almost equal merit are far apart."""
+    mesh, vertex = models.dinosaur(1000), 351
+    preparation = Session(mesh).preparation()
+    worst, shown, start = 0.0, 0, mesh.vertices[vertex]
+    is_far = np.linalg.norm(mesh.vertices - start, axis=1) > 0.15 * mesh.diagonal
+    for sense in (1.0, -1.0):
+        session = Session(mesh)
+        session.accept(preparation)
+        session.pull(vertex, start, max_steps=1)
+        for share in np.linspace(0.03, 0.3, 10):
+            before = session.vertices
+            to = start + [sense * share * mesh.diagonal, 0.0, 0.0]
+            session.pull(vertex, to, max_steps=3, within=0.0025)
+            if session.vertices is not before:
+                off = np.linalg.norm(converged(session, preparation) - session.vertices, axis=1)
+                worst, shown = max(worst, float(off[is_far].max())), shown + 1
+    print(f"{worst / mesh.diagonal:.2%} away in {shown} poses")
+    assert shown > 9
+    assert worst < 0.01 * mesh.diagonal

@@ -325,10 +325,15 @@ class GaussNewton:
             if options.within is not None:
                 before, length = length, self._farthest(step)
                 remaining = _left(length, before if state.age else math.inf)
+                if (
+                    newton
+                    and state.age
+                    and remaining <= options.within
+                    and (state.factor.share < _EXACT or math.inf > before > options.within)
+                ):
+                    state.drop_factor()  # H of this pose may be softer, or convex
+                    continue
                 if newton and state.factor.share < _EXACT:
-                    if state.age and remaining <= options.within:
-                        state.drop_factor()  # the exact H may be convex here
-                        continue
                     remaining *= _SHORT
             if state.step_size <= options.tolerance:
                 status = Status.CONVERGED
