@@ -30,7 +30,7 @@ def test_every_pose_shown_is_within_a_hundredth_of_the_one_it_converges_to():
 
 
 def test_a_fast_pull_shows_no_pose_that_a_step_with_an_old_matrix_took_for_converged():
-    """The neck of the dinosaur is soft: poses of almost equal merit are far apart."""
+    """In a soft body, poses of almost equal merit are far apart."""
     mesh, vertex = models.dinosaur(1000), 351
     preparation = Session(mesh).preparation()
     worst, shown, start = 0.0, 0, mesh.vertices[vertex]
