@@ -583,7 +583,7 @@ def test_a_cage_put_anywhere_keeps_the_volume_or_is_refused_and_nothing_flies_of
         assert not session.is_dragging
         assert_array_equal(session.vertices, VERTICES)
     assert 0 < len(refused) < 10
-    assert all("at most 10 are allowed" in error for error in refused)
+    assert all("more than 10 mesh diagonals away" in error for error in refused)
 
 
 def test_what_to_do_next_is_said_at_every_stage():

@@ -157,8 +157,7 @@ def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
     away = _farthest(points, mesh.vertices.mean(axis=0)) / mesh.diagonal
     if not away <= _FARTHEST:
         raise ConstraintError(
-            f"{name} are {away:.3g} mesh diagonals away from the mesh; "
-            f"at most {_FARTHEST:.0f} are allowed: move less"
+            f"{name} are more than {_FARTHEST:.0f} mesh diagonals away from the mesh; move less"
         )
 
 
