@@ -17,6 +17,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
+from vtk_segdeform.kernels import load_early
 from vtk_segdeform.session import Session
 
 from ..editor import DeformEditor, Job
@@ -44,6 +45,7 @@ from .repairing import ask_repair, ask_repair_of
 from .saving import may_discard
 
 _SIZE = 1200, 800
+_PAUSE = 300  # milliseconds from the start page to the loading of the compiled kernels
 _PERIOD = 30  # milliseconds between two polls of the job that opens a document
 
 
@@ -151,6 +153,7 @@ class Window(QtWidgets.QMainWindow):
         """Offer to recover autosaved work; open *path*, in another window beside recovered work."""
         slot = self._recover()
         if path is None:
+            QtCore.QTimer.singleShot(_PAUSE, self, self._load_kernels)
             return
         if slot is None:
             self.open(path)
@@ -180,6 +183,11 @@ class Window(QtWidgets.QMainWindow):
         request = ask_repair(self)
         if request is not None:
             self._open(request)
+
+    def _load_kernels(self) -> None:
+        """Load the compiled kernels while the start page is shown, so that files open faster."""
+        if not self.has_mesh and self._job is None:
+            load_early()
 
     def _repair_soon(self) -> None:
         """Repair once the current event of the view has been handled."""

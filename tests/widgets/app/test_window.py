@@ -33,7 +33,7 @@ from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.app import documents
+from vtk_segdeform.widgets.app import documents, window
 from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
 from vtk_segdeform.widgets.editor import preparing
 from vtk_segdeform.widgets.handle_dragger import LiveSolve
@@ -135,6 +135,20 @@ def test_the_start_page_opens_the_sample_model(start, monkeypatch, tmp_path):
     assert int(hand.window.winId()) == number  # the window was not re-created
     assert hand.window.editor_widget.plotter.hasFocus()
     assert slots(tmp_path) == []
+
+
+@pytest.mark.parametrize("is_file_given", [False, True])
+def test_kernels_are_loaded_while_the_start_page_waits(
+    start, ball_file, monkeypatch, is_file_given
+):
+    loads = []
+    monkeypatch.setattr(window, "load_early", lambda: loads.append(None))
+    monkeypatch.setattr(window, "_PAUSE", 50)
+    hand = start(ball_file if is_file_given else None)
+    times = []
+    QtCore.QTimer.singleShot(100, hand.window, lambda: times.append(None))
+    until(lambda: times, "twice the pause")
+    assert len(loads) == (not is_file_given)
 
 
 @BLANK
