@@ -17,10 +17,9 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from vtk_segdeform.kernels import load_early
 from vtk_segdeform.session import Session
 
-from ..editor import DeformEditor, Job
+from ..editor import DeformEditor, Job, expect_session
 from ..qt import DeformWidget
 from .autosave import Autosaves, Slot
 from .autosaver import INTERVAL, Autosaver, stops_of
@@ -187,7 +186,7 @@ class Window(QtWidgets.QMainWindow):
     def _load_kernels(self) -> None:
         """Load the compiled kernels while the start page is shown, so that files open faster."""
         if not self.has_mesh and self._job is None:
-            load_early()
+            expect_session()
 
     def _repair_soon(self) -> None:
         """Repair once the current event of the view has been handled."""

@@ -74,7 +74,14 @@ from .panel_actions import (
     with_radius,
     with_up,
 )
-from .session_file import MESH_FILES, READABLE_FILES, SessionFile, is_mesh, read_session
+from .session_file import (
+    MESH_FILES,
+    READABLE_FILES,
+    SessionFile,
+    expect_session,
+    is_mesh,
+    read_session,
+)
 
 __all__ = [
     "MESH_FILES",
@@ -97,6 +104,7 @@ __all__ = [
     "choosing_regions",
     "converting",
     "error_text",
+    "expect_session",
     "exporting",
     "finishing_after_drags",
     "fitting_with",
