@@ -127,7 +127,7 @@ def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thi
             np.eye(1000), body.vertices, body.faces, areas=areas, edges=graph + graph.T
         )
         sums = np.add.outer(surface.radii, surface.radii)
-        is_near = csgraph.dijkstra(graph, directed=False) <= 4.0 * sums
+        is_near = csgraph.dijkstra(graph, directed=False) <= 2.5 * sums
         assert surface.excluded[is_near].all()
         normals = surface.normals(body.vertices)
         facing_away = normals @ normals.T < 0.5
@@ -135,3 +135,16 @@ def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thi
         assert not others[~facing_away].any()
         opposite = normals[:, 2][:, None] * normals[:, 2] < -0.9
         assert others[opposite].any() == thin
+
+
+def test_no_two_samples_pass_through_each_other_in_a_step(fork):
+    deformer, _ = fork
+    contact = deformer._constraints.contact
+    radii = contact.surface.radii
+    rng = np.random.default_rng(1)
+    for size in (1e-3, 10.0):
+        step = size * rng.standard_normal(deformer._p.shape)
+        far = np.linalg.norm(contact.surface.rows @ step, axis=1).max()
+        share = contact.share(step)
+        assert share * 2.0 * far <= 1.5 * 2.0 * np.median(radii) * (1.0 + 1e-12)
+        assert (share == 1.0) == (size < 1.0)

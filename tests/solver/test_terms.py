@@ -6,8 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scenes import sausage
 
+from vtk_segdeform.solver import SolverOptions
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2, is_coarse=True)
@@ -33,6 +35,9 @@ class Wall:
         slope[:, 2] = -1.5 * self.weight * log**2 / gap * self.row
         return -self.weight * log**3, slope
 
+    def share(self, step):
+        return 1.0
+
     def hessian(self, p, x=None):
         gap = self.row @ p[:, 2] - self.height
         if not 0.0 < gap < self.reach:
@@ -42,6 +47,22 @@ class Wall:
         second = self.weight * (3.0 * log**2 - 6.0 * log) / gap**2
         full[2 * m :, 2 * m :] = 0.5 * second * np.outer(self.row, self.row)
         return full
+
+
+@dataclass(frozen=True)
+class Slow:
+    """A constant, with which no cage vertex moves farther than a limit in a step."""
+
+    limit: float
+
+    def value_and_slope(self, p, x=None):
+        return 1e-3, np.zeros_like(p)
+
+    def hessian(self, p, x=None):
+        return np.zeros((p.size, p.size))
+
+    def share(self, step):
+        return min(1.0, self.limit / np.abs(step).max())
 
 
 def solver_with(deformer, *terms):
@@ -84,3 +105,20 @@ def test_an_inactive_term_changes_no_bit(free):
     solution = solver_with(deformer, wall).solve(SCENE.turned(40))
     assert np.array_equal(solution.vertices, free.vertices)
     assert deformer.copy()._constraints.solver.terms == (wall,)
+
+
+def test_a_term_limits_every_step():
+    deformer = SCENE.held()
+    own, start, limit = deformer._constraints, deformer._p, 0.01
+    targets = deformer._frame.inward(SCENE.turned(10))
+    solver, places = replace(own.solver, terms=(Slow(limit),)), own.places(targets)
+    p, moves = start, []
+    for _ in range(40):
+        result = solver.minimise(p, places, SolverOptions(max_steps=1))
+        moves.append(np.abs(result.p - p).max())
+        p = result.p
+    expected = replace(own.solver).minimise(start, places, SolverOptions())
+    far = np.abs(expected.p - start).max()
+    assert far > 4.0 * limit
+    assert 0.9 * limit < max(moves) < 1.1 * limit  # and a little to restore the volume
+    assert_allclose(p, expected.p, atol=1e-5)

@@ -159,6 +159,10 @@ class Barrier:
         corners, volumes, weights = self.corners[kept], self.volumes[kept], self.weights[kept]
         return replace(self, corners=corners, volumes=volumes, weights=weights)
 
+    def share(self, _step: FloatArray) -> float:
+        """Return 1: where a step leads too far, the term is infinite."""
+        return 1.0
+
     def _at(self, p: FloatArray, x: FloatArray) -> FloatArray:
         """Return the surface points and inner points, (s + i, 3)."""
         return np.asarray(self.points @ (x if len(x) else self.surface.map(p)))

@@ -16,7 +16,7 @@ All of it is a smooth function of p that does not depend on how the mesh is move
 
 Three kinds of pairs are no contact, since they are near each other at rest already:
 
-    neighbours      within 4 (h_a + h_b) along the surface
+    neighbours      within 2.5 (h_a + h_b) along the surface
     two sides       of a thin part: one is behind the other, within 4.5 (h_a + h_b), facing away
     crossings       the same, of a mesh that crosses itself at rest
 
@@ -48,7 +48,7 @@ _LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cov
 _DEPTH = 1.5  # D_ab / (h_a + h_b)
 _BEHIND = 4.5  # (h_a + h_b): distance of two sides of a thin part, at most
 _SIDES = 0.5  # <n_a, n_b> of these, at most: a convex part is thick, and may fold inwards
-_NEIGHBOURS = 4.0  # (h_a + h_b): distance along the surface
+_NEIGHBOURS = 2.5  # (h_a + h_b): distance along the surface
 _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
 _FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
@@ -56,6 +56,7 @@ _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the ne
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 2.0  # median (h_a + h_b): additional distance of a search
+_FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
 _STIFFNESS = 5e3  # k, times the scale of the shape energy
 _TINY = 1e-30
@@ -228,6 +229,14 @@ class Contact:
     def begun_at(self, _p: FloatArray, _x: FloatArray = NO_SURFACE) -> Contact:
         """Return itself: the term is finite everywhere."""
         return self
+
+    def share(self, step: FloatArray) -> float:
+        """Return the share of a *step* (m, 3), at most 1, that moves two samples by D_ab at most.
+
+        Parts that touch while the surface buckles would pass through each other in one step.
+        """
+        far = _largest(self.surface.rows @ step)
+        return min(1.0, _FARTHEST * self.surface.spacing / max(far, _TINY))
 
     def is_active(self, p: FloatArray) -> bool:
         """Return whether samples push each other apart at *p*."""

@@ -67,7 +67,7 @@ from .exact_volume import moved_along, steps_to_volume
 from .extrapolation import End, Way
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
-from .terms import NO_SURFACE, Term, hessian_of, with_terms
+from .terms import NO_SURFACE, Term, hessian_of, share_of_step, with_terms
 from .volume_constraints import Volumes
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
@@ -320,8 +320,6 @@ class GaussNewton:
             if is_coupled and state.step_is_doubtful:
                 state.drop_factor()
                 continue
-            if here.is_active and state.step_size > _LONGEST_ACTIVE:
-                step *= _LONGEST_ACTIVE / state.step_size
             if options.within is not None:
                 before, length = length, self._farthest(step)
                 remaining = _left(length, before if state.age else math.inf)
@@ -335,6 +333,9 @@ class GaussNewton:
                     continue
                 if newton and state.factor.share < _EXACT:
                     remaining *= _SHORT
+            share = share_of_step(self._begun, step) if here.is_active else 1.0
+            if here.is_active:
+                step *= min(share, _LONGEST_ACTIVE / max(state.step_size, _LONGEST_ACTIVE))
             if state.step_size <= options.tolerance:
                 status = Status.CONVERGED
                 break
@@ -343,15 +344,17 @@ class GaussNewton:
             if len(merits) > options.max_steps:
                 break
             ahead = None
-            if options.acceleration:
+            is_accelerated = options.acceleration > 0 and share == 1.0
+            if is_accelerated:
                 residual = self._factor.triangle.T @ step
                 guess = state.acceleration.extrapolate(here.p, step, residual)
                 ahead = self._retract(guess, directions, term, options)
                 if not self._improves(ahead, here):
-                    state.acceleration.forget()
                     ahead = None
+            if ahead is None:
+                state.acceleration.forget()
             is_renewable = is_coupled and state.age > 0  # H is of an earlier pose
-            if ahead is None and not (is_renewable and options.acceleration):
+            if ahead is None and not (is_renewable and is_accelerated):
                 ahead = self._shortened(here, step, directions, term, options)
             if ahead is None and is_renewable:
                 state.drop_factor()

@@ -42,6 +42,10 @@ class Term(Protocol):
         """
         ...
 
+    def share(self, step: FloatArray) -> float:
+        """Return the share of a *step* (m, 3), at most 1, to which the Hessian is valid."""
+        ...
+
 
 def with_terms(
     terms: Sequence[Term], p: FloatArray, x: FloatArray, *, value: float, slope: FloatArray
@@ -62,3 +66,8 @@ def hessian_of(terms: Sequence[Term], p: FloatArray, x: FloatArray) -> FloatArra
         if own is not None:
             total = own if total is None else total + own
     return total
+
+
+def share_of_step(terms: Sequence[Term], step: FloatArray) -> float:
+    """Return the share of a *step* (m, 3), at most 1, to which all *terms* limit it."""
+    return min([1.0, *(term.share(step) for term in terms)])
