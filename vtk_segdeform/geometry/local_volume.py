@@ -309,13 +309,12 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     tree = cKDTree(x)
     workers = n_threads() if len(x) > sizes.PARALLEL_SEARCH else 1
     radius = np.full(len(x), np.linalg.norm(np.ptp(x, axis=0)))
-    opposite = np.asarray(
-        tree.query(x + radius[:, None] * inward, workers=workers)[1], dtype=np.int64
-    )
-    active = np.arange(len(x))
-    for _ in range(_MOST_SHRINKS):
+    active = opposite = np.arange(len(x))
+    for turn in range(_MOST_SHRINKS):
         centre = x[active] + radius[active, None] * inward[active]
         distance, touched = (np.asarray(found) for found in tree.query(centre, workers=workers))
+        if not turn:
+            opposite = touched.astype(np.int64)
         chord = x[touched] - x[active]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, inward[active])

@@ -113,8 +113,8 @@ def scale_bodies(
 class ScaledSurface:
     """A large mesh moved by its cages and scaled to its exact volume; on a GPU if there is one.
 
-    The path on a GPU is untested there; see `subspace.gpu`.  Several bodies are scaled one by one,
-    on the processor.
+    For the path on a GPU see `subspace.gpu`.  Several bodies are scaled one by one, on the
+    processor.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ The files, in reading order:
     interpolated  the rows of a large mesh, interpolated on a grid
     subspace      `Subspace`: the block matrix of figure 6 of the paper, and its products
     passengers    other points that a deformation moves
-    gpu           the passes over a whole mesh on a GPU; untested there
+    gpu           the passes over a whole mesh on a GPU
 """
 
 from .gpu import GPUError, GPUSurface, gpu_arrays
