@@ -689,7 +689,8 @@ class Deformer:
             held |= stays
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
         volumes = self.preserved_volumes
-        finisher = Finisher(self._rest_pose, self._cell_energy, held, volumes, progress)
+        given = self._rest_pose, self._cell_energy, held, volumes, progress
+        finisher = Finisher(*given, avoid_contact=self._avoid_contact)
         found = finisher.run(start, places[held], progress)
         if shares is not None and found.vertices is not start:
             ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)

@@ -18,7 +18,8 @@ or all of it, with more and more of the surface about them, and the last steps a
 these vertices held: the rest of the surface relaxes around them.  In a cactus bent by 120 degrees
 this leaves distortion 0.079 without crossings; the start has 0.120, and the finish with crossings
 0.067.  Where many of the faces of a patch crossed before the finish, they are not held, which would
-not part them.  Creases in which a few triangles still cross others are smoothed (`creases`).
+not part them.  Creases in which a few triangles still cross others are smoothed (`creases`).  Of a
+deformer that avoids contact, what crosses even then is drawn apart (`untangling`).
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
@@ -43,6 +44,7 @@ from .creases import smoothed
 from .factor import factored
 from .gradients import around
 from .unfolding import unfolded
+from .untangling import untangled
 
 _STEPS = 30  # at most
 # They end once the energy has fallen by less than 3 % in eight of them.  With a tenth instead,
@@ -54,6 +56,8 @@ _Z_STEPS = 4  # for which the directions of the volumes are used
 _ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
 _RISE = 1e-13  # relative rise of the energy that counts as rounding
 _SHORTEST = 1.0 / 16.0  # least share of a step
+_UNTANGLED = 3  # rounds of drawing crossing parts apart, and restoring the volume, at most
+_RELAXED = 0, 1, 2, 4  # rings about what was drawn apart that stay while the rest relaxes
 _UNFOLDED = 3  # rounds of removing folds, and restoring the volume, at most
 _MANY = 0.5  # share of the crossing faces of a patch that crossed before
 # Shares of the finish at which crossing parts are held, and rings about them, one after another.
@@ -93,6 +97,8 @@ class Finisher:
         The volumes to preserve.
     progress : Progress, optional
         Called while the matrix is factored; may cancel.
+    avoid_contact : bool
+        Draw parts apart that cross before the finish, too.
 
     Raises
     ------
@@ -107,11 +113,13 @@ class Finisher:
         held: BoolArray,
         constraints: Sequence[VolumeConstraint],
         progress: Progress | None = None,
+        *,
+        avoid_contact: bool = False,
     ) -> None:
         anchored = np.bincount(mesh.components, held) > 0.0
         free = anchored[mesh.components] & ~held
         self._mesh, self._energy = mesh, energy.near(free)
-        self._crossing = Crossings(mesh.vertices, mesh.faces).at
+        self._crossings, self._avoid_contact = Crossings(mesh.vertices, mesh.faces), avoid_contact
         self._held, self._free = held, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
@@ -135,16 +143,16 @@ class Finisher:
         """
         begin = self._at_places(start, places)
         found = self._run(begin, part(progress, 0.0, 0.5))
-        if not found.steps:
+        if not found.steps and not self._avoid_contact:
             return found
         return self._apart(begin, found, part(progress, 0.5, 1.0))
 
     def _apart(self, begin: FloatArray, found: Finish, progress: Progress | None) -> Finish:
         """Return *found*, the finish of *begin*, without crossings that *begin* does not have."""
         tell(progress, 0.0, "looking for crossings")
-        if not len(self._crossing(found.vertices)):
+        if not len(self._crossings.at(found.vertices)):
             return found
-        before = self._crossing(begin)
+        before = self._crossings.at(begin)
         crossing = least = self._grown(found.vertices, before)
         best, end, steps = found, found.vertices, found.steps
         stays = np.zeros(len(begin), dtype=bool)
@@ -164,15 +172,48 @@ class Finisher:
                 best, least = found, crossing
         if len(least) and not len(before):
             return Finish(begin, (), steps)
-        x = self._without_creases(best.vertices, part(progress, 0.5, 0.75))
-        opened = self._without_folds(x, part(progress, 0.75, 1.0))
-        if len(self._crossing(opened)) <= len(self._crossing(x)):
-            x = opened
+        x = self._without_creases(best.vertices, part(progress, 0.5, 0.7))
+        x = self._opened(x, part(progress, 0.7, 0.8))
+        if self._avoid_contact:
+            x = self._drawn_apart(x, part(progress, 0.8, 1.0))
         return replace(best, vertices=x, steps=steps)
+
+    def _drawn_apart(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* without the crossings that its places allow to draw apart."""
+        crossing = self._crossings.at(x)
+        apart = self._untangled(x, progress) if len(crossing) else x
+        if apart is x or len(self._crossings.at(apart)):
+            return apart
+        for rings in _RELAXED:
+            held = self._held | around(self._mesh, crossing, rings)
+            problem = Finisher(self._mesh, self._energy, held, self._constraints, progress)
+            relaxed = problem._run(apart, progress).vertices
+            if not len(self._crossings.at(relaxed)):
+                return self._open_and_apart(relaxed, progress)
+        return self._open_and_apart(apart, progress)
+
+    def _open_and_apart(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x*, which does not cross itself, with as few folds as that allows."""
+        best, least = x, np.count_nonzero(self._energy.folds.at(x))
+        for _ in range(_UNTANGLED):
+            if not least:
+                break
+            x = self._untangled(self._without_folds(x, progress), progress)
+            folded = np.count_nonzero(self._energy.folds.at(x))
+            if len(self._crossings.at(x)):
+                break
+            if folded < least:
+                best, least = x, folded
+        return best
+
+    def _opened(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* without folds, as far as nothing more crosses after it."""
+        opened = self._without_folds(x, progress)
+        return opened if len(self._crossings.at(opened)) <= len(self._crossings.at(x)) else x
 
     def _grown(self, x: FloatArray, before: IntArray) -> IntArray:
         """Return the crossing faces in the pose *x*, of patches of which few crossed *before*."""
-        faces, crossing = self._mesh.faces, self._crossing(x)
+        faces, crossing = self._mesh.faces, self._crossings.at(x)
         own = np.flatnonzero(around(self._mesh, np.union1d(crossing, before), 1))
         among = self._mesh.adjacency[own][:, own]
         count, label = connected_components(among, directed=False)
@@ -311,15 +352,30 @@ class Finisher:
         paths = np.hstack([x, *directions])
         return moved_along(paths, steps_to_volume(self._constraints, paths))
 
+    def _untangled(self, x: FloatArray, progress: Progress | None) -> FloatArray:
+        """Return *x* without the crossings that its places allow to draw apart."""
+        free = np.zeros(len(x), dtype=bool)
+        free[self._free] = True
+        for _ in range(_UNTANGLED):
+            apart = untangled(self._mesh, x, free, self._crossings, progress=progress)
+            if apart is x:
+                break
+            apart = self._landed(apart, self._directions(apart))  # may make it touch again
+            fewer = len(self._crossings.at(apart)) < len(self._crossings.at(x))
+            if not fewer or not np.isfinite(apart).all():
+                break
+            x = apart
+        return x
+
     def _without_creases(self, x: FloatArray, progress: Progress | None) -> FloatArray:
         """Return *x* without those of its crossings that smoothing removes."""
         free = np.zeros(len(x), dtype=bool)
         free[self._free] = True
-        smooth = smoothed(self._mesh, x, free, self._crossing, progress=progress)
+        smooth = smoothed(self._mesh, x, free, self._crossings.at, progress=progress)
         if smooth is x:
             return x
         smooth = self._landed(smooth, self._directions(smooth))
-        is_better = len(self._crossing(smooth)) < len(self._crossing(x))
+        is_better = len(self._crossings.at(smooth)) < len(self._crossings.at(x))
         return smooth if is_better and np.isfinite(smooth).all() else x
 
     def _without_folds(self, x: FloatArray, progress: Progress | None) -> FloatArray:

@@ -92,6 +92,10 @@ class Crossings:
 
     def at(self, x: FloatArray) -> IntArray:
         """Return the faces (k,) of `new_crossings` in the pose *x* (n, 3), not changed later."""
+        return np.unique(self.pairs(x))
+
+    def pairs(self, x: FloatArray) -> IntArray:
+        """Return the pairs (k, 2) of faces that cross in the pose *x* (n, 3), not changed later."""
         differences = [(x != pose).any(axis=1) for pose, _ in self._known]
         least = int(np.argmin([np.count_nonzero(each) for each in differences]))
         moved = differences[least][self._faces].any(axis=1)
@@ -100,7 +104,7 @@ class Crossings:
         found = found[~_meet(self._rest, self._faces[found[:, 0]], self._faces[found[:, 1]])]
         pairs = np.concatenate([known[~moved[known].any(axis=1)], found])
         self._known = [self._known[0], *self._known[1:][-_KNOWN:], (x, pairs)]
-        return np.unique(pairs)
+        return pairs
 
 
 def intersections_of(vertices: FloatArray, faces: IntArray, some: IntArray) -> IntArray:
