@@ -11,8 +11,7 @@ from campaign import every
 from numpy.testing import assert_allclose
 from real_meshes import path_of
 from scenes import sausage
-from scipy import sparse
-from solids import rotation
+from scipy import linalg, sparse
 
 from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import fit_cages
@@ -24,6 +23,7 @@ from vtk_segdeform.finish import Finisher
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import Regions
+from vtk_segdeform.session import Session
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
 from vtk_segdeform.solver.solution import Status
 
@@ -110,18 +110,45 @@ def test_a_soft_row_reproduces_affine_maps():
     assert samples.soft_row(HIGH, rest[HIGH], 1e-6) is None
 
 
-@pytest.mark.parametrize("push", [-1.0, 1.0])
-def test_anchors_resist_a_load_that_topples_the_surface_and_no_other(push):
-    corners = np.indices((2, 2, 2)).reshape(3, 8).T * [1.0, 2.0, 3.0] - [0.5, 1.0, 1.5]
-    edges = sparse.csr_array(np.ones((8, 8)))
-    faces = np.empty((0, 3), dtype=np.int64)
-    samples = SurfaceSamples(np.arange(8), np.eye(8), corners, np.full(8, 1 / 8), faces, edges)
-    load = np.outer(push * np.sign(corners[:, 2]), [0.0, 0.0, 1.0])  # pushes or stretches
-    steady = samples.steadying(corners + 7.0, load)
-    assert steady.any() == (push < 0.0)
-    turned = corners @ rotation([1.0, 0.0, 0.0], 0.1).T - corners
-    work = 2.0 * np.vdot(load, turned)
-    assert np.vdot(turned, steady @ turned) >= max(work, 0.0)
+def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_one():
+    solver, p = held()._constraints.solver, held()._p
+    assert solver.steadying(p, 0.0) == 0.0
+    assert solver.steadying(p, 10.0 * solver.energy.scale) > 0.0
+    squeezed = p * [1.0, 1.0, 0.6]
+    least = 0.02 * solver.energy.scale
+    weight = solver.steadying(squeezed, least)
+    assert weight > 0.0
+    places = held()._constraints.places(held()._targets)
+
+    def slope(k, q):
+        anchors = Anchors(k * solver.energy.mass, squeezed, np.zeros_like(p))
+        position = solver.positions.local(solver.positions.rows, anchors)
+        return replace(solver, positions=position)._iterate_at(q, position.toward(places)).slope
+
+    def least_curvature(k):
+        steps = 1e-6 * np.eye(p.size).reshape(-1, *p.shape)
+        columns = [slope(k, squeezed + step) - slope(k, squeezed - step) for step in steps]
+        hessian = np.reshape(columns, (p.size, p.size)) / 2e-6
+        mass = np.kron(solver.energy.mass, np.eye(3))
+        return linalg.eigvalsh(0.5 * (hessian + hessian.T) - least * mass)[0]
+
+    rounding = 1e-6 * solver.energy.scale
+    assert least_curvature(weight) > -rounding
+    assert least_curvature(0.49 * weight) < -rounding
+
+
+def test_a_pulled_point_that_is_pulled_on_takes_nothing_else_along():
+    mesh = models.cactus(1500)
+    tip = int(np.argmin(np.linalg.norm(mesh.vertices - [-0.32, -0.05, 0.62], axis=1)))
+    first = mesh.vertices[tip] + [-0.125, 0.03, 0.075]
+    session = Session(mesh)
+    session.accept(session.preparation())
+    session.pull(tip, first)
+    session.commit("Pull")
+    before = session.vertices.copy()
+    session.pull(tip, first + [-0.005, 0.0, 0.0])
+    moved = np.linalg.norm(session.vertices - before, axis=1).max()
+    assert moved < 0.015 * mesh.diagonal
 
 
 def test_a_pose_out_of_all_proportion_is_not_shown_and_the_status_says_so(monkeypatch):

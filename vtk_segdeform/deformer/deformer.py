@@ -114,6 +114,8 @@ _VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
+_BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
@@ -399,7 +401,9 @@ class Deformer:
 
         Solves keep the rest of the surface where it is now, softly; see `locality`.  Nothing moves
         before a handle does: forces that are not in balance at this pose, because another part of
-        the surface or other vertices were held before, remain as a constant load.
+        the surface or other vertices were held before, remain as a constant load.  A limb under a
+        load can be like a weight on a tip, so all of the surface is then held where it is, just
+        firmly enough that the pose is stable.
 
         Parameters
         ----------
@@ -447,8 +451,10 @@ class Deformer:
         volumes = self._constraints.volumes
         solver = replace(before, energy=energy, positions=positions, volumes=volumes)
         load = solver.unbalanced(p, pulled.moved(places))
-        steady = self._samples.steadying(p, load)
-        anchors = Anchors(weight * quadratic + steady, p, load)
+        least = _FIRM * energy.scale
+        is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
+        steady = solver.steadying(p, least) if is_loaded else 0.0
+        anchors = Anchors(weight * quadratic + steady * energy.mass, p, load)
         solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
         keeps = self._samples.weights(*near)

@@ -58,7 +58,6 @@ from ..mesh import Mesh
 from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
-_STEADY = 10.0  # times the least weight of anchors under a load; still far below those of handles
 _FEWEST = 4  # samples that determine an affine motion
 _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
@@ -203,40 +202,6 @@ class SurfaceSamples:
         for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
-
-    def steadying(self, p: FloatArray, load: FloatArray) -> FloatArray:
-        """Return anchors (m, m) that keep a *load* (m, 3) at cages *p* (m, 3) from turning them.
-
-        A constant load does not turn with the surface: it is in balance, but if it is compressive,
-        like a weight on a tip.  Turned by w, it does the work <w, (tr(B) - B) w>, and anchors of
-        weight k resist with k <w, (tr(J) - J) w>; B and J are the moments of the load and of the
-        area of a connected part.  k is a multiple of the least that is enough.
-        """
-        steady = np.zeros((len(p),) * 2)
-        for own, quadratic in self._parts:
-            if not len(own):
-                continue
-            around = p[own] - p[own].mean(axis=0)
-            moment = load[own].T @ around
-            inertia = around.T @ quadratic[np.ix_(own, own)] @ around
-            turning, resisting = (np.trace(a) * np.eye(3) - a for a in (moment, inertia))
-            if np.linalg.eigvalsh(resisting)[0] > _SHORTEST:
-                turning = 0.5 * (turning + turning.T)
-                least = float(linalg.eigh(turning, resisting, eigvals_only=True)[0])
-                steady += _STEADY * max(0.0, -least) * quadratic
-        return steady
-
-    @cached_property
-    def _parts(self) -> list[tuple[IntArray, FloatArray]]:
-        """For each connected part its cage vertices, and sum_s a_s W~_s^T W~_s."""
-        count, part = csgraph.connected_components(self.edges, directed=False)
-        among = sparse.coo_array((self.areas, (part, np.arange(len(part)))), (count, len(part)))
-        part_of = np.asarray(among.tocsr() @ np.abs(self.rows)).argmax(axis=0)
-        parts = []
-        for k in range(count):
-            rows, areas = self.rows[part == k], self.areas[part == k]
-            parts.append((np.flatnonzero(part_of == k), (rows.T * areas) @ rows))
-        return parts
 
     def soft_row(self, vertex: int, at: FloatArray, spread: float) -> FloatArray | None:
         """Return the row of x~, (m,), from samples within *spread* of *vertex*, which is *at* v.

@@ -56,6 +56,7 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
 
 import numpy as np
+from scipy import linalg
 
 from ..arrays import FloatArray, is_number, is_whole
 from ..checks import as_flag, shown
@@ -395,6 +396,27 @@ class GaussNewton:
         forces = np.zeros((rows.shape[1], 3))
         forces[:, : len(rows)] = rows.T
         return np.asarray(rows @ self._factor.solve(forces)[:, : len(rows)])
+
+    def steadying(self, p: FloatArray, least: float) -> float:
+        """Return the weight of anchors over the surface that make *p* a firm minimum.
+
+        With weight k they add k |x - x(p)|^2, the mean square over the surface.  The Hessian at
+        *p*, without that of the volumes, is then at least *least* times that mean square.  0 if it
+        is so already; else k is at most twice what is needed.
+        """
+        m, mass, weight = len(p), self.energy.mass, 0.0
+        turning = -rotation_term(self.energy, p)
+        while True:
+            full, fixed = turning.copy(), self._hessian + (weight - least) * mass
+            for axis in range(3):
+                block = slice(axis * m, (axis + 1) * m)
+                full[block, block] += fixed
+            try:
+                linalg.cholesky(full, lower=True, overwrite_a=True, check_finite=False)
+            except linalg.LinAlgError:
+                weight = max(2.0 * weight, least)
+            else:
+                return weight
 
     def unbalanced(self, p: FloatArray, targets: FloatArray) -> FloatArray:
         """Return half the gradient of the objective at *p*, (m, 3), without that of the volumes.
