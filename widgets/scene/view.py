@@ -43,7 +43,7 @@ _log = logging.getLogger(__name__)
 Stop = Callable[[], None]
 _LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
-_SHARE_DRAWN = 0.2  # of the time, at most, while another thread is spared
+_SHARE_DRAWN = 0.1  # of the time, at most, while another thread is spared
 _MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
 _KEY_MARK = vtkCommand.UserEvent + 411  # never invoked: marks renderers whose views observe keys
 
@@ -166,7 +166,7 @@ class View(Projection):
         """Leave most of the time to another thread, until stopped.
 
         Drawing holds Python's lock, and all processors in software.  Pictures requested by events
-        therefore take at most a fifth of the time: one that comes too soon is drawn by a later
+        therefore take at most a tenth of the time: one that comes too soon is drawn by a later
         event, so a timer must be running.  `render` and the camera still draw at once.
         """
         self._n_spared += 1
