@@ -171,7 +171,7 @@ def contour(x: FloatArray, faces: IntArray, pairs: IntArray) -> tuple[float, Flo
 def _bounded(vectors: FloatArray) -> FloatArray:
     """Return *vectors* (k, 3), none longer than `_STEEPEST`."""
     size = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return vectors * np.minimum(1.0, _STEEPEST / np.maximum(size, _TINY))
+    return np.asarray(vectors * np.minimum(1.0, _STEEPEST / np.maximum(size, _TINY)))
 
 
 def _piercings(x: FloatArray, faces: IntArray, pairs: IntArray) -> list[Any]:
