@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, TETRAHEDRON
 
 from vtk_segdeform.io.array_names import get_names, set_names
 from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.polygons import corner_values, polydata_of, polygons_of
+from vtk_segdeform.io.surface import Surface
 
 TYPES = ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8", "?"]
 SPECIAL = [
@@ -206,6 +207,40 @@ def test_cell_arrays_follow_their_cells_beside_points_lines_and_strips(tmp_path,
     assert group[:6] == list(range(3, 9))  # after points and lines
     lengths = np.diff(mixed.strip_offsets) - 2
     assert group[6:] == np.repeat(np.arange(9, 9 + len(lengths)), lengths).tolist()
+
+
+@pytest.mark.parametrize("n_corners", [1, 2])
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtp", ".vtk", ".vtu"])
+def test_a_face_of_one_or_two_corners_is_kept_and_the_others_can_be_bent(
+    tmp_path, suffix, n_corners
+):
+    counts, corners = polygons_of(prism(5))
+    at = int(counts[:3].sum())
+    given = polydata_of(
+        prism(5).points, np.insert(counts, 3, n_corners), np.insert(corners, at, [4, 7][:n_corners])
+    )
+    rng = np.random.default_rng(2)
+    given.point_data["Normals"] = rng.normal(size=(given.n_points, 3))
+    if suffix.startswith(".v"):
+        given.cell_data["Normals"] = rng.normal(size=(given.n_cells, 3))
+    write_mesh(tmp_path / f"a{suffix}", given)
+    surface = Surface.read(tmp_path / f"a{suffix}")
+    assert surface.mesh.is_closed
+    there = surface.mesh.vertices + 0.1
+    surface.write(tmp_path / f"b{suffix}", there)
+    again = Surface.read(tmp_path / f"b{suffix}")
+    for one, two in zip(polygons_of(given), polygons_of(again.given), strict=True):
+        assert_array_equal(one, two)
+    assert_allclose(again.mesh.vertices, there, atol=1e-12)
+    assert_allclose(again.given.point_data["Normals"], given.point_data["Normals"], atol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".glb"])
+def test_formats_of_triangles_leave_out_faces_of_two_corners(tmp_path, suffix):
+    counts, corners = polygons_of(prism(3))
+    given = polydata_of(prism(3).points, np.append(2, counts), np.append([0, 4], corners))
+    write_mesh(tmp_path / f"a{suffix}", given)
+    assert Surface.read(tmp_path / f"a{suffix}").mesh.n_faces == 8
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".stl"])

@@ -43,7 +43,7 @@ def rich():
     return surface
 
 
-def written(data, mode="Binary", compressor="ZLib", header="UInt32"):
+def written(data, mode="Binary", compressor="ZLib", header="UInt32", order="Little"):
     """Return the bytes of an XML file, with small blocks."""
     writer = vtkXMLPolyDataWriter() if isinstance(data, pv.PolyData) else (
         vtkXMLUnstructuredGridWriter()
@@ -52,6 +52,7 @@ def written(data, mode="Binary", compressor="ZLib", header="UInt32"):
     getattr(writer, f"SetDataModeTo{mode}")()
     getattr(writer, f"SetCompressorTypeTo{compressor}")()
     getattr(writer, f"SetHeaderTypeTo{header}")()
+    getattr(writer, f"SetByteOrderTo{order}Endian")()
     writer.SetBlockSize(240)
     writer.WriteToOutputStringOn()
     writer.Write()
@@ -78,20 +79,32 @@ def contents(data):
     return found
 
 
+@pytest.mark.parametrize("order", ["Little", "Big"])
 @pytest.mark.parametrize("grid", [False, True])
 @pytest.mark.parametrize(
     ("mode", "compressor", "header"),
     [("Ascii", "None", "UInt32"), ("Binary", "None", "UInt32"), ("Binary", "ZLib", "UInt64"),
      ("Appended", "ZLib", "UInt32"), ("Appended", "None", "UInt64")],
 )  # fmt: skip
-def test_all_codings_are_read_as_vtk_reads_them(tmp_path, grid, mode, compressor, header):
+def test_all_codings_are_read_as_vtk_reads_them(tmp_path, grid, mode, compressor, header, order):
     surface = rich().cast_to_unstructured_grid() if grid else rich()
-    text = written(surface, mode, compressor, header)
+    text = written(surface, mode, compressor, header, order)
     path = tmp_path / f"a.vt{'u' if grid else 'p'}"
     path.write_text(text, encoding="utf-8")
     plain = read_plain_xml(path.read_bytes())
     assert plain is not None
     assert contents(plain) == contents(pv.read(path))
+
+
+@pytest.mark.parametrize("order", ["Little", "Big"])
+@pytest.mark.parametrize("compressor", ["None", "ZLib"])
+def test_what_is_left_to_vtk_may_have_either_order_of_bytes(tmp_path, order, compressor):
+    surface = rich()
+    surface.field_data["names"] = ["one", "two"]
+    path = tmp_path / "a.vtp"
+    path.write_text(written(surface, compressor=compressor, order=order), encoding="utf-8")
+    assert read_plain_xml(path.read_bytes()) is None
+    assert_array_equal(read_polydata(path).points, surface.points)
 
 
 def test_raw_bytes_may_look_like_tags(tmp_path):
@@ -158,7 +171,7 @@ DAMAGE = {
     "elements that overlap": ("</Points>", "</Polys>"),
     "elements in each other": ("<Points>", 9999 * "<Points>"),
     "an open element": ("</VTKFile>", ""),
-    "another byte order": ("LittleEndian", "BigEndian"),
+    "an unknown byte order": ("LittleEndian", "MiddleEndian"),
     "numbers too large for their type": ("1 1 1 1", "1 1e39 1 1"),
     "characters that are not UTF-8": ("</Piece>", "\udcff</Piece>"),
     "control characters": ("3 6 9 12", "3 6\0 9 12"),

@@ -65,8 +65,10 @@ class NormalTransport:
         if place is not None:
             group = _agreeing(points[place], self._normals)
         starts = np.cumsum(counts) - counts
-        polygon = np.repeat(np.arange(len(counts)), counts - 2)
-        rank = np.arange(len(polygon)) - np.repeat(np.cumsum(counts - 2) - (counts - 2), counts - 2)
+        n_triangles = np.maximum(counts - 2, 0)
+        polygon = np.repeat(np.arange(len(counts)), n_triangles)
+        first = np.cumsum(n_triangles) - n_triangles
+        rank = np.arange(len(polygon)) - np.repeat(first, n_triangles)
         at = starts[polygon]
         cut = np.stack([at, at + rank + 1, at + rank + 2], axis=1)  # corners of triangles of a fan
         self._triangles = corners[cut]

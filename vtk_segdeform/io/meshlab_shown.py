@@ -65,6 +65,7 @@ def colours_of_quality(quality: FloatArray) -> Any:
 def wires_of(surface: pv.PolyData) -> bytes:
     """Return a PLY file of the edges of a surface, without faces."""
     counts, corners = polygons_of(surface)
+    counts = counts[counts > 0]
     ends = np.roll(corners, -1)
     last = np.cumsum(counts) - 1
     ends[last] = corners[last - counts + 1]

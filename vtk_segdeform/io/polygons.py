@@ -1,7 +1,8 @@
 """Polygons as two flat arrays, and their conversion from and to pyvista's PolyData.
 
 counts[k] is the number of corners of polygon k; corners has the vertex indices of one polygon after
-another.  Triangles are polygons with counts of 3.
+another.  Triangles are polygons with counts of 3.  Files also have polygons of one or two corners,
+which are kept as they are given.
 
 Long because the compiled passes that cut polygons have their equivalents in numpy beside them.
 """
@@ -42,10 +43,10 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     Raises
     ------
     MeshError
-        If a polygon has fewer than three corners or a vertex index out of range.
+        If a vertex index is out of range.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
-    _require_polygons(len(points), counts, corners)
+    _require_points(len(points), corners)
     surface = pv.PolyData()
     surface.points = points
     # With offsets even for triangles alone: VTK's coordinates are wrong on cells of a fixed size.
@@ -55,15 +56,11 @@ def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.P
     return surface
 
 
-def _require_polygons(n_points: int, counts: IntArray, corners: IntArray) -> None:
+def _require_points(n_points: int, corners: IntArray) -> None:
     if len(corners) and (corners.min() < 0 or corners.max() >= n_points):
         raise MeshError(
             f"faces use vertices {corners.min()} to {corners.max()}, but there are {n_points}; "
             "number vertices from 0, and pass all of them"
-        )
-    if len(counts) and counts.min() < 3:
-        raise MeshError(
-            f"faces with fewer than three corners: {np.count_nonzero(counts < 3)}; remove them"
         )
 
 
@@ -73,10 +70,10 @@ def polygons_of(polydata: pv.PolyData) -> tuple[IntArray, IntArray]:
     Raises
     ------
     MeshError
-        If a polygon has fewer than three corners or a vertex index out of range.
+        If a vertex index is out of range.
     """
     result = _all_polygons(polydata)
-    _require_polygons(polydata.n_points, *result)
+    _require_points(polydata.n_points, result[1])
     return result
 
 
@@ -145,8 +142,6 @@ def corner_values(wide: FloatArray | None, counts: IntArray, width: int = 2) -> 
 def triangles_of(polydata: pv.PolyData) -> IntArray:
     """Return triangles (m, 3) over the same points, polygon by polygon; see `cut_into_triangles`.
 
-    Polygons of one or two corners have none.
-
     Raises
     ------
     MeshError
@@ -155,13 +150,10 @@ def triangles_of(polydata: pv.PolyData) -> IntArray:
     cells = polydata.GetPolys()
     if cells.IsHomogeneous() == 3 and not polydata.GetNumberOfStrips():  # the most common case
         corners = np.asarray(pv.convert_array(cells.GetConnectivityArray()), dtype=np.int64)
-        _require_polygons(polydata.n_points, _NO_COUNTS, corners)
+        _require_points(polydata.n_points, corners)
         return read_only(corners.reshape(-1, 3))
     counts, corners = _all_polygons(polydata)
-    enough = counts >= 3
-    if not enough.all():
-        counts, corners = counts[enough], corners[np.repeat(enough, counts)]
-    _require_polygons(polydata.n_points, counts, corners)
+    _require_points(polydata.n_points, corners)
     return cut_into_triangles(np.asarray(polydata.points, float), counts, corners)[0]
 
 
@@ -173,8 +165,13 @@ def cut_into_triangles(
     Convex polygons are cut along their shortest diagonals, others by ear clipping, planar ones
     without overlaps.  Where that fails, as for one that touches or crosses itself, the
     triangulation has the least area.  A polygon that is given again, in either direction, is cut
-    like the first one.
+    like the first one.  Polygons of one or two corners have no triangles.
     """
+    if len(counts) and counts.min() < 3:
+        enough = counts >= 3
+        kept = counts[enough], corners[np.repeat(enough, counts)]
+        faces, polygon = cut_into_triangles(points, *kept)
+        return faces, np.flatnonzero(enough)[polygon]
     number = np.arange(len(counts))
     if (counts == 3).all():
         return corners.reshape(-1, 3), number
@@ -396,7 +393,7 @@ def _clipped_ears(
     points: FloatArray, counts: IntArray, corners: IntArray
 ) -> tuple[IntArray, IntArray]:
     """Return what VTK finds; it leaves out some polygons and parts of others."""
-    _require_polygons(len(points), counts, corners)
+    _require_points(len(points), corners)
     places, cells = vtkPoints(), vtkCellArray()
     places.SetData(numpy_to_vtk(np.ascontiguousarray(points)))
     offsets = np.append(0, np.cumsum(counts))

@@ -31,6 +31,8 @@ _WRITERS = {
     "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
 }
 _REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
+# In VTK's messages; the second is only a warning, but zeros are returned for what is missing.
+_FAILURE = re.compile(r"ERROR:|Error reading")
 _LEGACY = (
     "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
 )  # fmt: skip
@@ -55,11 +57,11 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
     core.vtkOutputWindow.SetInstance(window)
     try:
         _update(reader, path)
-        if "ERROR:" in window.GetOutput():
+        if _FAILURE.search(window.GetOutput()):
             raise ValueError(window.GetOutput())
         for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
             _write_piece(piece, folder / str(number), writers)
-            if "ERROR:" in window.GetOutput():
+            if _FAILURE.search(window.GetOutput()):
                 raise ValueError(window.GetOutput())
     finally:
         core.vtkOutputWindow.SetInstance(before)

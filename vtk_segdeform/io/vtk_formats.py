@@ -180,8 +180,9 @@ def _require_plausible_counts(data: bytes) -> None:
             raise MeshError(f"declares {match[0].decode()}, too many for {len(data)} bytes")
     wide = b'header_type="UInt64"' in data[:1000]
     coded = b"compressor=" in data[:1000]
+    order = ">" if b'byte_order="BigEndian"' in data[:1000] else "<"
     for match in _BINARY.finditer(data):
-        words = np.frombuffer(_decoded(match[1]), "<u8" if wide else "<u4")
+        words = np.frombuffer(_decoded(match[1]), order + ("u8" if wide else "u4"))
         counts = words[: 3 if coded else 1].astype(float)
         if (counts > most).any() or (coded and len(counts) > 1 and counts[0] * counts[1] > most):
             raise MeshError(f"declares an array that is too large for {len(data)} bytes")
@@ -248,7 +249,7 @@ def _with_arrays(
 def _first_message(error: Exception) -> str:
     """Return the first error message of VTK; the others follow from it."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    messages = [line for line in lines if not line.startswith("ERROR: In")]
+    messages = [line for line in lines if not line.startswith(("ERROR: In", "Generic Warning: In"))]
     return _PREFIX.sub("", messages[0]) if messages else type(error).__name__
 
 

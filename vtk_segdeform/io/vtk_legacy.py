@@ -17,7 +17,8 @@ or in big-endian order.  Before version 5.1 a list of cells has for each cell th
 points and these; since then two arrays, OFFSETS and CONNECTIVITY.  Indices (`vtkIdType`) have 32
 bits.
 
-No memory is allocated for a count before that many numbers have been found.
+No memory is allocated for a count before that many numbers have been found.  A file that ends in
+the middle of its numbers is refused: VTK would return zeros for what is missing.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ import pyvista as pv
 from vtkmodules.vtkCommonDataModel import vtkDataSetAttributes
 
 from ..arrays import IntArray
+from ..errors import MeshError
 from .vtk_parts import (
     LONGEST,
     NotPlainError,
@@ -76,13 +78,21 @@ _ATTRIBUTES = {
     "color_scalars": (vtkDataSetAttributes.SCALARS, None),
 }
 _WIDEST = 4  # components of scalars
+_CUT_OFF = (
+    "ends before its numbers do: it was cut off, or a count is wrong; copy or export it again"
+)
 _SPACE = 0x20
 
 
 def read_plain_legacy(data: bytes) -> pv.PolyData | pv.UnstructuredGrid | None:
-    """Return what is in the bytes of a .vtk file; None if the file is not plain."""
+    """Return what is in the bytes of a .vtk file; None if the file is not plain.
+
+    Raises a `MeshError` if it was cut off.
+    """
     try:
         return _File(data).read()
+    except MeshError:
+        raise
     except (NotPlainError, ValueError, FloatingPointError):
         return None
 
@@ -128,7 +138,7 @@ class _File:
         done: set[str] = set()
         cells = None
         while True:
-            word = self._word().lower()
+            word = self._word_or_end().lower()
             demand(word not in done)
             done.add(word)
             if word == "points":
@@ -150,7 +160,7 @@ class _File:
 
     def _read_attributes(self, attributes: Any, count: int) -> str:
         """Read arrays of *count* rows; return the word after them, "" at the end."""
-        while word := self._word().lower():
+        while word := self._word_or_end().lower():
             if word == "field":
                 self._read_field(attributes, count)
             elif word == "lookup_table":
@@ -228,6 +238,11 @@ class _File:
         return cells_of(starts - np.arange(len(starts)), values[is_corner], n_points)
 
     def _word(self) -> str:
+        word = self._word_or_end()
+        _demand_rest(word)
+        return word
+
+    def _word_or_end(self) -> str:
         """Return the next word; "" at the end."""
         found = _WORD.match(self._data, self._at)
         if found is None:
@@ -258,13 +273,13 @@ class _File:
         demand(not self._rest_of_line().strip())
         if self._is_text:
             first = int(np.searchsorted(self._begins, self._at))
-            demand(count < len(self._begins) - first)
+            _demand_rest(count < len(self._begins) - first)
             start, self._at = self._at, int(self._begins[first + count])
             numbers = numbers_of_text(self._data[start : self._at], kind)
             demand(len(numbers) == count)
             return numbers
         size = count * kind.itemsize
-        demand(size <= len(self._data) - self._at)
+        _demand_rest(size <= len(self._data) - self._at)
         numbers = np.frombuffer(self._data, kind.newbyteorder(">"), count, self._at)
         self._at += size
         return numbers.astype(kind)
@@ -283,6 +298,11 @@ class _File:
             else:
                 demand(_INFORMATION.fullmatch(line))
         return names
+
+
+def _demand_rest(found: object) -> None:
+    if not found:
+        raise MeshError(_CUT_OFF)
 
 
 def _is_name(name: str) -> bool:

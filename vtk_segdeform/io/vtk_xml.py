@@ -48,6 +48,7 @@ _TYPES = {
     "UInt32": "<u4", "Int64": "<i8", "UInt64": "<u8", "Float32": "<f4", "Float64": "<f8",
 }  # fmt: skip
 _HEADERS = {"UInt32": 4, "UInt64": 8}
+_ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
 _COMPRESSORS = ("", "vtkZLibDataCompressor")
 _KINDS = {
     "Scalars": vtkDataSetAttributes.SCALARS, "Vectors": vtkDataSetAttributes.VECTORS,
@@ -98,6 +99,7 @@ class _Coding:
     """The encoding of arrays, and the appended data."""
 
     header: int
+    order: str  # of bytes: < or >
     compressed: bool
     raw: bool
     appended: bytes
@@ -120,10 +122,13 @@ def _read(data: bytes) -> pv.PolyData | pv.UnstructuredGrid:
     _demand_text(head)
     file = _tree(head)
     compressor, header = file.values.get("compressor", ""), file.values.get("header_type", "UInt32")
-    demand(file.name == "VTKFile" and file.values.get("byte_order") == "LittleEndian")
+    order = _ORDERS.get(file.values.get("byte_order", ""))
+    demand(file.name == "VTKFile" and order)
+    assert order is not None
     demand(file.values.get("version") in ("0.1", "1.0") and header in _HEADERS)
     demand(compressor in _COMPRESSORS and len(file.children) == 1)
-    coding = _Coding(_HEADERS[header], bool(compressor), raw, appended, _DENSEST * len(data))
+    is_dense, most = bool(compressor), _DENSEST * len(data)
+    coding = _Coding(_HEADERS[header], order, is_dense, raw, appended, most)
     body, piece = file.children[0], file.children[0].child("Piece")
     demand(body.name == file.values.get("type") and piece is not None)
     assert piece is not None
@@ -274,7 +279,7 @@ def _numbers(element: _Element, count: int | None, coding: _Coding) -> Any:
             code = memoryview(element.text.strip())
         raw = coding.raw and values["format"] == "appended"
         decoded = (_decompressed if coding.compressed else _stored)(code, raw, coding)
-        result = np.frombuffer(decoded, kind)
+        result = np.frombuffer(decoded, kind.newbyteorder(coding.order)).astype(kind, copy=False)
     demand(count is None or len(result) == count)
     return result
 
@@ -306,7 +311,9 @@ def _decompressed(code: memoryview, raw: bool, coding: _Coding) -> bytes:
 
 
 def _words(code: memoryview, count: int, raw: bool, coding: _Coding) -> Any:
-    return np.frombuffer(_decoded(code, count * coding.header, raw), f"<u{coding.header}")
+    return np.frombuffer(
+        _decoded(code, count * coding.header, raw), f"{coding.order}u{coding.header}"
+    )
 
 
 def _length(size: int, raw: bool) -> int:
