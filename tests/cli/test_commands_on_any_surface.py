@@ -126,6 +126,16 @@ def test_check_tells_a_script_all_about_a_surface(tmp_path, capsys):
     assert not found["volume_under_lids"]
 
 
+def test_check_tells_a_script_of_files_that_cannot_be_read(tmp_path, capsys):
+    keys = set(checked(file_of("holed", tmp_path), capsys))
+    (tmp_path / "cut.off").write_text("OFF\n4 4 0\n0 0 0\n")
+    for name, reason in (("cut.off", "ends after"), ("none.off", "no such file")):
+        found = checked(tmp_path / name, capsys, code=1)
+        assert set(found) == keys
+        assert not found["can_be_deformed"]
+        assert reason in found["reason"]
+
+
 def test_check_says_each_thing_once(tmp_path, capsys):
     path = file_of("holed", tmp_path)
     assert main(["check", str(path)]) == 0

@@ -2,7 +2,7 @@
 
 With ``--json`` it prints one object with these keys:
 
-    file, points, polygons      as given
+    file, points, polygons      as given; null what cannot be read
     vertices, faces             of the mesh that is deformed; null if there is none
     components, closed          their number; whether none has a border
     holes                       number of edges of each border
@@ -15,7 +15,7 @@ With ``--json`` it prints one object with these keys:
     faults, notes               of the triangles as given: objects with kind, text and count; the
                                 note "single precision" counts triangles that have collapsed
     self_intersections          pairs of faces of the mesh that intersect
-    can_be_deformed, reason     whether there is a mesh, and otherwise why not
+    can_be_deformed, reason     whether there is a mesh, and otherwise why not, in words
 """
 
 from __future__ import annotations
@@ -46,7 +46,13 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
         raise ConstraintError("--repair and -o OUT require each other: -o is the repaired mesh")
     if options.repair and options.json:
         raise ConstraintError("--json reports a surface as it is; it cannot be used with --repair")
-    given = io.read_polydata(options.input)
+    try:
+        given = io.read_polydata(options.input)
+    except (MeshError, OSError) as error:
+        if not options.json:
+            raise
+        say(json.dumps({**_unread(str(options.input)), "reason": str(error)}, indent=1))
+        return False
     if options.repair:
         return _repair(given, options, say, progress)
     progress(0.1, "checking mesh")
@@ -63,24 +69,14 @@ def described(given: Any, name: str) -> dict[str, Any]:
     """Return the object that ``--json`` prints, of a pyvista.PolyData named *name*."""
     points, faces = np.asarray(given.points, dtype=np.float64), triangles_of(given)
     report = find_faults(points, faces)
-    found: dict[str, Any] = {
-        "file": name,
+    found = {
+        **_unread(name),
         "points": given.n_points,
         "polygons": given.n_cells - given.n_lines - given.n_verts,
-        "vertices": None,
-        "faces": None,
         "components": report.n_components,
         "closed": report.is_two_manifold,
-        "holes": [],
-        "encloses": [],
-        "flattened": [],
-        "volume_under_lids": False,
-        "workarounds": [],
         "faults": [_counted(fault) for fault in report.faults],
         "notes": [*map(_counted, report.notes), *_of_precision(points, faces)],
-        "self_intersections": None,
-        "can_be_deformed": False,
-        "reason": None,
     }
     try:
         surface = Surface(given)
@@ -99,6 +95,22 @@ def described(given: Any, name: str) -> dict[str, Any]:
             for each in surface.workarounds
         ],
         "can_be_deformed": True,
+    }
+
+
+def _unread(name: str) -> dict[str, Any]:
+    """Return what is known of the file *name* before it is read."""
+    unknown = ("points", "polygons", "vertices", "faces", "components", "closed")
+    none = ("holes", "encloses", "flattened", "workarounds", "faults", "notes")
+    return {
+        "file": name,
+        **dict.fromkeys(unknown),
+        **{key: [] for key in none},
+        "volume_under_lids": False,
+        "self_intersections": None,
+        "can_be_deformed": False,
+        "reason": None,
+        "volume": None,
     }
 
 
