@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import every
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
 from vtk_segdeform import sizes
@@ -32,7 +32,8 @@ def checked(vertices, faces):
     mesh = found.mesh
     assert_array_equal(found.moved(mesh.vertices), vertices)  # bit for bit
     in_face = np.setdiff1d(np.arange(len(vertices)), found.loose)
-    assert_array_equal(mesh.vertices[found.vertex_of[in_face]], vertices[in_face])
+    there = mesh.vertices[found.vertex_of[in_face]]
+    assert_allclose(there, vertices[in_face], rtol=0.0, atol=2e-15 * np.abs(there).max())
     given = {
         tuple(sorted(found.vertex_of[face].tolist()))
         for face in faces
@@ -92,14 +93,43 @@ def test_a_triangle_soup_is_welded_to_the_body(body):
     assert texts(found) == [f"welded {3 * len(body[1])} seam points"]
 
 
-def test_only_border_points_at_exactly_the_same_position_are_welded():
-    vertices, faces = soup(*SPHERE)
-    moved = vertices.copy()
-    moved[7] = np.nextafter(moved[7], 9.0)
-    found = checked(moved, faces)
-    assert found.mesh.n_vertices == len(SPHERE[0]) + 1
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("at", [0.0, 100.0])
+def test_border_points_at_the_same_position_but_for_rounding_are_welded(kind, at):
+    vertices, faces = soup(SPHERE[0] + at, SPHERE[1])
+    moved = vertices.astype(kind)
+    moved[7] = np.nextafter(moved[7], kind(9.0 + at))
+    found = mesh_of(moved, faces)
+    assert found.mesh.is_closed
+    assert len(found.loose) == 0
+    assert_array_equal(found.moved(found.mesh.vertices), moved)
+    assert_array_equal(found.vertices_at([7]), [found.vertex_of[7]])
     zero = np.where(np.arange(len(vertices))[:, None] % 2, vertices, np.negative(vertices) * -1.0)
     assert checked(zero, faces).mesh.is_closed  # -0.0 is 0.0
+
+
+@pytest.mark.parametrize("away", [1e-9, 1e-5])
+def test_border_points_that_nearly_meet_remain_apart_and_are_told(away):
+    vertices, faces = soup(*SPHERE)
+    moved = vertices.copy()
+    moved[7] += away
+    found = checked(moved, faces)
+    assert found.mesh.n_vertices == len(SPHERE[0]) + 1
+    assert "2 border points nearly meet and are not welded" in texts(found)
+    (told,) = (each for each in found.workarounds if "nearly" in each.text)
+    assert 7 in told.points
+    moved[7] += 0.01
+    assert not any("nearly" in text for text in texts(checked(moved, faces)))
+
+
+def test_a_gap_of_one_step_of_coarse_coordinates_remains():
+    step = 2.0**-10  # of single precision at 1e4
+    sheet = 3.0 * step * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    both = np.concatenate([sheet, sheet + [4.0 * step, 0.0, 0.0]]) + [8192.0, 0.0, 0.0]
+    assert_array_equal(both.astype(np.float32), both)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    assert checked(both, faces).workarounds[-1].text == "2 holes"
+    assert mesh_of(both, faces).mesh.n_vertices == 8
 
 
 def test_coincident_vertices_of_closed_bodies_are_not_welded():
@@ -278,7 +308,7 @@ def test_seams_welded_at_once_give_the_same_mesh_as_step_by_step(seed, monkeypat
     pytest.importorskip("numba")
     monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
     rng = np.random.default_rng(seed)
-    sewn, n_at_once = soup_module._sewn, 0
+    sewn, n_at_once = soup_module.sewn, 0
     for k in range(60):
         body = BODIES[rng.integers(len(BODIES))]
         kept = body[1][rng.random(len(body[1])) >= rng.choice([0.0, 0.02])]
@@ -287,7 +317,7 @@ def test_seams_welded_at_once_give_the_same_mesh_as_step_by_step(seed, monkeypat
         faces = np.where(turned[:, None], faces[:, ::-1], faces)
         found = []
         for way in (sewn, lambda found: None):
-            monkeypatch.setattr(soup_module, "_sewn", way)
+            monkeypatch.setattr(soup_module, "sewn", way)
             try:
                 found.append(mesh_of(vertices, faces))
             except MeshError as error:

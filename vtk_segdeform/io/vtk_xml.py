@@ -279,7 +279,8 @@ def _numbers(element: _Element, count: int | None, coding: _Coding) -> Any:
             code = memoryview(element.text.strip())
         raw = coding.raw and values["format"] == "appended"
         decoded = (_decompressed if coding.compressed else _stored)(code, raw, coding)
-        result = np.frombuffer(decoded, kind.newbyteorder(coding.order)).astype(kind, copy=False)
+        given = np.dtype(coding.order + kind.str[1:])
+        result = np.frombuffer(decoded, given).astype(kind, copy=False)
     demand(count is None or len(result) == count)
     return result
 

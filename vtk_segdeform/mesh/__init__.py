@@ -10,6 +10,7 @@ The files, in reading order:
     loops            boundaries as loops of vertices
     orientation      which faces of any triangles to flip
     soup             a mesh from any triangles, and the map between both
+    welding          points at the same position on borders become one vertex
     shells           orientation of closed shells
     inside           winding numbers, points inside a surface, distance to it
     near_faces       pairs of triangles that may do so: a tree of boxes

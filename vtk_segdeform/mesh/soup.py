@@ -2,12 +2,11 @@
 
     drop       faces without three different vertices, repeated faces, points in no face, and
                components without area
-    weld       points of borders at exactly the same position, and open sheets that coincide
+    weld       points of borders at the same position, and open sheets that coincide; see `welding`
     orient     neighbouring faces alike, closed surfaces and nearly closed ones outward
 
-Points that a file rounded differently on both sides of a seam remain apart: no distance separates
-them safely from a narrow gap.  Vertices within a surface are not welded, so a closed surface
-remains as it is.  Of a face that is given twice, in any orientation, the mesh has the first.
+Vertices within a surface are not welded, so a closed surface remains as it is.  Of a face that is
+given twice, in any orientation, the mesh has the first.
 
 Nothing is lost: every given point follows a vertex of the mesh, so a pose of the mesh is one of
 the given triangles, with the same points in the same order.
@@ -27,12 +26,13 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
 from .edges import components, repeats_vertex
-from .faults import UNREPAIRABLE, Search, as_soup, distinct_faces, flat_faces
-from .grouping import connected, first_equal_row, first_members
+from .faults import UNREPAIRABLE, Search, as_soup, flat_faces
+from .grouping import connected, first_members
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
 from .topology import HalfEdges
+from .welding import rounding, sewn, welded
 
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
@@ -110,14 +110,21 @@ class Soup:
     @cached_property
     def loose(self) -> IntArray:
         """(k,) int: the given points that are not at a vertex of the mesh, and only follow one."""
+        some = self._apart
+        with np.errstate(over="ignore", invalid="ignore"):
+            away = np.abs(self.points[some] - self.mesh.vertices[self.vertex_of[some]])
+        return some[~(away <= rounding(self.mesh.vertices)).all(axis=1)]
+
+    @cached_property
+    def _apart(self) -> IntArray:
         return np.flatnonzero((self.points != self.mesh.vertices[self.vertex_of]).any(axis=1))
 
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""
         points: FloatArray = vertices[self.vertex_of]
-        followed = self.vertex_of[self.loose]
+        followed = self.vertex_of[self._apart]
         step = vertices[followed] - self.mesh.vertices[followed]
-        points[self.loose] = self.points[self.loose] + step
+        points[self._apart] = self.points[self._apart] + step
         return points
 
 
@@ -144,13 +151,13 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
             found = found.at(np.where(used[:, None], points, other))
     _require_usable(found)
     target = np.arange(len(points))
-    if (sewn := _sewn(found)) is not None:
-        target, found = sewn
+    if (closed := sewn(found)) is not None:
+        target, found = closed
     elif found.half_edges.all_twins and found.is_closed:
         return Soup(points, Mesh.of(found), target)
     valid = found.points
-    welded, kept, half_edges = _welded(valid, found)
-    target = welded[target]
+    joined, kept, half_edges, near = welded(valid, found)
+    target = joined[target]
     without_area = _without_area(found, kept, half_edges)
     flat = np.flatnonzero(kept)[without_area] if without_area.any() else _NONE
     if len(flat):
@@ -175,7 +182,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)
-    workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges))
+    workarounds = tuple(_workarounds(triangles, kept, flat, target, loose, flip, half_edges, near))
     return Soup(points, mesh, vertex_of, workarounds)
 
 
@@ -188,82 +195,6 @@ def _require_usable(found: Search) -> None:
     if faults:
         reasons = "; ".join(f"{fault}; {fault.kind.advice}" for fault in faults)
         raise MeshError(f"this surface cannot be deformed: {reasons}")
-
-
-def _sewn(found: Search) -> tuple[IntArray, Search] | None:
-    """Weld all points of equal position: return the vertex of each (p,), and the search after that.
-
-    None if `_welded` might weld fewer points.  It welds the same ones if the faces at each vertex
-    are one fan: a point inside a surface has a complete fan, so all welded points were on borders.
-    """
-    may_have_seams = 2 * len(found.points) > len(found.triangles) + 4  # than a closed surface has
-    if not may_have_seams or found.n_repeating != 0 or not found.used.all():
-        return None
-    is_first = found.first_at == np.arange(len(found.points))
-    if is_first.all():
-        return None
-    target = (np.cumsum(is_first) - 1)[found.first_at]
-    faces = target.take(found.triangles)
-    vertices = found.points.take(np.flatnonzero(is_first), axis=0)
-    if repeats_vertex(faces).any():
-        return None
-    half_edges = HalfEdges(faces, len(vertices))
-    if not half_edges.one_fan_after_flips:
-        return None
-    sewn = Search.known(vertices, half_edges, None)
-    sewn.__dict__["first_at"] = np.arange(len(vertices))
-    return target, sewn
-
-
-def _welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges]:
-    """Return the point that each point (p,) is welded to, the faces (m,) kept, and half-edges."""
-    target, half_edges = np.arange(len(points)), found.half_edges
-    kept = ~(found.degenerate | found.duplicate)
-    while len(half_edges.boundary):  # a face that is dropped may leave a border
-        weld = _coinciding_sheets(half_edges, found.first_at)
-        weld[half_edges.tail[half_edges.boundary]] = True
-        weld[half_edges.head_of(half_edges.boundary)] = True
-        some = np.flatnonzero(weld)
-        place, first_there = found.first_at[some], np.empty(len(points), dtype=np.int64)
-        first_there[place[::-1]] = some[::-1]  # the last write wins
-        first = first_there[place]
-        if (first == some).all():
-            break
-        number = np.arange(len(points))
-        number[some] = first
-        target = number[target]
-        degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
-        kept[kept] = ~(degenerate | duplicate)
-    return target, kept, half_edges
-
-
-def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
-    """Return the vertices (p,) of faces of open shells with all positions of another such face."""
-    found = np.zeros(len(first_at), dtype=bool)
-    if (first_at == np.arange(len(first_at))).all():
-        return found
-    used = np.zeros_like(found)
-    used[half_edges.faces] = True
-    shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
-    border = np.zeros_like(found)
-    border[half_edges.tail[half_edges.boundary]] = True
-    border[half_edges.head_of(half_edges.boundary)] = True
-    if border[used].all():
-        return found
-    some = np.flatnonzero(shared[half_edges.faces[:, 0]])
-    some = some[shared[half_edges.faces[some, 1:]].all(axis=1)]
-    if border[half_edges.faces[some]].all():  # as along seams: no need to find the shells
-        return found
-    shells = half_edges.shells
-    is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
-    is_open[shells[half_edges.boundary // 3]] = True
-    faces = half_edges.faces[some[is_open[shells[some]]]]
-    if border[faces].all():
-        return found
-    first = first_equal_row(np.sort(first_at[faces], axis=1))
-    again = first != np.arange(len(first))
-    found[faces[again]] = found[faces[first[again]]] = True
-    return found
 
 
 def _without_area(found: Search, kept: BoolArray, half_edges: HalfEdges) -> BoolArray:
@@ -299,6 +230,7 @@ def _workarounds(
     loose: IntArray,
     flip: BoolArray,
     half_edges: HalfEdges,
+    near: IntArray,
 ) -> Iterator[Workaround]:
     """Yield the sentences, from what was changed to what was left as it is."""
 
@@ -341,6 +273,9 @@ def _workarounds(
         number = np.cumsum(on_border) - 1
         n_holes = int(connected(int(on_border.sum()), *(number[end] for end in ends)).max()) + 1
         yield _workaround(Kind.HOLE, n_holes, "# hole", np.flatnonzero(on_border[target]))
+    if len(near):
+        text = f"{len(near)} border points nearly meet and are not welded"
+        yield Workaround(text, at(near), None, len(near))
     if len(crowded := half_edges.branching):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"
         there = at(np.append(half_edges.tail[crowded], half_edges.head_of(crowded)))

@@ -1,0 +1,140 @@
+"""Welding: points at the same position on borders become one vertex.
+
+The two sides of a seam may be computed in different ways, as at 0 and 2 pi of a cylinder, so points
+within a few roundings of their coordinates are at the same position.  Points that a file with fewer
+digits rounded differently remain apart, because no distance separates them safely from a narrow
+gap; `soup` tells that they nearly meet.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import BoolArray, FloatArray, IntArray
+from .edges import repeats_vertex
+from .faults import Search, distinct_faces
+from .grouping import connected, first_equal_row, first_members
+from .topology import HalfEdges
+
+_ROUNDINGS = 4.0  # of the largest coordinate, in the precision of all: the same position
+_NEARLY = 1e-3  # of the shortest border at both points
+_NEAREST = 3  # other points of borders that are looked at
+
+
+def sewn(found: Search) -> tuple[IntArray, Search] | None:
+    """Weld all points of equal position: return the vertex of each (p,), and the search after that.
+
+    None if `welded` might weld fewer points.  It welds the same ones if the faces at each vertex
+    are one fan: a point inside a surface has a complete fan, so all welded points were on borders.
+    """
+    may_have_seams = 2 * len(found.points) > len(found.triangles) + 4  # than a closed surface has
+    if not may_have_seams or found.n_repeating != 0 or not found.used.all():
+        return None
+    is_first = found.first_at == np.arange(len(found.points))
+    if is_first.all():
+        return None
+    target = (np.cumsum(is_first) - 1)[found.first_at]
+    faces = target.take(found.triangles)
+    vertices = found.points.take(np.flatnonzero(is_first), axis=0)
+    if repeats_vertex(faces).any():
+        return None
+    half_edges = HalfEdges(faces, len(vertices))
+    if not half_edges.one_fan_after_flips:
+        return None
+    sewn = Search.known(vertices, half_edges, None)
+    sewn.__dict__["first_at"] = np.arange(len(vertices))
+    return target, sewn
+
+
+def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges, IntArray]:
+    """Weld points of borders and of open sheets.
+
+    Return the point that each point (p,) is welded to, the faces (m,) kept, half-edges, and the
+    points (k,) of borders that nearly meet.
+    """
+    target, half_edges, first_at = np.arange(len(points)), found.half_edges, found.first_at
+    kept, near = ~(found.degenerate | found.duplicate), np.empty((0, 2), dtype=np.int64)
+    while len(half_edges.boundary):  # a face that is dropped may leave a border
+        weld = _coinciding_sheets(half_edges, first_at)
+        weld[half_edges.tail[half_edges.boundary]] = True
+        weld[half_edges.head_of(half_edges.boundary)] = True
+        some = np.flatnonzero(weld)
+        place, first_there = first_at[some], np.empty(len(points), dtype=np.int64)
+        first_there[place[::-1]] = some[::-1]  # the last write wins
+        first = first_there[place]
+        number = np.arange(len(points))
+        if (first == some).all():
+            near = _near_on_borders(points, half_edges)
+            apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
+            is_same = apart <= rounding(points)
+            if not is_same.any():
+                break
+            one, two = near[is_same].T
+            part = connected(len(points), np.append(number, one), np.append(first_at, two))
+            first_at, near = first_members(part)[part], near[:0]
+            continue
+        number[some] = first
+        target = number[target]
+        degenerate, duplicate, half_edges = distinct_faces(number[half_edges.faces], len(points))
+        kept[kept] = ~(degenerate | duplicate)
+    return target, kept, half_edges, np.unique(near)
+
+
+def rounding(points: FloatArray) -> float:
+    """Return the distance of points that are at the same position but for rounding."""
+    with np.errstate(over="ignore"):
+        is_single = bool((points.astype(np.float32) == points).all())
+    precision = np.finfo(np.float32 if is_single else np.float64).eps
+    return _ROUNDINGS * float(precision) * float(np.abs(points).max(initial=0.0))
+
+
+def _near_on_borders(points: FloatArray, half_edges: HalfEdges) -> IntArray:
+    """Return pairs (k, 2) of vertices of borders that nearly meet, and are not ends of an edge."""
+    ends = np.stack([half_edges.tail[half_edges.boundary], half_edges.head_of(half_edges.boundary)])
+    border, ends = np.unique(ends, return_inverse=True)
+    places, ends = points[border], ends.reshape(2, -1)
+    shortest = np.full(len(border), np.inf)
+    for each in ends:
+        np.minimum.at(shortest, each, np.linalg.norm(places[ends[0]] - places[ends[1]], axis=1))
+    found = cKDTree(places).query(places, min(_NEAREST + 1, len(places)))
+    away, other = (np.ravel(each) for each in found)
+    one = np.repeat(np.arange(len(places)), len(other) // len(places))
+    is_near = (one != other) & (away <= _NEARLY * np.minimum(shortest[one], shortest[other]))
+    pairs: IntArray = border[np.stack([one, other], axis=1)[is_near]]
+    if not len(pairs):
+        return pairs
+    n = half_edges.n_vertices
+    keys = np.sort(pairs, axis=1) @ [n, 1]
+    edges = np.sort(half_edges.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1) @ [n, 1]
+    apart: IntArray = pairs[~np.isin(keys, edges)]
+    return apart
+
+
+def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
+    """Return the vertices (p,) of faces of open shells with all positions of another such face."""
+    found = np.zeros(len(first_at), dtype=bool)
+    if (first_at == np.arange(len(first_at))).all():
+        return found
+    used = np.zeros_like(found)
+    used[half_edges.faces] = True
+    shared = used & (np.bincount(first_at[used], minlength=len(first_at)) > 1)[first_at]
+    border = np.zeros_like(found)
+    border[half_edges.tail[half_edges.boundary]] = True
+    border[half_edges.head_of(half_edges.boundary)] = True
+    if border[used].all():
+        return found
+    some = np.flatnonzero(shared[half_edges.faces[:, 0]])
+    some = some[shared[half_edges.faces[some, 1:]].all(axis=1)]
+    if border[half_edges.faces[some]].all():  # as along seams: no need to find the shells
+        return found
+    shells = half_edges.shells
+    is_open = np.zeros(int(shells.max()) + 1, dtype=bool)
+    is_open[shells[half_edges.boundary // 3]] = True
+    faces = half_edges.faces[some[is_open[shells[some]]]]
+    if border[faces].all():
+        return found
+    first = first_equal_row(np.sort(first_at[faces], axis=1))
+    again = first != np.arange(len(first))
+    found[faces[again]] = found[faces[first[again]]] = True
+    return found
