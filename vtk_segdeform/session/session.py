@@ -685,8 +685,13 @@ class Session(Timeline):
         state = grasp.state
         assert state.pose is not None
         wanted = {**state.pose.targets, **targets}
-        if grasp is before:
-            state = replace(state, pose=self._state.pose)
+        if before is not None:  # go on from the pose so far
+            pose = self._state.pose
+            assert pose is not None
+            if grasp is not before:  # the handle has become a patch
+                now = handles.targets_at(state.handles, self.vertices)
+                pose = replace(state.pose, cage_vertices=pose.cage_vertices, targets=now)
+            state = replace(state, pose=pose)
         solution = self._drag(state, wanted, [grasp.name], (max_steps, within))
         self._grasp = start, grasp
         return solution

@@ -63,6 +63,8 @@ def export_picture(window: Any) -> bool:
 
 def may_discard(window: Any) -> bool:
     """Return whether the document may be closed: it is saved, or the user discards it."""
+    if window.has_mesh and window.editor.controller.settling.is_awaited:
+        _settle(window)
     if not window.is_modified:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
@@ -71,16 +73,21 @@ def may_discard(window: Any) -> bool:
 
 
 def _saved_now(window: Any) -> bool:
-    """Save the session, and wait until that is done; the window is drawn meanwhile."""
+    """Save the session, and wait until that is done."""
     if not save_session(window):
         return False
+    _settle(window)
+    return not window.is_modified
+
+
+def _settle(window: Any) -> None:
+    """Wait until the pose has settled and has been saved; the window is drawn meanwhile."""
     events, settling = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller.settling
     while settling.is_active:
         QtWidgets.QApplication.processEvents(
             events.ExcludeUserInputEvents | events.WaitForMoreEvents
         )
     settling.flush()
-    return not window.is_modified
 
 
 def _session_saved(window: Any, path: Path) -> None:

@@ -86,7 +86,7 @@ BINDINGS = (
     Binding("more_local", ("plus", "equal"), frozenset({P}), "More local", actions.more_local),
     Binding("less_local", ("minus",), frozenset({P}), "Less local", actions.less_local),
     Binding("auto_locality", ("a",), frozenset({P}), "Automatic locality", actions.auto_locality),
-    Binding("remove_pins", ("u",), frozenset({P}), "Remove all pins", actions.unpin_all),
+    Binding("remove_pins", ("u",), frozenset({P}), "Remove all points", actions.unpin_all),
     Binding("", ("r",), frozenset({P}), "While pulling: turn", None),
     Binding("select_through", ("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
     Binding("grow", ("plus", "equal"), PAINTING, "Grow by one ring", actions.grow),

@@ -14,7 +14,7 @@ import numpy as np
 from vtk_segdeform.errors import RegionError, SessionError
 
 from ..region_selector import Paint
-from .actions import Action, fit_cages, once_settled, segment
+from .actions import Action, fit_cages, once_settled, segment, toggle_volume
 from .controller import Controller
 from .mode import Mode
 
@@ -154,6 +154,16 @@ def setting_colour_range(share: float | None) -> Action:
 def setting(**changes: float | bool | None) -> Action:
     """Return the action that changes options of the session."""
     return lambda controller: controller.session.change_options(**changes)
+
+
+def preserving_volume(wanted: bool) -> Action:
+    """Return the action that turns volume preservation on or off, and says so."""
+
+    def change(controller: Controller) -> None:
+        if controller.session.options.preserve_volume != wanted:
+            toggle_volume(controller)
+
+    return change
 
 
 def finishing_after_drags(wanted: bool) -> Action:

@@ -63,6 +63,11 @@ class Settling:
         return _STEP * int(max(share, 0.0) / _STEP)
 
     @property
+    def is_awaited(self) -> bool:
+        """Whether something, such as saving, waits until the pose has settled."""
+        return bool(self._waiting)
+
+    @property
     def work(self) -> str:
         """What `fraction` is about."""
         return "Saving" if self._waiting else "Settling"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..editor import Action, Controller, DeformEditor, pulling_with, setting
+from ..editor import Action, Controller, DeformEditor, preserving_volume, pulling_with
 from ..volume_overlay import percent
 from .fields import Field, Section, key_button
 
@@ -78,7 +78,7 @@ def preserve_toggle(editor: DeformEditor, name: str) -> Field:
         "preserve_volume",
         value=editor.session.options.preserve_volume and has_volume,
         enabled=has_volume,
-        act=lambda on: setting(preserve_volume=on),
+        act=preserving_volume,
     )
 
 

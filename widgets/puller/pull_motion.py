@@ -65,9 +65,13 @@ class PullMotion:
         self._constraint = next_constraint(unconstrained, self._constraint, axis)
         self._begin()
 
-    def toggle_turning(self, pointer: Pointer) -> None:
-        """Turn instead of moving from now on, or the other way round; the motion so far stays."""
-        self._base_shift, self._base_turn = self._shift, self._turn
+    def toggle_turning(self, pointer: Pointer, turned: FloatArray) -> None:
+        """Turn instead of moving from now on, or the other way round; the motion so far stays.
+
+        *turned* (3, 3) is how the surface around the point has turned by itself while it was moved.
+        """
+        self._base_shift = self._shift
+        self._base_turn = self._turn if self.has_turned else turned
         self.is_turning = not self.is_turning
         self.has_turned = True
         self._constraint = None

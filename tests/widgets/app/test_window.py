@@ -265,7 +265,8 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
 
 
 @BLANK
-def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes):
+@pytest.mark.parametrize("is_saving", [False, True])
+def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes, is_saving):
     hand = start(arm_file)
     session, settling = hand.window.session, hand.window.editor.controller.settling
     tick, rests = LiveSolve._tick, [True]
@@ -287,9 +288,14 @@ def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, 
     assert_array_equal(load_session(arm_file).vertices, session.vertices)
     rests.append(True)
     bend([0.0, 0.3, -0.2])
+    if is_saving:  # so that there is nothing to ask
+        hand.choose("File", "Save session")
+    else:
+        boxes.answers.append("Save")
+    n_asked = len(boxes.seen)
     rests.clear()
-    boxes.answers.append("Save")
     assert hand.window.close()
+    assert len(boxes.seen) == n_asked + (not is_saving)
     assert session.solution.status is not Status.STEP_LIMIT
     assert_array_equal(load_session(arm_file).vertices, session.vertices)
 

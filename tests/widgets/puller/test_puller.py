@@ -10,6 +10,7 @@ from solids import icosphere
 
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ArgumentError, ConstraintError
+from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.widgets.picking.surface_ring import SurfaceRing
 from vtk_segdeform.widgets.puller.caption import Caption
@@ -172,6 +173,24 @@ def test_r_turns_about_the_point_and_a_number_is_degrees(bench):
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     np.testing.assert_allclose(after, before @ [[c, 0, -s], [0, 1, 0], [s, 0, c]], atol=1e-9)
     assert bench.session.undo_label == "pull"
+
+
+def test_r_leaves_the_surface_as_it_has_turned_by_itself(bench):
+    place, vertex = bench.on(2.6)
+    rest = SCENE.mesh.vertices
+    bench.hand.press(place)
+    for k in range(1, 13):
+        bench.hand.move(place + [-4 * k, 12 * k])
+    near = np.linalg.norm(rest - rest[vertex], axis=1) < 0.4 * bench.puller.radius
+
+    def turned():
+        return rigid_fit(rest[near], bench.session.vertices[near])[0]
+
+    before = turned()
+    assert (np.trace(before) - 1.0) / 2.0 < np.cos(0.5)  # the end of the body has bent
+    bench.hand.key("r")
+    assert (np.trace(before.T @ turned()) - 1.0) / 2.0 > np.cos(0.1)  # at once
+    bench.hand.release()
 
 
 def test_shift_and_the_wheel_or_brackets_change_the_radius(bench):

@@ -416,6 +416,17 @@ def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     assert not seen.session.handles
 
 
+@pytest.mark.parametrize("name", ["pull.preserve", "deform.preserve"])
+def test_turning_volume_preservation_off_and_on_is_told(make, name):
+    seen = make(models.sphere(300))
+    seen.mode(Mode.PULL if name == "pull.preserve" else Mode.DEFORM)
+    seen.click(seen.panel.controls[name])
+    assert not seen.session.options.preserve_volume
+    seen.click(seen.panel.controls[name])
+    assert seen.session.options.preserve_volume
+    assert "Volume preservation on from the next move" in seen.editor.status
+
+
 @pytest.mark.campaign
 def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen = make(models.sphere(300))
