@@ -20,6 +20,7 @@ from vtk_segdeform.deformer.locality import Ring, SurfaceSamples
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import Finisher
+from vtk_segdeform.geometry import distortion
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import Regions
@@ -351,3 +352,34 @@ def test_a_pull_that_needs_every_correction_has_converged():
     solution = pull(tetrahedron, 3, [0.0, 0.0, 1.3])
     assert solution.status is Status.CONVERGED
     assert solution.handle_error < 1e-4
+
+
+def test_the_finish_of_a_pull_makes_no_bump_around_the_pulled_point():
+    mesh = models.cactus(3000)
+    x = mesh.vertices
+    tip = int(np.argmin(np.linalg.norm(x - [-0.32, -0.05, 0.62], axis=1)))
+    session = Session(mesh)
+    session.accept(session.preparation())
+    session.pull(tip, x[tip] + [-0.2, 0.0, 0.1])
+    session.commit()
+    poses = [session.vertices.copy()]
+    session.finish()
+    poses.append(session.vertices)
+    near = (np.linalg.norm(x[mesh.faces] - x[tip], axis=2) < 0.2 * mesh.diagonal).all(axis=1)
+    rest, *bent = (bends(each, mesh.faces[near]) for each in (x, *poses))
+    before, after = (np.sqrt(((each - rest) ** 2).mean()) for each in bent)
+    assert distortion(mesh, poses[1]) < 0.97 * distortion(mesh, poses[0])
+    assert after < 1.25 * before
+
+
+def bends(x, faces):
+    """Return the signed angles between the normals of neighbouring triangles."""
+    sides = np.concatenate([faces, np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)])
+    owner = {(a, b): k for k, (a, b, _) in enumerate(sides.tolist())}
+    pairs = np.array([(k, owner[b, a]) for (a, b), k in owner.items() if a < b and (b, a) in owner])
+    normal = np.cross(x[sides[:, 1]] - x[sides[:, 0]], x[sides[:, 2]] - x[sides[:, 0]])
+    one, two = normal[pairs[:, 0]], normal[pairs[:, 1]]
+    along = x[sides[pairs[:, 0], 1]] - x[sides[pairs[:, 0], 0]]
+    across = np.cross(one, two)
+    sine = np.einsum("ij,ij->i", across, along) / np.linalg.norm(along, axis=1)
+    return np.arctan2(sine, np.einsum("ij,ij->i", one, two))

@@ -648,7 +648,7 @@ class Deformer:
         in less space, and the handles and fixed vertices are exact.  The volume is preserved as
         before.  The next solve starts from the cages, as if the pose had not been finished.  Of a
         deformer made by `local` only the surface within the reach is finished: it stays from 1.15
-        times the reach on, and next to a handle of one vertex, which would become a spike.  A pose
+        times the reach on, and around a handle of one vertex, which would become a bump.  A pose
         that would lose its volume, because hardly a vertex is free, is returned unchanged.  Of the
         finish of a pull half is used, or a quarter, if all of it would add energy or folds; if
         these do as well, the pose is returned unchanged.
@@ -723,16 +723,17 @@ class Deformer:
         )
 
     def _near_pulled_vertices(self) -> FloatArray:
-        """Return 1 within half the spread of pulled vertices, 0 beyond the spread, (n,) float.
+        """Return 1 within the spread of pulled vertices, 0 beyond twice the spread, (n,) float.
 
-        And 1 at their neighbours.  Samples are coarser than the vertices, and smoothing between
-        them would move the neighbours of a pulled vertex, which stays.
+        And 1 at their neighbours.  Triangles resist no bending, so the finish would concentrate
+        the load of a pulled vertex in a crease around it.  The cages distribute it, so their pose
+        is kept here.
         """
         x, pulled = self._rest_pose.vertices, self._constraints.pulled
         near = np.zeros(len(x))
         for each in pulled.vertices:
             away = np.linalg.norm(x - x[each], axis=1) / pulled.spread
-            near = np.maximum(near, np.clip(2.0 * (1.0 - away), 0.0, 1.0))
+            near = np.maximum(near, np.clip(2.0 - away, 0.0, 1.0))
             near[self.mesh.adjacency[[each]].indices] = 1.0
         return near
 
