@@ -98,7 +98,13 @@ class VolumeConstraint:
         if self.extension is None:
             return x
         x = x - x[0]
-        return np.concatenate([x, self.extension[len(x) :] @ x])  # its upper part is the identity
+        return np.concatenate([x, self._means @ x])
+
+    @cached_property
+    def _means(self) -> sparse.csr_array:
+        """The points that were added, from the others: `extension` below the identity."""
+        assert self.extension is not None
+        return self.extension[self.extension.shape[1] :]
 
 
 @dataclass(frozen=True, eq=False)
