@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
@@ -35,7 +36,7 @@ class WaitingPage(QtWidgets.QWidget):
     """The page shown while a document is read: its name, the progress and a Cancel button."""
 
     cancelled = QtCore.Signal()
-    """The Cancel button was clicked."""
+    """The Cancel button was clicked, or Escape was pressed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -58,6 +59,18 @@ class WaitingPage(QtWidgets.QWidget):
         """Show that *name* is being opened."""
         self._name = name
         self.show_progress(0.0, "")
+
+    def showEvent(self, event: Any) -> None:  # noqa: N802
+        """Take the keyboard."""
+        super().showEvent(event)
+        self.cancel.setFocus()
+
+    def keyPressEvent(self, event: Any) -> None:  # noqa: N802
+        """Cancel at Escape."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.cancelled.emit()
+        else:
+            super().keyPressEvent(event)
 
     def show_progress(self, fraction: float, text: str) -> None:
         """Show the progress, 0..1, and the current step."""

@@ -152,7 +152,8 @@ def test_kernels_are_loaded_while_the_start_page_waits(
 
 
 @BLANK
-def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch):
+@pytest.mark.parametrize("by_key", [False, True])
+def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monkeypatch, by_key):
     hand, read, threads = start(), documents.read_session, []
     go_on = threading.Event()
 
@@ -166,7 +167,10 @@ def test_a_file_from_the_menu_is_opened_in_another_thread(start, ball_file, monk
     hand.choose("File", "Open ...")
     until(lambda: hand.page is hand.window.pages.waiting, "the page that says so")
     until(lambda: "ball.vtp" in hand.page.label.text() and threads, "the name")
-    hand.click(hand.page.cancel)
+    if by_key:
+        QtTest.QTest.keyClick(hand.window.focusWidget(), Qt.Key_Escape)
+    else:
+        hand.click(hand.page.cancel)
     assert hand.page is hand.window.pages.start
     hand.choose("File", "Open ...")
     until(lambda: len(threads) == 2, "the second time")
