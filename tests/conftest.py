@@ -96,6 +96,13 @@ def _quick_rendering() -> None:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def _no_first_run() -> None:
+    from vtk_segdeform.kernels import dispatch
+
+    dispatch._CACHED = "*.py[c]"  # which are there, whether kernels have been compiled or not
+
+
+@pytest.fixture(scope="session", autouse=True)
 def fitted_once() -> Iterator[Any]:
     """Fit equal cages around equal regions once per process; yield the function that fits."""
     from vtk_segdeform.cages import fit

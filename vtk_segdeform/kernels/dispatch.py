@@ -17,6 +17,7 @@ import importlib
 import importlib.util
 import os
 import sys
+from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -28,6 +29,7 @@ from .. import sizes
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 24  # bytes; only the pages that are used take memory
 _LARGE = 1 << 17  # bytes; a process has less than that at hand, without new pages
+_CACHED = "*.nbi"  # files of compiled kernels
 _checked = [0]  # faces processed so far by equivalents in numpy
 _is_late = [False]  # whether small arrays are processed in numpy until the kernels are loaded
 
@@ -75,9 +77,14 @@ def load_late() -> None:
     _is_late[0] = not _kernels.cache_info().currsize
 
 
+def _missing() -> list[str]:
+    """Return the names of the libraries that make frames faster and are not installed."""
+    return [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]
+
+
 def advice() -> str:
     """Return a sentence about missing libraries that make frames faster; "" if none is missing."""
-    missing = [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]
+    missing = _missing()
     if not missing:
         return ""
     times = "3 to 6 times as long" if "numba" in missing else "longer"
@@ -86,6 +93,18 @@ def advice() -> str:
         f"{' and '.join(missing)} {verb} not installed: frames take {times}. "
         f"pip install {' '.join(missing)}"
     )
+
+
+def is_first_run() -> bool:
+    """Tell whether kernels will be compiled, once for all later runs, which takes half a minute.
+
+    False if that is unknown, because numba does not cache them beside the source.
+    """
+    folder = Path(__file__).parent / "compiled"
+    if _LIBRARIES[0] in _missing() or os.environ.get("SEGDEFORM_NUMBA", "1") == "0":
+        return False
+    is_beside = "NUMBA_CACHE_DIR" not in os.environ and os.access(folder, os.W_OK)
+    return is_beside and not any((folder / "__pycache__").glob(_CACHED))
 
 
 def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:

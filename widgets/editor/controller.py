@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.kernels import advice, load_early, load_late
+from vtk_segdeform.kernels import advice, is_first_run, load_early, load_late
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
@@ -37,6 +37,7 @@ from .session_file import SessionFile, is_mesh, read_session
 from .settling import Settling, is_unsettled
 from .widget_set import WidgetSet
 
+_FIRST_RUN = "The first run compiles for about half a minute, later ones do not"
 T = TypeVar("T")
 
 
@@ -81,7 +82,7 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
-        self.messages.note(advice())
+        self.messages.note(advice() or _FIRST_RUN * is_first_run())
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)

@@ -19,6 +19,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.errors import CageError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
@@ -574,6 +575,13 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
     made.type("1")
     assert made.editor.status
     assert "numba" not in made.editor.status
+    made.editor.remove()
+
+
+def test_the_first_run_says_that_it_compiles(monkeypatch):
+    monkeypatch.setattr(dispatch, "_CACHED", "*.none")
+    made = Bench(plain_view((500, 400)), sausage(is_coarse=True).mesh, mode=None)
+    assert made.editor.status.startswith("The first run compiles")
     made.editor.remove()
 
 
