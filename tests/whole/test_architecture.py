@@ -49,6 +49,7 @@ GRANTED = {
     "io": {"pyvista"},
     "io.array_names": VTK,
     "io.convert": VTK,
+    "io.grids": VTK,
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
     "io.vtk_formats": VTK,

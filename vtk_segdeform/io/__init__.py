@@ -15,6 +15,7 @@ The files, in reading order:
     vtk_formats        other formats, by VTK
     vtk_xml vtk_legacy plain files of VTK's formats, without VTK
     vtk_parts          their cells and arrays
+    grids              unstructured grids as PolyData, and back
     isolated reading_child
                        native readers in a child process
     array_names        names and arrays that a format cannot store

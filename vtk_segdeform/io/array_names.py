@@ -17,6 +17,7 @@ from vtkmodules.vtkCommonCore import vtkStringArray
 
 from ..errors import MeshError
 
+CELL_TYPES = "types of the cells of a grid"  # a field array, see `grids`
 _log = logging.getLogger(__name__)
 _LONGEST = 200  # characters; some readers store names in buffers of fixed size
 
@@ -114,7 +115,7 @@ def warn_left_out(
         f"{sort} array {name!r}"
         for sort in ("point", "cell", "field")
         for name in list(getattr(surface, f"{sort}_data"))
-        if name not in kept.get(sort, ())
+        if name not in (*kept.get(sort, ()), CELL_TYPES)
     ]
     for count, sort in ((surface.n_verts, "vertex"), (surface.n_lines, "line")):
         if count and not cells:

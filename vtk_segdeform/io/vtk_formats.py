@@ -27,13 +27,13 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkIOHDF import vtkHDFWriter
-from vtkmodules.vtkIOLegacy import vtkPolyDataWriter
+from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from ..errors import MeshError
-from .array_names import plain_names, warn_renamed
+from .array_names import CELL_TYPES, plain_names, warn_renamed
+from .grids import grid_of, is_grid, surface_of_grid
 from .isolated import read_isolated
-from .polygons import polydata_of
 from .vtk_legacy import read_plain_legacy
 from .vtk_xml import read_plain_xml
 
@@ -55,9 +55,6 @@ _BEGINS = {
     ".vtu": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
     ".vtkhdf": re.compile(rb"\x89HDF\r\n\x1a\n"),
 }
-# VTK's numbers of the cells of a grid, by where PolyData has them.
-_VERTS, _LINES, _POLYGONS, _STRIPS = (1, 2), (3, 4), (5, 7, 9), (6,)
-_SURFACE_CELLS = frozenset({*_VERTS, *_LINES, *_POLYGONS, *_STRIPS})
 _WRITERS = {".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
 _REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"', ".vtkhdf": "/."}
 _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
@@ -76,7 +73,7 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         data = path.read_bytes()
         plain = _PLAIN[suffix](data)
         if plain is not None:
-            return _surface(plain)
+            return _surface(plain, suffix)
         if suffix in _XML:
             _require_plausible_counts(data)
     try:
@@ -88,7 +85,9 @@ def read_with_vtk(path: Path) -> pv.PolyData:
             parts = [_validated(pv.get_reader(piece).read()) for piece in pieces]
     except (MeshError, RuntimeError) as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
-    surfaces = [_surface(part) for part in parts]
+    surfaces = [_surface(part, suffix) for part in parts]
+    for each in surfaces[: len(surfaces) * (len(surfaces) > 1)]:
+        each.GetFieldData().RemoveArray(CELL_TYPES)
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     if suffix == ".vtkhdf":  # it does not store which arrays are active
         _activate_normals(surface)
@@ -196,54 +195,12 @@ def _decoded(word: bytes) -> bytes:
         return b""
 
 
-def _surface(data: pv.DataSet) -> pv.PolyData:
+def _surface(data: pv.DataSet, suffix: str) -> pv.PolyData:
     if isinstance(data, pv.PolyData):
         return data
     if not isinstance(data, pv.UnstructuredGrid):
         raise MeshError(f"contains a {type(data).__name__}, not a surface")
-    if not set(data.celltypes.tolist()) <= _SURFACE_CELLS:
-        raise MeshError(
-            "contains cells other than triangles and polygons; extract its surface first"
-        )
-    if not data.n_cells or not set(data.celltypes.tolist()) & {*_POLYGONS, *_STRIPS}:
-        return pv.PolyData()
-    surface, order = pv.PolyData(), []
-    surface.points = np.asarray(data.points, dtype=float)
-    starts, corners = (
-        pv.convert_array(each)
-        for each in (data.GetCells().GetOffsetsArray(), data.GetCells().GetConnectivityArray())
-    )
-    for name, types in (
-        ("verts", _VERTS), ("lines", _LINES), ("faces", _POLYGONS), ("strips", _STRIPS),
-    ):  # fmt: skip
-        rows = np.flatnonzero(np.isin(data.celltypes, types))
-        if name == "faces" and len(rows) == data.n_cells:
-            return _with_arrays(polydata_of(surface.points, np.diff(starts), corners), data)
-        parts = [corners[starts[k] : starts[k + 1]] for k in rows]
-        if parts:
-            setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
-        order.append(rows)
-    return _with_arrays(surface, data, np.concatenate(order))
-
-
-def _with_arrays(
-    surface: pv.PolyData, data: pv.UnstructuredGrid, order: Any = slice(None)
-) -> pv.PolyData:
-    """Give a surface the arrays of a grid whose cells have another order."""
-    cells = surface.cell_data
-    for mine, theirs in (
-        (surface.point_data, data.point_data),
-        (cells, data.cell_data),
-        (surface.field_data, data.field_data),
-    ):
-        for name, values in theirs.items():
-            mine[name] = values[order] if mine is cells else values
-    for mine, theirs in ((surface.GetPointData(), data.GetPointData()),
-                         (surface.GetCellData(), data.GetCellData())):  # fmt: skip
-        for kind in range(theirs.NUM_ATTRIBUTES):
-            if (active := theirs.GetAbstractAttribute(kind)) is not None:
-                mine.SetActiveAttribute(active.GetName(), kind)
-    return surface
+    return surface_of_grid(data, only_as_grid=suffix == ".vtk")
 
 
 def _first_message(error: Exception) -> str:
@@ -263,9 +220,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
     plain = _with_plain_names(surface, suffix)
     if suffix in _XML:
         writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(
-            plain if suffix == ".vtp" else pv.wrap(plain).cast_to_unstructured_grid()
-        )
+        writer.SetInputData(_without_types(plain) if suffix == ".vtp" else grid_of(plain))
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()
         writer.Write()
@@ -273,8 +228,9 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            writer = _WRITERS[suffix]()
-            writer.SetInputData(plain)
+            is_legacy_grid = suffix == ".vtk" and is_grid(surface)
+            writer = vtkUnstructuredGridWriter() if is_legacy_grid else _WRITERS[suffix]()
+            writer.SetInputData(grid_of(plain) if is_legacy_grid else _without_types(plain))
             again = surface
             if suffix != ".vtkhdf":
                 writer.SetFileName(str(path))
@@ -291,6 +247,11 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         raise OSError(" ".join(str(error).split())) from None
     if not np.array_equal(again.points, surface.points, equal_nan=True):
         raise OSError("the file is incomplete")
+
+
+def _without_types(surface: Any) -> Any:
+    surface.GetFieldData().RemoveArray(CELL_TYPES)
+    return surface
 
 
 def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:

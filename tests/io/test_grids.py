@@ -1,0 +1,85 @@
+"""Grids of surface cells are written as they were read: types and order of cells, arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista as pv
+from numpy.testing import assert_array_equal
+from test_vtk_xml import contents
+
+from vtk_segdeform.io.convert import read_polydata, write_mesh
+from vtk_segdeform.io.surface import Surface
+
+RING = np.arange(6) * np.pi / 3.0
+POINTS = np.stack([np.cos(RING), np.sin(RING), 0.0 * RING], axis=1)
+POINTS = np.concatenate([POINTS, POINTS + [0.0, 0.0, 1.0], [[9.0, 9.0, 9.0]]])
+SIDES = [[k, (k + 1) % 6, (k + 1) % 6 + 6, k + 6] for k in range(6)]
+# Types of VTK and corners, in no order of a PolyData.
+CELLS = [
+    (9, SIDES[0]), (1, [12]), (7, SIDES[1]), (5, [0, 2, 1]), (5, [0, 3, 2]), (3, [0, 12]),
+    (7, [0, 5, 4, 3]), (6, [6, 7, 11, 8]), (4, [1, 12, 2]), (5, [8, 10, 11]), (2, [12, 12]),
+    (7, [8, 9, 10]), *((9, side) for side in SIDES[2:]),
+]  # fmt: skip
+
+
+def grid(cells=CELLS):
+    rows = np.concatenate([[len(corners), *corners] for _, corners in cells])
+    made = pv.UnstructuredGrid(rows, np.array([kind for kind, _ in cells]), POINTS)
+    made.cell_data["number"] = np.arange(len(cells))
+    made.cell_data["wide"] = np.arange(3.0 * len(cells)).reshape(-1, 3)
+    made.point_data["place"] = np.arange(len(POINTS)) * 0.5
+    made.field_data["times"] = [1.0, 2.0]
+    for attributes in (made.GetPointData(), made.GetCellData()):
+        attributes.SetActiveAttribute(-1, 0)
+    return made
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
+@pytest.mark.parametrize("n", [len(CELLS), 1])
+@pytest.mark.parametrize("texts", [False, True])
+def test_a_grid_is_written_as_it_was_read(tmp_path, suffix, n, texts):
+    given = grid(CELLS[:n] if n > 1 else [*CELLS[:1], *CELLS[3:5]])
+    if texts:  # so that it is read by VTK
+        given.cell_data["names"] = [f"cell {k}" for k in range(given.n_cells)]
+    given.save(tmp_path / f"a{suffix}")
+    surface = Surface.read(tmp_path / f"a{suffix}")
+    surface.write(tmp_path / f"b{suffix}", surface.mesh.vertices)
+    expected, found = (pv.read(tmp_path / f"{name}{suffix}") for name in "ab")
+    assert isinstance(found, pv.UnstructuredGrid)
+    if texts:
+        assert list(found.cell_data["names"]) == list(expected.cell_data["names"])
+        for each in (expected, found):
+            del each.cell_data["names"]
+    assert contents(found) == contents(expected)
+
+
+def test_the_cells_of_a_grid_are_those_of_the_mesh(tmp_path):
+    grid().save(tmp_path / "a.vtu")
+    mesh = Surface.read(tmp_path / "a.vtu").mesh
+    assert mesh.is_closed
+    assert mesh.n_vertices == 12
+
+
+def test_other_formats_know_nothing_of_the_grid(tmp_path, caplog):
+    grid().save(tmp_path / "a.vtu")
+    surface = read_polydata(tmp_path / "a.vtu")
+    for suffix in (".vtp", ".obj", ".vtkhdf"):
+        write_mesh(tmp_path / f"b{suffix}", surface)
+        assert "grid" not in caplog.text
+        assert list(read_polydata(tmp_path / f"b{suffix}").field_data) in (["times"], [])
+    assert len(surface.field_data) == 2
+
+
+def test_the_types_of_other_cells_are_not_used(tmp_path):
+    grid().save(tmp_path / "a.vtu")
+    surface = read_polydata(tmp_path / "a.vtu")
+    other = surface.copy()
+    other.verts = np.empty(0, dtype=int)
+    other.cell_data.clear()
+    write_mesh(tmp_path / "b.vtu", other)
+    assert_array_equal(pv.read(tmp_path / "b.vtu").celltypes[:2], [3, 4])
+    types = np.asarray(surface.field_data["types of the cells of a grid"])
+    types[types == 9] = 5  # not of four corners
+    write_mesh(tmp_path / "c.vtu", surface)
+    assert sorted(pv.read(tmp_path / "c.vtu").celltypes) == [1, 2, 3, 4, *[5] * 4, 6, *[9] * 7]

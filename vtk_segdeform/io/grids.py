@@ -1,0 +1,162 @@
+"""Unstructured grids of surface cells as PolyData, and back.
+
+A PolyData has its vertices first, then lines, polygons and strips.  A grid has its cells in any
+order, and several types for the same corners: a quad may be a polygon, too.  So the field array
+`CELL_TYPES` has the types of a grid in its own order, from which `grid_of` restores it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonCore import vtkIdList
+
+from ..arrays import IntArray
+from ..errors import MeshError
+from ..mesh import ragged_arange
+from .array_names import CELL_TYPES
+from .polygons import polydata_of
+
+# VTK's types of the cells of a grid, by where PolyData has them.
+_KINDS = {"verts": (1, 2), "lines": (3, 4), "faces": (5, 7, 9), "strips": (6,)}
+_SIZES = {1: 1, 3: 2, 5: 3, 9: 4}  # numbers of corners of types for which there is one
+
+
+def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.PolyData:
+    """Return the surface cells of a *grid* as a PolyData; empty if there are no polygons.
+
+    Types and order are stored if those of a grid made from the result would differ, or if the
+    format of the file has both and this is *only_as_grid* to be restored.
+    """
+    types = grid.celltypes
+    if not set(types.tolist()) <= {each for kind in _KINDS.values() for each in kind}:
+        raise MeshError(
+            "contains cells other than triangles and polygons; extract its surface first"
+        )
+    if not np.isin(types, (*_KINDS["faces"], *_KINDS["strips"])).any():
+        return pv.PolyData()
+    starts, corners = _cells(grid)
+    order, points = _order(types), np.asarray(grid.points, dtype=float)
+    if np.isin(types, _KINDS["faces"]).all():
+        surface = polydata_of(points, np.diff(starts), corners)
+    else:
+        surface = pv.PolyData()
+        surface.points = points
+        for name, kinds in _KINDS.items():
+            rows = np.flatnonzero(np.isin(types, kinds))
+            parts = [corners[starts[k] : starts[k + 1]] for k in rows]
+            if parts:
+                setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
+    _copy_arrays(grid, surface, order)
+    is_usual = (types == _usual(types, np.diff(starts))).all() and (np.diff(order) == 1).all()
+    if only_as_grid or not is_usual:
+        surface.field_data[CELL_TYPES] = types
+    return surface
+
+
+def grid_of(surface: Any) -> pv.UnstructuredGrid:
+    """Return the cells of a PolyData as a grid, with the types and the order that are stored."""
+    given = pv.wrap(surface)
+    grid = given.cast_to_unstructured_grid()
+    grid.GetFieldData().RemoveArray(CELL_TYPES)
+    types = _stored(given)
+    if types is None:
+        return grid
+    starts, corners = _cells(grid)
+    order = _order(types)
+    place = np.argsort(order)  # of each cell of the grid in the PolyData
+    sizes = np.diff(starts)[place]
+    result = pv.UnstructuredGrid()
+    result.points = grid.points
+    ends = np.append(0, np.cumsum(sizes))
+    cell, corner = ragged_arange(sizes)
+    moved = corners[starts[place[cell]] + corner]
+    result.SetCells(numpy_to_vtk(types, deep=True), pv.CellArray.from_arrays(ends, moved))
+    result.GetPointData().ShallowCopy(grid.GetPointData())
+    result.GetFieldData().ShallowCopy(grid.GetFieldData())
+    cells = result.GetCellData()
+    if (place == np.arange(len(place))).all():
+        cells.ShallowCopy(grid.GetCellData())
+    else:
+        cells.CopyAllOn()
+        cells.CopyAllocate(grid.GetCellData(), len(place))
+        cells.CopyData(grid.GetCellData(), _ids(place), _ids(np.arange(len(place))))
+    return result
+
+
+def is_grid(surface: pv.PolyData) -> bool:
+    """Tell whether a PolyData has the types of the grid that it was."""
+    return _stored(surface) is not None
+
+
+def _stored(surface: pv.PolyData) -> Any:
+    """Return the types of a grid, (m,) uint8, if they are stored and fit the cells."""
+    types = surface.field_data.get(CELL_TYPES)
+    if types is None or types.dtype != np.uint8 or types.shape != (surface.n_cells,):
+        return None
+    types = np.asarray(types)
+    grid = surface.cast_to_unstructured_grid()
+    wanted, sizes = types[_order(types)], np.diff(_cells(grid)[0])
+    fits = _kind(wanted) == _kind(grid.celltypes)
+    for kind, size in _SIZES.items():
+        fits &= (wanted != kind) | (sizes == size)
+    return types if fits.all() else None
+
+
+def _cells(grid: pv.UnstructuredGrid) -> tuple[IntArray, IntArray]:
+    """Return where each cell begins in the list of corners, and this list."""
+    cells = grid.GetCells()
+    starts, corners = cells.GetOffsetsArray(), cells.GetConnectivityArray()
+    return pv.convert_array(starts), pv.convert_array(corners)
+
+
+def _order(types: Any) -> IntArray:
+    """Return the cells of a grid in the order of a PolyData, (m,) int."""
+    return np.argsort(_kind(types), kind="stable")
+
+
+def _kind(types: Any) -> IntArray:
+    """Return where a PolyData has cells of these *types*, 0 to 3, or 4 if nowhere."""
+    kind = np.full(len(types), len(_KINDS))
+    for number, each in enumerate(_KINDS.values()):
+        kind[np.isin(types, each)] = number
+    return kind
+
+
+def _usual(types: Any, sizes: IntArray) -> IntArray:
+    """Return the types that VTK gives to cells of a PolyData, (m,) int."""
+    usual = np.array([2, 4, 7, 6])[_kind(types)]
+    for kind, size in _SIZES.items():
+        usual[(_kind(types) == _kind([kind])) & (sizes == size)] = kind
+    return usual
+
+
+def _copy_arrays(grid: pv.UnstructuredGrid, surface: pv.PolyData, order: IntArray) -> None:
+    """Give a surface the arrays of a grid whose cells have another order."""
+    cells = surface.cell_data
+    for mine, theirs in (
+        (surface.point_data, grid.point_data),
+        (cells, grid.cell_data),
+        (surface.field_data, grid.field_data),
+    ):
+        for name, values in theirs.items():
+            mine[name] = values[order] if mine is cells else values
+    for mine, theirs in ((surface.GetPointData(), grid.GetPointData()),
+                         (surface.GetCellData(), grid.GetCellData())):  # fmt: skip
+        for kind in range(theirs.NUM_ATTRIBUTES):
+            active = theirs.GetAbstractAttribute(kind)
+            if active is None:
+                mine.SetActiveAttribute(-1, kind)
+            else:
+                mine.SetActiveAttribute(active.GetName(), kind)
+
+
+def _ids(numbers: IntArray) -> vtkIdList:
+    ids = vtkIdList()
+    ids.SetNumberOfIds(len(numbers))
+    for k, number in enumerate(numbers.tolist()):
+        ids.SetId(k, number)
+    return ids
