@@ -276,3 +276,37 @@ def test_lists_of_any_lengths_between_numbers(monkeypatch, kind, length, compile
         wrong = packed(*rows[-1], (2, -3))
         with pytest.raises(MeshError, match="a list of 'face' has the length -3"):
             tables_of(header + b"".join([*first, wrong, b"1 " * 3000]))
+
+
+def test_lines_of_the_header_are_kept_and_lists_that_are_not_read_are_named(tmp_path, caplog):
+    text = """ply
+format ascii 1.0
+comment made by hand
+obj_info num_cols 2
+obj_info num_rows  2
+element vertex 4
+property float x
+property float y
+property float z
+property list uchar int near
+element face 4
+property list uchar int vertex_indices
+property list uchar float weights
+end_header
+0 0 0 2 1 2
+1 0 0 0
+0 1 0 0
+0 0 1 1 1
+3 0 2 1 1 .5
+3 0 1 3 0
+3 1 2 3 0
+3 2 0 3 0
+"""
+    (tmp_path / "a.ply").write_text(text)
+    surface = read_polydata(tmp_path / "a.ply")
+    assert "vertex property 'near', face property 'weights'" in caplog.text
+    caplog.clear()
+    write_mesh(tmp_path / "b.ply", surface)
+    lines = (tmp_path / "b.ply").read_bytes().split(b"\n")[2:5]
+    assert lines == [b"comment made by hand", b"obj_info num_cols 2", b"obj_info num_rows 2"]
+    assert caplog.text == ""

@@ -41,7 +41,8 @@ _WIDTHS = {"RGB": 3, "RGBA": 4}
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
-_COMMENTS, _PLAIN = "Comments", re.compile(r"[!-~]+")
+_LINES = {"comment": "Comments", "obj_info": "ObjectInfo"}  # field arrays of lines of the header
+_PLAIN = re.compile(r"[!-~]+")
 _COMMON = 255  # corners of a face; VTK and MeshLab store the number in a byte
 _NO_NUMBERS = np.empty(0, dtype=np.int64)
 _OF_POINTS = frozenset({*"xyz", *_NORMAL, *_COLOUR, *(name for pair in _TEXTURE for name in pair)})
@@ -84,8 +85,17 @@ def read_ply(path: Path) -> pv.PolyData:
         for name, values in tables[element].items():
             if isinstance(values, np.ndarray) and len(values):
                 surface.field_data[f"{element}.{name}"] = values
-    if comments := comments_of(data):
-        set_names(surface, _COMMENTS, comments)
+    for word, name in _LINES.items():
+        if lines := comments_of(data, word):
+            set_names(surface, name, lines)
+    lost = [
+        f"{element} property {name!r}"
+        for element, table in (("vertex", vertex), ("face", face), *tables.items())
+        for name, values in table.items()
+        if isinstance(values, Lists) and element != "tristrips"
+    ]
+    if lost:
+        _log.warning("lists of numbers are not read: %s", ", ".join(dict.fromkeys(lost)))
     return surface
 
 
@@ -159,16 +169,19 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     kept["cell"] += written_cells
     kept["cell"] += [_CORNER_TEXTURE] if seams is not None else []
     elements = _other_elements(surface, kept["field"])
-    comments = [" ".join(line.split()) for line in get_names(surface, _COMMENTS)]
-    kept["field"] += [_COMMENTS] if comments else []
+    lines = [
+        f"{word} {' '.join(line.split())}"
+        for word, name in _LINES.items()
+        for line in get_names(surface, name)
+    ]
+    kept["field"] += _LINES.values()
     warn_left_out("PLY", surface, kept)
     if counts.max(initial=0) > _COMMON:
         _log.warning("PLY faces of over %d corners cannot be read by some programs", _COMMON)
     lists = [("vertex_indices", counts, corners.astype("<i4"))]
     if seams is not None:  # MeshLab reads single precision only
         lists.append(("texcoord", 2 * counts, seams.astype("<f4").ravel()))
-    header = ["ply", "format binary_little_endian 1.0"]
-    header += [f"comment {line}" for line in comments]
+    header = ["ply", "format binary_little_endian 1.0", *lines]
     header += [f"element vertex {len(points)}"]
     header += [f"property {_WORDS[c.dtype.str[1:]]} {name}" for name, c in vertex.items()]
     header += [f"element face {len(counts)}"]

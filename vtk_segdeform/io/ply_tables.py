@@ -85,12 +85,13 @@ def tables_of(data: bytes) -> dict[str, Table]:
     return tables
 
 
-def comments_of(data: bytes) -> list[str]:
-    """Return the comments in the header of a PLY file."""
+def comments_of(data: bytes, word: str = "comment") -> list[str]:
+    """Return the lines in the header of a PLY file that begin with *word*, without it."""
     end = _END.search(data)
     lines = _LINE.split(data[: end.start()]) if end else []
     found = [decoded(line).strip() for line in lines]
-    return [each[7:].strip() for each in found if each.startswith(("comment ", "comment\t"))]
+    own = (each for each in found if each.startswith((f"{word} ", f"{word}\t")))
+    return [each.removeprefix(word).strip() for each in own]
 
 
 def _header(data: bytes) -> tuple[str, list[_Element], int]:
