@@ -13,7 +13,7 @@ from vtkmodules.vtkCommonDataModel import vtkDataSetAttributes
 from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import read_polydata
+from vtk_segdeform.io import read_polydata, write_mesh
 from vtk_segdeform.io.vtk_legacy import read_plain_legacy
 
 _OLD, _NEW = 42, 51
@@ -195,3 +195,18 @@ def test_text_arrays_are_read_by_vtk(tmp_path):
     path = tmp_path / "a.vtk"
     assert read_plain_legacy(written(path, surface, binary=True, version=_NEW)) is None
     assert read_polydata(path).field_data["names"].tolist() == ["one", "two"]
+
+
+@pytest.mark.parametrize("as_grid", [False, True])
+@pytest.mark.parametrize("binary", [False, True])
+def test_the_title_is_kept(tmp_path, as_grid, binary):
+    surface = rich().cast_to_unstructured_grid() if as_grid else rich()
+    data = written(tmp_path / "a.vtk", surface, binary=binary, version=_NEW)
+    assert data.count(b"vtk output") == 1
+    for title in ("Körper 7, scanned", "vtk output"):
+        (tmp_path / "a.vtk").write_bytes(data.replace(b"vtk output", title.encode(), 1))
+        read = read_polydata(tmp_path / "a.vtk")
+        assert ("Header" in read.field_data) == (title != "vtk output")
+        write_mesh(tmp_path / "b.vtk", read)
+        assert (tmp_path / "b.vtk").read_bytes().split(b"\n")[1] == title.encode()
+        assert list(pv.read(tmp_path / "b.vtk").field_data) == ["times"]

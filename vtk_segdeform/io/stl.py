@@ -22,13 +22,12 @@ import pyvista as pv
 
 from ..errors import MeshError
 from ..kernels import compiled_checks, inputs
-from .array_names import decoded, get_names, set_names, warn_left_out
+from .array_names import HEADER, decoded, get_names, set_names, warn_left_out
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _SHORTEST = len("vertex 0 0 0")
 _START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-_HEADER = "Header"
 _NAME = re.compile(rb"solid[ \t]*([^\r\n]*)", re.I)
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
@@ -57,7 +56,7 @@ def read_stl(path: Path) -> pv.PolyData:
     if attributes.any():
         surface.cell_data["Attribute"] = attributes
     if title := decoded(header).strip():
-        set_names(surface, _HEADER, [title])
+        set_names(surface, HEADER, [title])
     return surface
 
 
@@ -77,10 +76,10 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     if attributes is not None and attributes.dtype == np.uint16 and attributes.ndim == 1:
         rows["more"] = np.asarray(attributes)[cells_of(surface)][polygon]
         kept["cell"].append("Attribute")
-    header = " ".join(get_names(surface, _HEADER)).encode("utf-8")[:80]
+    header = " ".join(get_names(surface, HEADER)).encode("utf-8")[:80]
     if header.lower().startswith(b"solid"):  # which would be text
         header = b"_" + header[:79]
-    kept["field"] += [_HEADER] if header else []
+    kept["field"] += [HEADER] if header else []
     warn_left_out("STL", surface, kept)
     with path.open("wb") as file:
         file.write(header.ljust(80, b"\0") + len(rows).to_bytes(4, "little"))

@@ -31,7 +31,15 @@ from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from ..errors import MeshError
-from .array_names import CELL_TYPES, plain_names, warn_renamed
+from .array_names import (
+    CELL_TYPES,
+    HEADER,
+    decoded,
+    get_names,
+    plain_names,
+    set_names,
+    warn_renamed,
+)
 from .grids import grid_of, is_grid, surface_of_grid
 from .isolated import read_isolated
 from .vtk_legacy import read_plain_legacy
@@ -49,6 +57,7 @@ _NORM_RANGE = re.compile(  # of bounded length, so that no file takes quadratic 
     re.DOTALL,
 )
 _BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
+_TITLE, _NO_TITLE = re.compile(rb"[^\n]*\n([^\r\n]{1,255})\r?\n"), "vtk output"
 _BEGINS = {
     ".vtk": re.compile(rb"# vtk DataFile"),
     ".vtp": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
@@ -57,6 +66,7 @@ _BEGINS = {
 }
 _WRITERS = {".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
 _REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"', ".vtkhdf": "/."}
+_LONGEST_TITLE = 200
 _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
 
 
@@ -73,7 +83,7 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         data = path.read_bytes()
         plain = _PLAIN[suffix](data)
         if plain is not None:
-            return _surface(plain, suffix)
+            return _with_title(_surface(plain, suffix), path)
         if suffix in _XML:
             _require_plausible_counts(data)
     try:
@@ -91,6 +101,17 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     if suffix == ".vtkhdf":  # it does not store which arrays are active
         _activate_normals(surface)
+    return _with_title(surface, path)
+
+
+def _with_title(surface: pv.PolyData, path: Path) -> pv.PolyData:
+    """Give *surface* the title of a legacy file as the field array `HEADER`, unless it is VTK's."""
+    if path.suffix.lower() == ".vtk":
+        with path.open("rb") as file:
+            found = _TITLE.match(file.read(1000))
+        title = decoded(found[1]).strip() if found else ""
+        if title.isprintable() and title not in ("", _NO_TITLE):
+            set_names(surface, HEADER, [title])
     return surface
 
 
@@ -217,7 +238,12 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
     without an error.  So the former writes to memory, and the output of the latter is read back.
     """
     suffix = path.suffix.lower()
-    plain = _with_plain_names(surface, suffix)
+    plain, title = _with_plain_names(surface, suffix), ""
+    if suffix == ".vtk":
+        title = " ".join(get_names(surface, HEADER))[:_LONGEST_TITLE]
+        title = title if title.isprintable() else ""
+        if title:
+            plain.GetFieldData().RemoveArray(HEADER)
     if suffix in _XML:
         writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
         writer.SetInputData(_without_types(plain) if suffix == ".vtp" else grid_of(plain))
@@ -232,6 +258,8 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
             writer = vtkUnstructuredGridWriter() if is_legacy_grid else _WRITERS[suffix]()
             writer.SetInputData(grid_of(plain) if is_legacy_grid else _without_types(plain))
             again = surface
+            if title:
+                writer.SetHeader(title)
             if suffix != ".vtkhdf":
                 writer.SetFileName(str(path))
                 writer.SetFileTypeToBinary()
