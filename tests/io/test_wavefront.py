@@ -48,6 +48,7 @@ def names_of(surface, key):
 def test_names_that_are_not_ascii_are_read_and_written(tmp_path, encoding, newline):
     text = BLENDER.replace("身体", "Füße") if encoding == "latin-1" else BLENDER
     (tmp_path / "a.obj").write_bytes(text.replace("\n", newline).encode(encoding))
+    (tmp_path / "Körper.mtl").touch()
     for path in ("a.obj", "b.obj"):
         surface = read_polydata(tmp_path / path)
         body = "Füße" if encoding == "latin-1" else "身体"
@@ -77,6 +78,19 @@ def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
     assert lines[at : at + 4] == ["o Körper", "g links oben", "usemtl Haut #1", "s 1"]
     assert lines.count("s off") == 1
     assert lines[0] == "mtllib Körper.mtl"
+
+
+def test_a_material_library_that_is_not_beside_the_file_is_told(tmp_path, caplog):
+    for folder in ("here", "there"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "here" / "a.obj").write_text(BLENDER, encoding="utf-8")
+    (tmp_path / "here" / "Körper.mtl").write_text("newmtl Haut")
+    surface = read_polydata(tmp_path / "here" / "a.obj")
+    write_mesh(tmp_path / "here" / "b.obj", surface)
+    assert caplog.text == ""
+    write_mesh(tmp_path / "there" / "b.obj", surface)
+    assert "copy Körper.mtl there, too: the OBJ file refers to it" in caplog.text
+    assert not (tmp_path / "there" / "Körper.mtl").exists()
 
 
 @pytest.mark.parametrize(

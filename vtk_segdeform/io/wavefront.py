@@ -20,6 +20,8 @@ texture coordinates.
 
 from __future__ import annotations
 
+import logging
+import os
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -42,6 +44,7 @@ from .moving import CORNER_NORMALS
 from .number_lines import Lines
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
+_log = logging.getLogger(__name__)
 _CORNER_TEXTURE = "TextureCorners"
 _OF_CORNERS = {
     "texture coordinate": ("TextureCoordinates", _CORNER_TEXTURE),
@@ -264,6 +267,8 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     libraries = plain_names(get_names(surface, _LIBRARY))
     warn_renamed("material library", libraries)
     kept["field"] += [_LIBRARY] if libraries else []
+    if missing := [name for name in libraries.values() if not os.path.exists(path.parent / name)]:
+        _log.warning("copy %s there, too: the OBJ file refers to it", ", ".join(missing))
     table = np.asarray(surface.points, dtype=float)
     colour = surface.point_data.get("RGB")
     if colour is not None and colour.dtype == np.uint8 and colour.shape == table.shape:
