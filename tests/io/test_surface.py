@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import icosphere, torus
+from solids import icosphere, rotation, torus
 
 import vtk_segdeform as sd
 from vtk_segdeform.errors import ConstraintError, MeshError
@@ -149,3 +149,33 @@ def test_a_handle_of_points_in_no_face_is_an_error():
     vertices, targets = surface.targets_at([0, n], [[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]])
     assert len(vertices) == 1
     assert_array_equal(targets, [[0.0, 0.0, 1.0]])
+
+
+def parametric(kind, radius):
+    """Return a torus, or for 0 a sphere, of quads whose seams and poles are computed."""
+    u, v = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25), np.linspace(0.0, np.pi, 13))
+    u, v = u.astype(kind), v.astype(kind) * kind(2.0 if radius else 1.0)
+    across = kind(radius) + np.sin(v)
+    x, y, z = across * np.cos(u), across * np.sin(u), np.cos(v)
+    turn = rotation([1.0, 2.0, 0.5], 0.7)
+    points = (np.stack([x, y, z], axis=-1).reshape(-1, 3) @ turn.T).astype(kind)
+    k, n = np.arange(12)[:, None] * 25 + np.arange(24), 25
+    quads = np.stack([k, k + n, k + n + 1, k + 1], axis=-1).reshape(-1, 4)
+    return polydata_of(points, np.full(len(quads), 4), quads.ravel())
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+@pytest.mark.parametrize("radius", [3.0, 0.0])
+@pytest.mark.parametrize("suffix", [".vtp", ".ply", ".obj"])
+def test_computed_seams_and_poles_are_closed_also_after_writing(tmp_path, kind, radius, suffix):
+    surface = sd.Surface(parametric(kind, radius))
+    mesh = surface.mesh
+    assert mesh.is_closed
+    assert mesh.n_vertices == (24 * 12 if radius else 24 * 11 + 2)
+    assert_array_equal(surface.moved(mesh.vertices).points, surface.given.points)
+    bent = mesh.vertices + 0.1 * np.sin(mesh.vertices[:, [1, 2, 0]])
+    surface.write(tmp_path / f"a{suffix}", bent)
+    again = sd.Surface.read(tmp_path / f"a{suffix}")
+    assert again.mesh.is_closed
+    assert again.mesh.n_vertices == mesh.n_vertices
+    assert_array_equal(np.unique(again.mesh.vertices, axis=0), np.unique(bent, axis=0))

@@ -110,21 +110,23 @@ class Soup:
     @cached_property
     def loose(self) -> IntArray:
         """(k,) int: the given points that are not at a vertex of the mesh, and only follow one."""
-        some = self._apart
+        some = np.flatnonzero((self.points != self.mesh.vertices[self.vertex_of]).any(axis=1))
         with np.errstate(over="ignore", invalid="ignore"):
             away = np.abs(self.points[some] - self.mesh.vertices[self.vertex_of[some]])
         return some[~(away <= rounding(self.mesh.vertices)).all(axis=1)]
 
-    @cached_property
-    def _apart(self) -> IntArray:
-        return np.flatnonzero((self.points != self.mesh.vertices[self.vertex_of]).any(axis=1))
-
     def moved(self, vertices: FloatArray) -> FloatArray:
-        """Return the given points (p, 3) for the mesh at *vertices* (n, 3)."""
+        """Return the given points (p, 3) for the mesh at *vertices* (n, 3).
+
+        Welded points coincide there, so that they do after writing and reading as well; at the rest
+        positions the given points are returned, bit for bit.
+        """
+        if np.array_equal(vertices, self.mesh.vertices):
+            return self.points.copy()
         points: FloatArray = vertices[self.vertex_of]
-        followed = self.vertex_of[self._apart]
+        followed = self.vertex_of[self.loose]
         step = vertices[followed] - self.mesh.vertices[followed]
-        points[self._apart] = self.points[self._apart] + step
+        points[self.loose] = self.points[self.loose] + step
         return points
 
 

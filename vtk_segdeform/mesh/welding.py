@@ -18,7 +18,7 @@ from .grouping import connected, first_equal_row, first_members
 from .topology import HalfEdges
 
 _ROUNDINGS = 4.0  # of the largest coordinate, in the precision of all: the same position
-_NEARLY = 1e-3  # of the shortest border at both points
+_NEARLY = 1e-2  # of the shortest edge at both points
 _NEAREST = 3  # other points of borders that are looked at
 
 
@@ -55,6 +55,7 @@ def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, Half
     """
     target, half_edges, first_at = np.arange(len(points)), found.half_edges, found.first_at
     kept, near = ~(found.degenerate | found.duplicate), np.empty((0, 2), dtype=np.int64)
+    same = rounding(points)
     while len(half_edges.boundary):  # a face that is dropped may leave a border
         weld = _coinciding_sheets(half_edges, first_at)
         weld[half_edges.tail[half_edges.boundary]] = True
@@ -65,9 +66,9 @@ def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, Half
         first = first_there[place]
         number = np.arange(len(points))
         if (first == some).all():
-            near = _near_on_borders(points, half_edges)
+            near = _near_on_borders(points, half_edges, same)
             apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
-            is_same = apart <= rounding(points)
+            is_same = apart <= same
             if not is_same.any():
                 break
             one, two = near[is_same].T
@@ -89,26 +90,33 @@ def rounding(points: FloatArray) -> float:
     return _ROUNDINGS * float(precision) * float(np.abs(points).max(initial=0.0))
 
 
-def _near_on_borders(points: FloatArray, half_edges: HalfEdges) -> IntArray:
-    """Return pairs (k, 2) of vertices of borders that nearly meet, and are not ends of an edge."""
-    ends = np.stack([half_edges.tail[half_edges.boundary], half_edges.head_of(half_edges.boundary)])
-    border, ends = np.unique(ends, return_inverse=True)
-    places, ends = points[border], ends.reshape(2, -1)
-    shortest = np.full(len(border), np.inf)
-    for each in ends:
-        np.minimum.at(shortest, each, np.linalg.norm(places[ends[0]] - places[ends[1]], axis=1))
-    found = cKDTree(places).query(places, min(_NEAREST + 1, len(places)))
+def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> IntArray:
+    """Return pairs (k, 2) of vertices of borders that nearly meet, for the edges at both.
+
+    Edges of up to *same* do not count, as at a pole, where the same point is given many times; only
+    if they are shorter the pair may be the ends of one.
+    """
+    ends = np.append(half_edges.tail[half_edges.boundary], half_edges.head_of(half_edges.boundary))
+    is_border = np.zeros(len(points), dtype=bool)
+    is_border[ends] = True
+    border = np.flatnonzero(is_border)
+    faces = half_edges.faces[is_border[half_edges.faces].any(axis=1)]
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    length = np.linalg.norm(points[tail] - points[head], axis=1)
+    shortest = np.full(len(points), np.inf)
+    for end in (tail, head):
+        np.minimum.at(shortest, end, np.where(length > same, length, np.inf))
+    shortest[np.isinf(shortest)] = 0.0
+    found = cKDTree(points[border]).query(points[border], min(_NEAREST + 1, len(border)))
     away, other = (np.ravel(each) for each in found)
-    one = np.repeat(np.arange(len(places)), len(other) // len(places))
+    one = np.repeat(border, len(other) // len(border))
+    other = border[other]
     is_near = (one != other) & (away <= _NEARLY * np.minimum(shortest[one], shortest[other]))
-    pairs: IntArray = border[np.stack([one, other], axis=1)[is_near]]
-    if not len(pairs):
-        return pairs
-    n = half_edges.n_vertices
-    keys = np.sort(pairs, axis=1) @ [n, 1]
-    edges = np.sort(half_edges.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1) @ [n, 1]
-    apart: IntArray = pairs[~np.isin(keys, edges)]
-    return apart
+    pairs = np.stack([one, other], axis=1)[is_near]
+    keys, n = np.sort(pairs, axis=1) @ [len(points), 1], len(points)
+    is_edge = np.isin(keys, np.minimum(tail, head) * n + np.maximum(tail, head))
+    kept: IntArray = pairs[~is_edge | (away[is_near] <= same)]
+    return kept
 
 
 def _coinciding_sheets(half_edges: HalfEdges, first_at: IntArray) -> BoolArray:
