@@ -32,7 +32,11 @@ def pulled(refine=None, **named):
     return pull(SCENE.mesh, tip, to, refine=refine, **options)
 
 
-@pytest.mark.parametrize("make", [bent, pulled])
+def pulled_apart(refine=None, **named):
+    return pulled(refine, avoid_contact=True, **named)
+
+
+@pytest.mark.parametrize("make", [bent, pulled_apart])
 def test_small_meshes_are_finished_and_large_ones_on_request(make, monkeypatch):
     plain, finished = make(False), make()
     assert distortion(SCENE.mesh, finished.vertices) < distortion(SCENE.mesh, plain.vertices)
@@ -41,6 +45,11 @@ def test_small_meshes_are_finished_and_large_ones_on_request(make, monkeypatch):
     monkeypatch.setattr(sizes, "FINISHED", SCENE.mesh.n_vertices - 1)
     assert_array_equal(make().vertices, plain.vertices)
     assert_array_equal(make(True).vertices, finished.vertices)
+
+
+def test_a_pull_is_finished_on_request():
+    assert_array_equal(pulled().vertices, pulled(False).vertices)
+    assert distortion(SCENE.mesh, pulled(True).vertices) < distortion(SCENE.mesh, pulled().vertices)
 
 
 @pytest.mark.parametrize("make", [bent, pulled])

@@ -365,7 +365,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     _contact_and_lids(parser)
-    _refine(parser)
+    _refine(parser, "with --avoid-contact")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
@@ -392,7 +392,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
-    _refine(parser)
+    _refine(parser, f"up to {sizes.FINISHED:,} vertices")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
@@ -403,11 +403,8 @@ def _contact_and_lids(parser: argparse.ArgumentParser) -> None:
     add("--lids", choices=("auto", "on", "off"), default="auto", help=text)
 
 
-def _refine(parser: argparse.ArgumentParser) -> None:
-    text = (
-        "finish the pose on the mesh itself: less distorted, handles exact (default: up to "
-        f"{sizes.FINISHED:,} vertices)"
-    )
+def _refine(parser: argparse.ArgumentParser, default: str) -> None:
+    text = f"finish the pose on the mesh itself: less distorted, handles exact (default: {default})"
     action = argparse.BooleanOptionalAction
     parser.add_argument("--refine", action=action, default=None, help=text)
 

@@ -70,6 +70,8 @@ def pull(
         Keep parts of the surface from crossing each other; see `Deformer`.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
+        None does so only with *avoid_contact*: triangles are less distorted then, but a smooth
+        bend may get a step where the finish ends.
     progress : Progress, optional
         Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
         before every step.  It cancels by raising `Cancelled`.
@@ -98,6 +100,7 @@ def pull(
     as_lids(lids)
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
+    refine = False if refine is None and not avoid_contact else refine
     vertex = checked_vertex(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [vertex], "pins")
     target = checked_point(to)[None]

@@ -74,7 +74,7 @@ class Controller:
     settling : Settling
         A pose that converges after its release; saving waits for it.
     finishing : Finishing
-        Finishes the pose on the mesh after each drag.
+        Finishes the pose on the mesh after each drag of a handle.
     """
 
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
@@ -293,7 +293,8 @@ class Controller:
         if widget.remark:
             self.messages.note(widget.remark)
         load_early()
-        if widget in (self.widgets.dragger, self.widgets.puller):
+        is_pull = widget is self.widgets.puller  # smooth, while a finish may end in a step
+        if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
 

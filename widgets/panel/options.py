@@ -182,7 +182,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "deform.finishes",
                     "toggle",
                     "Finish on the mesh",
-                    "After each drag, reduce the distortion of the mesh itself",
+                    "After each drag of a handle, reduce the distortion of the mesh itself",
                     value=editor.controller.finishing.is_wanted,
                     act=finishing_after_drags,
                 ),
