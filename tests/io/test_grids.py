@@ -7,6 +7,7 @@ import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
 from test_vtk_xml import contents
+from vtkmodules.vtkCommonCore import vtkFloatArray, vtkIdTypeArray, vtkStringArray
 
 from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.surface import Surface
@@ -30,6 +31,17 @@ def grid(cells=CELLS):
     made.cell_data["wide"] = np.arange(3.0 * len(cells)).reshape(-1, 3)
     made.point_data["place"] = np.arange(len(POINTS)) * 0.5
     made.field_data["times"] = [1.0, 2.0]
+    for attributes in (made.GetPointData(), made.GetCellData()):  # in no alphabetical order
+        n = attributes.GetArray(0).GetNumberOfTuples()
+        ids, named = vtkIdTypeArray(), vtkFloatArray()
+        for array, name, width in ((ids, "ids", 1), (named, "a named one", 2)):
+            array.SetName(name)
+            array.SetNumberOfComponents(width)
+            array.SetNumberOfTuples(n)
+            for k in range(n * width):
+                array.SetValue(k, 3 * k)
+            attributes.AddArray(array)
+        named.SetComponentName(1, "second")
     for attributes in (made.GetPointData(), made.GetCellData()):
         attributes.SetActiveAttribute(-1, 0)
     return made
@@ -41,16 +53,23 @@ def grid(cells=CELLS):
 def test_a_grid_is_written_as_it_was_read(tmp_path, suffix, n, texts):
     given = grid(CELLS[:n] if n > 1 else [*CELLS[:1], *CELLS[3:5]])
     if texts:  # so that it is read by VTK
-        given.cell_data["names"] = [f"cell {k}" for k in range(given.n_cells)]
+        names = vtkStringArray()
+        names.SetName("names")
+        for k in range(given.n_cells):
+            names.InsertNextValue(f"Körper {k}")
+        given.GetCellData().AddArray(names)
     given.save(tmp_path / f"a{suffix}")
     surface = Surface.read(tmp_path / f"a{suffix}")
     surface.write(tmp_path / f"b{suffix}", surface.mesh.vertices)
     expected, found = (pv.read(tmp_path / f"{name}{suffix}") for name in "ab")
     assert isinstance(found, pv.UnstructuredGrid)
     if texts:
-        assert list(found.cell_data["names"]) == list(expected.cell_data["names"])
         for each in (expected, found):
-            del each.cell_data["names"]
+            names = each.GetCellData().GetAbstractArray("names")
+            each.GetCellData().RemoveArray("names")
+            assert [names.GetValue(k) for k in range(given.n_cells)] == [
+                f"Körper {k}" for k in range(given.n_cells)
+            ]
     assert contents(found) == contents(expected)
 
 

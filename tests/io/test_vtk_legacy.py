@@ -166,10 +166,25 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path, binary, version, is_plain)
         surface.field_data["names"] = ["one", "two"]
     sound = written(tmp_path / "a.vtk", surface, binary=binary, version=version)
     assert (read_plain_legacy(sound) is not None) == is_plain
-    for left in (0.3, 0.6, 0.9) if is_plain else (0.9,):
+    for left in (0.3, 0.6, 0.9) if is_plain else (0.55, 0.97):
         (tmp_path / "a.vtk").write_bytes(sound[: int(left * len(sound))])
         with pytest.raises(MeshError):
             read_polydata(tmp_path / "a.vtk")
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(b"", b""), (b"SCALARS a short 1", b"SCALARS a short 2"), (b"5 6 7", b"5 6")],
+)
+def test_a_text_that_vtk_reads_in_part_only_is_refused(tmp_path, before, after):
+    text = SOUND.replace(b"\n", b"\r\n")  # so that it is left to VTK
+    assert before in text
+    (tmp_path / "a.vtk").write_bytes(text.replace(before, after, 1))
+    if not before:
+        assert read_polydata(tmp_path / "a.vtk").n_cells == 4
+        return
+    with pytest.raises(MeshError, match="is not a readable"):
+        read_polydata(tmp_path / "a.vtk")
 
 
 @pytest.mark.parametrize("version", [_OLD, _NEW])

@@ -38,7 +38,7 @@ def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.Poly
         )
     if not np.isin(types, (*_KINDS["faces"], *_KINDS["strips"])).any():
         return pv.PolyData()
-    starts, corners = _cells(grid)
+    starts, corners = _rows(grid.GetCells())
     order, points = _order(types), np.asarray(grid.points, dtype=float)
     if np.isin(types, _KINDS["faces"]).all():
         surface = polydata_of(points, np.diff(starts), corners)
@@ -50,8 +50,11 @@ def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.Poly
             parts = [corners[starts[k] : starts[k + 1]] for k in rows]
             if parts:
                 setattr(surface, name, np.concatenate([[len(part), *part] for part in parts]))
-    _copy_arrays(grid, surface, order)
-    is_usual = (types == _usual(types, np.diff(starts))).all() and (np.diff(order) == 1).all()
+    surface.GetPointData().ShallowCopy(grid.GetPointData())
+    surface.GetFieldData().ShallowCopy(grid.GetFieldData())
+    _copy_rows(grid.GetCellData(), surface.GetCellData(), order)
+    usual = _usual(_kind(types), np.diff(starts))
+    is_usual = (types == usual).all() and (np.diff(order) == 1).all()
     if only_as_grid or not is_usual:
         surface.field_data[CELL_TYPES] = types
     return surface
@@ -60,30 +63,22 @@ def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.Poly
 def grid_of(surface: Any) -> pv.UnstructuredGrid:
     """Return the cells of a PolyData as a grid, with the types and the order that are stored."""
     given = pv.wrap(surface)
-    grid = given.cast_to_unstructured_grid()
-    grid.GetFieldData().RemoveArray(CELL_TYPES)
+    kinds, sizes, corners = _cells_of(given)
     types = _stored(given)
     if types is None:
-        return grid
-    starts, corners = _cells(grid)
-    order = _order(types)
-    place = np.argsort(order)  # of each cell of the grid in the PolyData
-    sizes = np.diff(starts)[place]
-    result = pv.UnstructuredGrid()
-    result.points = grid.points
-    ends = np.append(0, np.cumsum(sizes))
-    cell, corner = ragged_arange(sizes)
+        types = _usual(kinds, sizes).astype(np.uint8)
+    place = np.argsort(_order(types))  # of each cell of the grid in the PolyData
+    cell, corner = ragged_arange(sizes[place])
+    starts = np.cumsum(sizes) - sizes
     moved = corners[starts[place[cell]] + corner]
+    result = pv.UnstructuredGrid()
+    result.SetPoints(given.GetPoints())
+    ends = np.append(0, np.cumsum(sizes[place]))
     result.SetCells(numpy_to_vtk(types, deep=True), pv.CellArray.from_arrays(ends, moved))
-    result.GetPointData().ShallowCopy(grid.GetPointData())
-    result.GetFieldData().ShallowCopy(grid.GetFieldData())
-    cells = result.GetCellData()
-    if (place == np.arange(len(place))).all():
-        cells.ShallowCopy(grid.GetCellData())
-    else:
-        cells.CopyAllOn()
-        cells.CopyAllocate(grid.GetCellData(), len(place))
-        cells.CopyData(grid.GetCellData(), _ids(place), _ids(np.arange(len(place))))
+    result.GetPointData().ShallowCopy(given.GetPointData())
+    result.GetFieldData().ShallowCopy(given.GetFieldData())
+    result.GetFieldData().RemoveArray(CELL_TYPES)
+    _copy_rows(given.GetCellData(), result.GetCellData(), place)
     return result
 
 
@@ -98,19 +93,32 @@ def _stored(surface: pv.PolyData) -> Any:
     if types is None or types.dtype != np.uint8 or types.shape != (surface.n_cells,):
         return None
     types = np.asarray(types)
-    grid = surface.cast_to_unstructured_grid()
-    wanted, sizes = types[_order(types)], np.diff(_cells(grid)[0])
-    fits = _kind(wanted) == _kind(grid.celltypes)
+    kinds, sizes, _ = _cells_of(surface)
+    wanted = types[_order(types)]
+    fits = _kind(wanted) == kinds
     for kind, size in _SIZES.items():
         fits &= (wanted != kind) | (sizes == size)
     return types if fits.all() else None
 
 
-def _cells(grid: pv.UnstructuredGrid) -> tuple[IntArray, IntArray]:
+def _cells_of(surface: pv.PolyData) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the kinds of the cells of a PolyData, their numbers of corners, and these."""
+    found = [
+        (len(starts) - 1, np.diff(starts), corners)
+        for starts, corners in map(
+            _rows, (surface.GetVerts(), surface.GetLines(), surface.GetPolys(), surface.GetStrips())
+        )
+    ]
+    kinds = np.repeat(np.arange(len(found)), [count for count, _, _ in found])
+    sizes, corners = (np.concatenate([each[k] for each in found]) for k in (1, 2))
+    return kinds, sizes.astype(np.int64), corners.astype(np.int64)
+
+
+def _rows(cells: Any) -> tuple[IntArray, IntArray]:
     """Return where each cell begins in the list of corners, and this list."""
-    cells = grid.GetCells()
-    starts, corners = cells.GetOffsetsArray(), cells.GetConnectivityArray()
-    return pv.convert_array(starts), pv.convert_array(corners)
+    starts = pv.convert_array(cells.GetOffsetsArray())
+    corners = pv.convert_array(cells.GetConnectivityArray())
+    return (starts if len(starts) else np.zeros(1, dtype=np.int64)), corners
 
 
 def _order(types: Any) -> IntArray:
@@ -126,32 +134,32 @@ def _kind(types: Any) -> IntArray:
     return kind
 
 
-def _usual(types: Any, sizes: IntArray) -> IntArray:
+def _usual(kinds: IntArray, sizes: IntArray) -> IntArray:
     """Return the types that VTK gives to cells of a PolyData, (m,) int."""
-    usual = np.array([2, 4, 7, 6])[_kind(types)]
+    usual = np.array([2, 4, 7, 6])[kinds]
     for kind, size in _SIZES.items():
-        usual[(_kind(types) == _kind([kind])) & (sizes == size)] = kind
+        usual[(kinds == _kind([kind])) & (sizes == size)] = kind
     return usual
 
 
-def _copy_arrays(grid: pv.UnstructuredGrid, surface: pv.PolyData, order: IntArray) -> None:
-    """Give a surface the arrays of a grid whose cells have another order."""
-    cells = surface.cell_data
-    for mine, theirs in (
-        (surface.point_data, grid.point_data),
-        (cells, grid.cell_data),
-        (surface.field_data, grid.field_data),
-    ):
-        for name, values in theirs.items():
-            mine[name] = values[order] if mine is cells else values
-    for mine, theirs in ((surface.GetPointData(), grid.GetPointData()),
-                         (surface.GetCellData(), grid.GetCellData())):  # fmt: skip
-        for kind in range(theirs.NUM_ATTRIBUTES):
-            active = theirs.GetAbstractAttribute(kind)
-            if active is None:
-                mine.SetActiveAttribute(-1, kind)
-            else:
-                mine.SetActiveAttribute(active.GetName(), kind)
+def _copy_rows(given: Any, result: Any, rows: IntArray) -> None:
+    """Give the attributes *result* the *rows* (m,) of all arrays of those *given*, of m rows."""
+    if (rows == np.arange(len(rows))).all():
+        result.ShallowCopy(given)
+        return
+    for k in range(given.GetNumberOfArrays()):
+        array = given.GetAbstractArray(k)
+        made = array.NewInstance()
+        made.SetName(array.GetName())
+        made.SetNumberOfComponents(array.GetNumberOfComponents())
+        made.SetNumberOfTuples(len(rows))
+        made.InsertTuples(_ids(np.arange(len(rows))), _ids(rows), array)
+        made.CopyComponentNames(array)
+        result.AddArray(made)
+    for kind in range(given.NUM_ATTRIBUTES):
+        active = given.GetAbstractAttribute(kind)
+        if active is not None:
+            result.SetActiveAttribute(active.GetName(), kind)
 
 
 def _ids(numbers: IntArray) -> vtkIdList:

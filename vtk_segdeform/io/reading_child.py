@@ -33,6 +33,8 @@ _WRITERS = {
 _REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
 # In VTK's messages; the second is only a warning, but zeros are returned for what is missing.
 _FAILURE = re.compile(r"ERROR:|Error reading")
+_TEXT = re.compile(rb"[^\n]*\n[^\n]*\n\s*ASCII\b", re.IGNORECASE)
+_END = b"end_of_the_file"
 _LEGACY = (
     "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
 )  # fmt: skip
@@ -59,6 +61,11 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
         _update(reader, path)
         if _FAILURE.search(window.GetOutput()):
             raise ValueError(window.GetOutput())
+        if path.suffix.lower() == ".vtk" and _TEXT.match(data := path.read_bytes()):
+            own = core.vtkStringOutputWindow()
+            core.vtkOutputWindow.SetInstance(own)
+            _require_whole(type(reader)(), data, own)
+            core.vtkOutputWindow.SetInstance(window)
         for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
             _write_piece(piece, folder / str(number), writers)
             if _FAILURE.search(window.GetOutput()):
@@ -73,6 +80,22 @@ def _update(reader: Any, path: Path) -> None:
         for sort in _LEGACY:
             getattr(reader, f"ReadAll{sort}On")()
     reader.Update()
+
+
+def _require_whole(reader: Any, data: bytes, window: Any) -> None:
+    """Raise ValueError unless *reader* gets to the end of *data*, a legacy file in text.
+
+    VTK returns zeros for numbers that are missing, and omits all that follows a word that it does
+    not expect.  But it names a keyword that it does not know, if it gets there.
+    """
+    whole = data + b"\n\n" + _END + b" 1\n"
+    reader.ReadFromInputStringOn()
+    reader.SetBinaryInputString(whole, len(whole))
+    for sort in _LEGACY:
+        getattr(reader, f"ReadAll{sort}On")()
+    reader.Update()
+    if _END.decode() not in window.GetOutput():
+        raise ValueError("its numbers do not fit their counts: it is damaged, or was cut off")
 
 
 def _write_piece(piece: Any, path: Path, writers: Any) -> None:
