@@ -252,14 +252,35 @@ def test_a_matrix_turns_the_surface_around_the_point():
     turn[:3, 3] = X[HIGH] + 0.3 * UP - turn[:3, :3] @ X[HIGH]
     session = ready()
     session.pull(HIGH, X[HIGH] + 0.3 * UP, locality=1.0, max_steps=8)
+    now, so_far = session.vertices, session.turned()
     session.pull(HIGH, turn, locality=1.0)  # turned in the same pull
     patch = session.handles["pull 1"]
     assert len(patch) > 5
-    expected = X[patch] @ turn[:3, :3].T + turn[:3, 3]
+    shape = X[HIGH] + (now[patch] - now[HIGH]) @ so_far  # that it has, where it was at the press
+    assert_allclose(shape, X[patch], atol=0.02 * D)
+    expected = shape @ turn[:3, :3].T + turn[:3, 3]
     assert_allclose(session.vertices[patch], expected, atol=5e-3 * D)
     assert session.commit() == "drag pull 1"
     assert session.undo() == "drag pull 1"
     assert not session.can_undo
+
+
+def test_the_rotation_so_far_turns_nothing():
+    session = ready()
+    assert_array_equal(session.turned(), np.eye(3))
+    tip = int(X[:, 0].argmax())
+    for share in (0.25, 0.5, 0.75, 1.0):
+        session.pull(tip, X[tip] + share * 0.3 * D * np.array([-0.5, 0.0, 1.0]), max_steps=8)
+    session.refine()
+    before, so_far = session.vertices.copy(), session.turned()
+    assert (np.trace(so_far) - 1.0) / 2.0 < np.cos(0.5)
+    matrix = np.eye(4)
+    matrix[:3, :3] = so_far
+    matrix[:3, 3] = before[tip] - so_far @ X[tip]
+    session.pull(tip, matrix)
+    assert np.abs(session.vertices - before).max() < 0.002 * D
+    session.commit()
+    assert_array_equal(session.turned(), np.eye(3))
 
 
 @pytest.mark.parametrize("share", every(2, [0.7, 0.35]))

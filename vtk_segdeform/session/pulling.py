@@ -27,6 +27,7 @@ from .. import deformer
 from ..arrays import FloatArray, IntArray, frozen, plain
 from ..deformer import SPREAD, Deformer, checked_point, checked_vertex, reach_and_follows
 from ..errors import ConstraintError
+from ..geometry import rigid_fit
 from ..mesh import Mesh
 from .handles import (
     Targets,
@@ -143,6 +144,29 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
     local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
     return Grasp(grip, after, name, vertices[vertex], MappingProxyType(carried))
+
+
+def turned(grasp: Grasp, mesh: Mesh, before: FloatArray, now: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) of the surface around a grabbed point, by itself, since the press.
+
+    *before* and *now*, (n, 3), are the poses at the press and now.
+    """
+    patch = _patch(mesh, grasp.grip.vertex, SPREAD * grasp.grip.radius)
+    patch = np.union1d(patch, mesh.adjacency[[grasp.grip.vertex]].indices)
+    return rigid_fit(before[patch], now[patch])[0]
+
+
+def as_it_is(grasp: Grasp, rotation: FloatArray, now: FloatArray) -> Grasp:
+    """Return *grasp* with the shape that its patch has in the pose *now*, (n, 3).
+
+    The targets of a pull that has turned the patch by *rotation* since the press are *now*.
+    """
+    assert grasp.state.pose is not None
+    patch = grasp.state.handles[grasp.name]
+    shape = grasp.point + (now[patch] - now[grasp.grip.vertex]) @ rotation
+    targets = MappingProxyType({**grasp.state.pose.targets, grasp.name: shape})
+    pose = replace(grasp.state.pose, targets=targets)
+    return replace(grasp, state=replace(grasp.state, pose=pose))
 
 
 def localised(constrained: Deformer, locality: Locality) -> Deformer:

@@ -662,7 +662,8 @@ class Session(Timeline):
         Notes
         -----
         Calls with the same vertex, radius and locality belong to one pull until `commit`, which
-        leaves a handle at the grabbed vertex.
+        leaves a handle at the grabbed vertex.  If a map follows points, the surface around the
+        vertex keeps the shape that it has got until then; see `turned`.
         """
         vertex = checked_vertex(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
@@ -679,6 +680,8 @@ class Session(Timeline):
         if grasp is None or (turns and not grasp.grip.turns):
             grip = pulling.Grip(vertex, radius, locality, turns)
             grasp = pulling.grasp(self.mesh, start, self._vertices_of(start), grip)
+            if before is not None:  # the handle becomes a patch, of the shape that it has now
+                grasp = pulling.as_it_is(grasp, self.turned(), self.vertices)
         targets = grasp.targets(motion)
         for points in targets.values():
             handles.require_near(self.mesh, points, "coordinates of to")
@@ -688,13 +691,24 @@ class Session(Timeline):
         if before is not None:  # go on from the pose so far
             pose = self._state.pose
             assert pose is not None
-            if grasp is not before:  # the handle has become a patch
+            if grasp is not before:
                 now = handles.targets_at(state.handles, self.vertices)
                 pose = replace(state.pose, cage_vertices=pose.cage_vertices, targets=now)
             state = replace(state, pose=pose)
         solution = self._drag(state, wanted, [grasp.name], (max_steps, within))
         self._grasp = start, grasp
         return solution
+
+    def turned(self) -> FloatArray:
+        """Return the rotation (3, 3) of the surface around the point that is being pulled.
+
+        It is that since the press, in which the surface has turned by itself; without a pull it is
+        the identity.  With it as the linear part of *to*, `pull` turns nothing.
+        """
+        start, grasp = self._grasp or (None, None)
+        if start is None or grasp is None or start is not self._drag_start:
+            return np.eye(3)
+        return pulling.turned(grasp, self.mesh, self._vertices_of(start), self.vertices)
 
     def pin(self, vertex: int) -> str:
         """Pin a vertex where it is now, and return the name of the pin, a handle.

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vtk_segdeform.arrays import BoolArray, FloatArray
-from vtk_segdeform.geometry import rigid_fit
 
 from ..scene import Pointer, SurfaceDisplay
 from .line_of_sight import intersections
@@ -94,14 +93,6 @@ class Picker:
         points = np.array([hit.point for hit in hits]).reshape(-1, 3)
         faces = np.array([hit.face for hit in hits], dtype=np.int64)
         return self._distance.within(self._surface.points, points, faces, radius)
-
-    def turned(self, vertex: int, before: FloatArray, radius: float) -> FloatArray:
-        """Return the rotation (3, 3) of the surface around *vertex* since the pose *before*."""
-        now = self._surface.points
-        face = int((self._mesh.faces == vertex).any(axis=1).argmax())
-        share = self.distances([self._hit(now[vertex], face)], radius) / radius
-        near = np.flatnonzero(share < 1.0)
-        return rigid_fit(before[near], now[near], (1.0 - share[near] ** 2) ** 2)[0]
 
     def ring(self, hit: Hit, radius: float) -> FloatArray:
         """Return the segments (k, 2, 3) of the line at *radius* from *hit* along the surface."""

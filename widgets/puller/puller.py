@@ -26,7 +26,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import SPREAD, checked_locality
+from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session, automatic_locality
@@ -87,7 +87,6 @@ class Puller(Widget):
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
-        self._pressed: tuple[Any, ...] = ()  # the grabbed vertex, the pose then, and a radius
         self._pending: Callable[[], None] | None = None  # a released pull that could not start yet
         self._stop_polling: Stop | None = None
         self._live = LiveSolve(self.view, session, self.cancel)
@@ -237,7 +236,7 @@ class Puller(Widget):
         if axis >= 0:
             motion.constrain(axis)
         elif key.lower() == "r":
-            motion.toggle_turning(pointer, self._picker.turned(*self._pressed))
+            motion.toggle_turning(pointer, self.session.turned())
         elif motion.entry.is_enter(key):
             return self.finish()
         elif not motion.entry.type(key):
@@ -253,7 +252,6 @@ class Puller(Widget):
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.begin()
         start = np.array(self._surface.points[vertex])
-        self._pressed = vertex, np.array(self._surface.points), SPREAD * self.radius
         step = step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size, step)
         pull = partial(session.pull, vertex, radius=self.radius, locality=self.locality)
@@ -288,7 +286,7 @@ class Puller(Widget):
                 session.commit("pull")
                 committed = True
         finally:
-            self._motion, self._pressed = None, ()
+            self._motion = None
             self._show(None)
             if self._pending is None:
                 self._drop_pending()
