@@ -34,6 +34,7 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, DEFAULT_KEYS
 from vtk_segdeform.widgets.handle_dragger import live_solve
+from vtk_segdeform.widgets.recording.film import Film
 from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
 
@@ -368,7 +369,15 @@ class Stand:
         place = self.drag(Mode.DEFORM)
         self.draw()
         before = set(self.folder.glob("work.film*"))
-        self._meanwhile("ctrl+m", place, during=during)
+        released, save = threading.Event(), Film.save
+
+        def save_after_release(*args, **named):  # as in `first_overlay`
+            assert released.wait(LONGEST)
+            save(*args, **named)
+
+        with pytest.MonkeyPatch.context() as slow:
+            slow.setattr(Film, "save", save_after_release)
+            self._meanwhile("ctrl+m", place, during=during, released=released)
         assert len(set(self.folder.glob("work.film*")) - before) == 1
 
     def _meanwhile(
