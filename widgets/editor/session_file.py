@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry import VertexNormals
@@ -101,7 +102,8 @@ def read_session(path: Path, progress: Progress) -> Session:
     """
     if os.path.isfile(path) and os.path.getsize(path) > _LARGE:
         load_early()
-    if is_mesh(path):
+    may_be_session = path.suffix.lower() == _SUFFIX or not os.path.isfile(path)
+    if is_mesh(path) or not (may_be_session or is_zipfile(path)):
         from vtk_segdeform.io import Surface, read_polydata  # which import pyvista
 
         progress(0.0, "Reading mesh")

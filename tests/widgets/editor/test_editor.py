@@ -17,13 +17,14 @@ from scipy.spatial.transform import Rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, load_session, models, save_session
-from vtk_segdeform.errors import CageError, RegionError
+from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.job import _Shared
+from vtk_segdeform.widgets.editor.session_file import read_session
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
@@ -576,6 +577,15 @@ def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatc
     assert made.editor.status
     assert "numba" not in made.editor.status
     made.editor.remove()
+
+
+def test_a_file_that_is_neither_a_mesh_nor_a_session_is_told_the_formats(tmp_path):
+    (tmp_path / "grid.vts").write_text('<VTKFile type="StructuredGrid">')
+    with pytest.raises(MeshError, match=r"\.vts files cannot be read; use one of .*\.vtu"):
+        read_session(tmp_path / "grid.vts", lambda *_: None)
+    save_session(tmp_path / "work.segdeform", Session(models.sphere(100)))
+    (tmp_path / "work.segdeform").rename(tmp_path / "work.backup")
+    assert read_session(tmp_path / "work.backup", lambda *_: None).mesh.n_vertices == 100
 
 
 def test_the_first_run_says_that_it_compiles(monkeypatch):
