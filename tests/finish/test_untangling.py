@@ -126,7 +126,7 @@ def test_a_finish_draws_apart_what_crossed_before_it_if_it_is_asked_to(avoid_con
 
 def test_drawing_apart_can_be_cancelled():
     def stop(fraction, text):
-        assert "apart" in text
+        assert "separating" in text
         raise Cancelled("enough")
 
     with pytest.raises(Cancelled, match="enough"):

@@ -225,3 +225,11 @@ def test_the_title_is_kept(tmp_path, as_grid, binary):
         write_mesh(tmp_path / "b.vtk", read)
         assert (tmp_path / "b.vtk").read_bytes().split(b"\n")[1] == title.encode()
         assert list(pv.read(tmp_path / "b.vtk").field_data) == ["times"]
+
+
+def test_a_field_array_of_the_same_name_is_not_replaced_by_the_title(tmp_path):
+    surface = rich()
+    surface.field_data["Header"] = [1.0, 2.0]
+    data = written(tmp_path / "a.vtk", surface, binary=True, version=_NEW)
+    (tmp_path / "a.vtk").write_bytes(data.replace(b"vtk output", b"scan of mine", 1))
+    assert read_polydata(tmp_path / "a.vtk").field_data["Header"].tolist() == [1.0, 2.0]

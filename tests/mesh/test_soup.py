@@ -109,17 +109,17 @@ def test_border_points_at_the_same_position_but_for_rounding_are_welded(kind, at
 
 
 @pytest.mark.parametrize("away", [1e-9, 1e-5])
-def test_border_points_that_nearly_meet_remain_apart_and_are_told(away):
+def test_border_points_that_almost_coincide_are_not_welded_but_reported(away):
     vertices, faces = soup(*SPHERE)
     moved = vertices.copy()
     moved[7] += away
     found = checked(moved, faces)
     assert found.mesh.n_vertices == len(SPHERE[0]) + 1
-    assert "2 border points nearly meet and are not welded" in texts(found)
-    (told,) = (each for each in found.workarounds if "nearly" in each.text)
+    assert "2 border points almost coincide (not welded)" in texts(found)
+    (told,) = (each for each in found.workarounds if "almost" in each.text)
     assert 7 in told.points
     moved[7] += 0.01
-    assert not any("nearly" in text for text in texts(checked(moved, faces)))
+    assert not any("almost" in text for text in texts(checked(moved, faces)))
 
 
 def test_a_gap_of_one_step_of_coarse_coordinates_remains():

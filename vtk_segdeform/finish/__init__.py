@@ -8,7 +8,7 @@ The files, in reading order:
     gradients      of the triangles of a patch, and the pose that has given ones
     unfolding      opens folds where they are
     creases        smooths creases in which a pose crosses itself
-    untangling     draws parts apart that cross
+    untangling     separates parts that cross
     factor         the factored Laplacian of the free vertices
     finisher       the iteration: fixed vertices, handles and volumes exact
 """

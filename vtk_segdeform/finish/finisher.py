@@ -19,7 +19,7 @@ these vertices held: the rest of the surface relaxes around them.  In a cactus b
 this leaves distortion 0.079 without crossings; the start has 0.120, and the finish with crossings
 0.067.  Where many of the faces of a patch crossed before the finish, they are not held, which would
 not part them.  Creases in which a few triangles still cross others are smoothed (`creases`).  Of a
-deformer that avoids contact, what crosses even then is drawn apart (`untangling`).
+deformer that avoids contact, parts that still cross are separated (`untangling`).
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
@@ -98,7 +98,7 @@ class Finisher:
     progress : Progress, optional
         Called while the matrix is factored; may cancel.
     avoid_contact : bool
-        Draw parts apart that cross before the finish, too.
+        Also separate parts that crossed before the finish; see `untangling`.
 
     Raises
     ------
@@ -179,7 +179,7 @@ class Finisher:
         return replace(best, vertices=x, steps=steps)
 
     def _drawn_apart(self, x: FloatArray, progress: Progress | None) -> FloatArray:
-        """Return *x* without the crossings that its places allow to draw apart."""
+        """Return *x* untangled and relaxed around; *x* itself if something still crosses."""
         crossing = self._crossings.at(x)
         apart = self._untangled(x, progress) if len(crossing) else x
         if apart is x or len(self._crossings.at(apart)):
@@ -353,7 +353,7 @@ class Finisher:
         return moved_along(paths, steps_to_volume(self._constraints, paths))
 
     def _untangled(self, x: FloatArray, progress: Progress | None) -> FloatArray:
-        """Return *x* without the crossings that its places allow to draw apart."""
+        """Return *x* with fewer crossings, at its volume; *x* itself if there are no fewer."""
         free = np.zeros(len(x), dtype=bool)
         free[self._free] = True
         for _ in range(_UNTANGLED):

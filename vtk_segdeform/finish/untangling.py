@@ -1,4 +1,4 @@
-"""Parts that cross are drawn apart: the curve in which they cross is made shorter until it is gone.
+"""Untangling: parts that cross are separated by shrinking the curve in which they cross.
 
 Two faces that cross have a segment in common, from P to Q; at either end an edge of one pierces the
 other.  The segments of all pairs make closed curves around what has passed through the surface, and
@@ -58,7 +58,7 @@ def untangled(
             break
         there = x.copy()
         for tangle in _tangles(mesh, pairs):
-            tell(progress, turn / _ROUNDS, "drawing crossing parts apart")
+            tell(progress, turn / _ROUNDS, "separating crossing parts")
             there[tangle] = _opened(mesh, x, free, tangle)
         if not np.isfinite(there).all() or len(crossings.pairs(there)) >= len(pairs):
             break

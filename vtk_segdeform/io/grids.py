@@ -28,8 +28,8 @@ _SIZES = {1: 1, 3: 2, 5: 3, 9: 4}  # numbers of corners of types for which there
 def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.PolyData:
     """Return the surface cells of a *grid* as a PolyData; empty if there are no polygons.
 
-    Types and order are stored if those of a grid made from the result would differ, or if the
-    format of the file has both and this is *only_as_grid* to be restored.
+    The types are stored if a grid that is made from the result would have others, or another order.
+    With *only_as_grid* they are always stored, because the format has PolyData as well.
     """
     types = grid.celltypes
     if not set(types.tolist()) <= {each for kind in _KINDS.values() for each in kind}:
@@ -83,7 +83,7 @@ def grid_of(surface: Any) -> pv.UnstructuredGrid:
 
 
 def is_grid(surface: pv.PolyData) -> bool:
-    """Tell whether a PolyData has the types of the grid that it was."""
+    """Return whether a PolyData was read from a grid and still has its cells."""
     return _stored(surface) is not None
 
 

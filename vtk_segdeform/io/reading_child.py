@@ -31,7 +31,7 @@ _WRITERS = {
     "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
 }
 _REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
-# In VTK's messages; the second is only a warning, but zeros are returned for what is missing.
+# In VTK's messages.  The second is only a warning, but missing numbers are returned as zeros.
 _FAILURE = re.compile(r"ERROR:|Error reading")
 _TEXT = re.compile(rb"[^\n]*\n[^\n]*\n\s*ASCII\b", re.IGNORECASE)
 _END = b"end_of_the_file"
@@ -83,10 +83,10 @@ def _update(reader: Any, path: Path) -> None:
 
 
 def _require_whole(reader: Any, data: bytes, window: Any) -> None:
-    """Raise ValueError unless *reader* gets to the end of *data*, a legacy file in text.
+    """Raise ValueError unless *reader* reaches the end of *data*, a legacy file in text.
 
-    VTK returns zeros for numbers that are missing, and omits all that follows a word that it does
-    not expect.  But it names a keyword that it does not know, if it gets there.
+    VTK returns zeros for missing numbers, and silently omits everything after a word that it does
+    not expect.  So an unknown keyword is appended, which VTK reports once it gets there.
     """
     whole = data + b"\n\n" + _END + b" 1\n"
     reader.ReadFromInputStringOn()

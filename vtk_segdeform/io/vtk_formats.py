@@ -96,8 +96,8 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     except (MeshError, RuntimeError) as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
     surfaces = [_surface(part, suffix) for part in parts]
-    for each in surfaces[: len(surfaces) * (len(surfaces) > 1)]:
-        each.GetFieldData().RemoveArray(CELL_TYPES)
+    if len(surfaces) > 1:  # of several grids nothing is restored
+        surfaces = [_without_types(each) for each in surfaces]
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     if suffix == ".vtkhdf":  # it does not store which arrays are active
         _activate_normals(surface)
@@ -105,12 +105,13 @@ def read_with_vtk(path: Path) -> pv.PolyData:
 
 
 def _with_title(surface: pv.PolyData, path: Path) -> pv.PolyData:
-    """Give *surface* the title of a legacy file as the field array `HEADER`, unless it is VTK's."""
+    """Store the title of a legacy file as the field array `HEADER`, unless it is VTK's default."""
     if path.suffix.lower() == ".vtk":
         with path.open("rb") as file:
             found = _TITLE.match(file.read(1000))
         title = decoded(found[1]).strip() if found else ""
-        if title.isprintable() and title not in ("", _NO_TITLE):
+        is_new = title.isprintable() and title not in ("", _NO_TITLE)
+        if is_new and HEADER not in surface.field_data:
             set_names(surface, HEADER, [title])
     return surface
 

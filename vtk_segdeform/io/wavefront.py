@@ -268,7 +268,7 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     warn_renamed("material library", libraries)
     kept["field"] += [_LIBRARY] if libraries else []
     if missing := [name for name in libraries.values() if not os.path.exists(path.parent / name)]:
-        _log.warning("copy %s there, too: the OBJ file refers to it", ", ".join(missing))
+        _log.warning("the OBJ file refers to %s: copy it to the same folder", ", ".join(missing))
     table = np.asarray(surface.points, dtype=float)
     colour = surface.point_data.get("RGB")
     if colour is not None and colour.dtype == np.uint8 and colour.shape == table.shape:

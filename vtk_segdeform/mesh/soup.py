@@ -118,8 +118,8 @@ class Soup:
     def moved(self, vertices: FloatArray) -> FloatArray:
         """Return the given points (p, 3) for the mesh at *vertices* (n, 3).
 
-        Welded points coincide there, so that they do after writing and reading as well; at the rest
-        positions the given points are returned, bit for bit.
+        Welded points have equal positions then, so they are welded again after writing and reading.
+        For the mesh at rest the given points are returned, bit for bit.
         """
         if np.array_equal(vertices, self.mesh.vertices):
             return self.points.copy()
@@ -153,8 +153,8 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
             found = found.at(np.where(used[:, None], points, other))
     _require_usable(found)
     target = np.arange(len(points))
-    if (closed := sewn(found)) is not None:
-        target, found = closed
+    if (result := sewn(found)) is not None:
+        target, found = result
     elif found.half_edges.all_twins and found.is_closed:
         return Soup(points, Mesh.of(found), target)
     valid = found.points
@@ -276,7 +276,7 @@ def _workarounds(
         n_holes = int(connected(int(on_border.sum()), *(number[end] for end in ends)).max()) + 1
         yield _workaround(Kind.HOLE, n_holes, "# hole", np.flatnonzero(on_border[target]))
     if len(near):
-        text = f"{len(near)} border points nearly meet and are not welded"
+        text = f"{len(near)} border points almost coincide (not welded)"
         yield Workaround(text, at(near), None, len(near))
     if len(crowded := half_edges.branching):
         text = f"{counted(len(crowded), 'edge', 'edges')} with three or more faces"

@@ -1,9 +1,9 @@
 """Welding: points at the same position on borders become one vertex.
 
-The two sides of a seam may be computed in different ways, as at 0 and 2 pi of a cylinder, so points
-within a few roundings of their coordinates are at the same position.  Points that a file with fewer
-digits rounded differently remain apart, because no distance separates them safely from a narrow
-gap; `soup` tells that they nearly meet.
+The two sides of a seam may be computed in different ways, as at 0 and 2 pi of a cylinder, so
+positions are compared up to a few rounding errors.  Points that differ by more, such as those that
+a file with few digits rounded differently, are not welded: no tolerance distinguishes them safely
+from a narrow gap.  `soup` reports that they almost coincide.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ def sewn(found: Search) -> tuple[IntArray, Search] | None:
     half_edges = HalfEdges(faces, len(vertices))
     if not half_edges.one_fan_after_flips:
         return None
-    sewn = Search.known(vertices, half_edges, None)
-    sewn.__dict__["first_at"] = np.arange(len(vertices))
-    return target, sewn
+    after = Search.known(vertices, half_edges, None)
+    after.__dict__["first_at"] = np.arange(len(vertices))
+    return target, after
 
 
 def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges, IntArray]:
     """Weld points of borders and of open sheets.
 
     Return the point that each point (p,) is welded to, the faces (m,) kept, half-edges, and the
-    points (k,) of borders that nearly meet.
+    points (k,) of borders that almost coincide.
     """
     target, half_edges, first_at = np.arange(len(points)), found.half_edges, found.first_at
     kept, near = ~(found.degenerate | found.duplicate), np.empty((0, 2), dtype=np.int64)
@@ -83,7 +83,7 @@ def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, Half
 
 
 def rounding(points: FloatArray) -> float:
-    """Return the distance of points that are at the same position but for rounding."""
+    """Return the distance up to which points are at the same position, up to rounding errors."""
     with np.errstate(over="ignore"):
         is_single = bool((points.astype(np.float32) == points).all())
     precision = np.finfo(np.float32 if is_single else np.float64).eps
@@ -91,10 +91,10 @@ def rounding(points: FloatArray) -> float:
 
 
 def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> IntArray:
-    """Return pairs (k, 2) of vertices of borders that nearly meet, for the edges at both.
+    """Return pairs (k, 2) of vertices of borders that almost coincide, relative to their edges.
 
-    Edges of up to *same* do not count, as at a pole, where the same point is given many times; only
-    if they are shorter the pair may be the ends of one.
+    Edges no longer than *same* are ignored: at a pole, one point is given many times.  Both ends of
+    such an edge may be a pair, those of a longer one may not.
     """
     ends = np.append(half_edges.tail[half_edges.boundary], half_edges.head_of(half_edges.boundary))
     is_border = np.zeros(len(points), dtype=bool)

@@ -147,9 +147,9 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
 
 
 def turned(grasp: Grasp, mesh: Mesh, before: FloatArray, now: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) of the surface around a grabbed point, by itself, since the press.
+    """Return the rotation (3, 3) of the surface around the grabbed vertex since the press.
 
-    *before* and *now*, (n, 3), are the poses at the press and now.
+    *before* and *now* are the poses at the press and at present, (n, 3).
     """
     patch = _patch(mesh, grasp.grip.vertex, SPREAD * grasp.grip.radius)
     patch = np.union1d(patch, mesh.adjacency[[grasp.grip.vertex]].indices)
@@ -157,9 +157,9 @@ def turned(grasp: Grasp, mesh: Mesh, before: FloatArray, now: FloatArray) -> Flo
 
 
 def as_it_is(grasp: Grasp, rotation: FloatArray, now: FloatArray) -> Grasp:
-    """Return *grasp* with the shape that its patch has in the pose *now*, (n, 3).
+    """Return *grasp* with its patch in the shape that it has in the current pose *now*, (n, 3).
 
-    The targets of a pull that has turned the patch by *rotation* since the press are *now*.
+    *rotation* (3, 3) is that of the patch since the press; turned by it, the patch does not move.
     """
     assert grasp.state.pose is not None
     patch = grasp.state.handles[grasp.name]

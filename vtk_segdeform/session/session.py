@@ -662,8 +662,8 @@ class Session(Timeline):
         Notes
         -----
         Calls with the same vertex, radius and locality belong to one pull until `commit`, which
-        leaves a handle at the grabbed vertex.  If a map follows points, the surface around the
-        vertex keeps the shape that it has got until then; see `turned`.
+        leaves a handle at the grabbed vertex.  When the first map follows points, the surface
+        around the vertex keeps its current shape; see `turned`.
         """
         vertex = checked_vertex(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
@@ -700,10 +700,10 @@ class Session(Timeline):
         return solution
 
     def turned(self) -> FloatArray:
-        """Return the rotation (3, 3) of the surface around the point that is being pulled.
+        """Return the rotation (3, 3) of the surface around the pulled vertex since the press.
 
-        It is that since the press, in which the surface has turned by itself; without a pull it is
-        the identity.  With it as the linear part of *to*, `pull` turns nothing.
+        A pull to a point also rotates the surface there.  A map with this linear part continues
+        such a pull without a jump.  The identity if nothing is being pulled.
         """
         start, grasp = self._grasp or (None, None)
         if start is None or grasp is None or start is not self._drag_start:

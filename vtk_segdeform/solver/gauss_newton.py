@@ -79,6 +79,7 @@ _SHORTEST_ACTIVE = 1.0 / 4096.0  # the same while a term is active
 _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
+_MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _OLD = 6  # steps after which H is computed again
 _OLDISH = 2  # the same if a solver with other weights has just computed most of it
 _OLD_ACTIVE = 3  # the same while a term is active
@@ -401,12 +402,13 @@ class GaussNewton:
         """Return the weight of anchors over the surface that make *p* a firm minimum.
 
         With weight k they add k |x - x(p)|^2, the mean square over the surface.  The Hessian at
-        *p*, without that of the volumes, is then at least *least* times that mean square.  0 if it
-        is so already; else k is at most twice what is needed.
+        *p*, without that of the volumes, is then at least *least* times that mean square.  k is 0
+        if it is so already, else at most twice what is needed.  It is also 0 if no k is enough,
+        because some cage vertices move none of the samples of the surface.
         """
         m, mass, weight = len(p), self.energy.mass, 0.0
         turning = -rotation_term(self.energy, p)
-        while True:
+        for _ in range(_MOST_TRIES):
             full, fixed = turning.copy(), self._hessian + (weight - least) * mass
             for axis in range(3):
                 block = slice(axis * m, (axis + 1) * m)
@@ -417,6 +419,7 @@ class GaussNewton:
                 weight = max(2.0 * weight, least)
             else:
                 return weight
+        return 0.0
 
     def unbalanced(self, p: FloatArray, targets: FloatArray) -> FloatArray:
         """Return half the gradient of the objective at *p*, (m, 3), without that of the volumes.

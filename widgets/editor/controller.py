@@ -37,7 +37,7 @@ from .session_file import SessionFile, is_mesh, read_session
 from .settling import Settling, is_unsettled
 from .widget_set import WidgetSet
 
-_FIRST_RUN = "The first run compiles for about half a minute, later ones do not"
+_FIRST_RUN = "First run: compiling takes about half a minute, once"
 T = TypeVar("T")
 
 
@@ -82,7 +82,7 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
-        self.messages.note(advice() or _FIRST_RUN * is_first_run())
+        self.messages.note(advice() or (_FIRST_RUN if is_first_run() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)

@@ -68,7 +68,8 @@ class PullMotion:
     def toggle_turning(self, pointer: Pointer, turned: FloatArray) -> None:
         """Turn instead of moving from now on, or the other way round; the motion so far stays.
 
-        *turned* (3, 3) is how the surface around the point has turned by itself while it was moved.
+        *turned* (3, 3) is the rotation of the surface around the point since the press; see
+        `Session.turned`.
         """
         self._base_shift = self._shift
         self._base_turn = self._turn if self.has_turned else turned

@@ -591,7 +591,7 @@ def test_a_file_that_is_neither_a_mesh_nor_a_session_is_told_the_formats(tmp_pat
 def test_the_first_run_says_that_it_compiles(monkeypatch):
     monkeypatch.setattr(dispatch, "_CACHED", "*.none")
     made = Bench(plain_view((500, 400)), sausage(is_coarse=True).mesh, mode=None)
-    assert made.editor.status.startswith("The first run compiles")
+    assert made.editor.status.startswith("First run: compiling")
     made.editor.remove()
 
 
