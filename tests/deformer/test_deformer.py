@@ -9,7 +9,7 @@ import pytest
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import exact_volume_change, icosphere, rotation
+from solids import TETRAHEDRON, exact_volume_change, icosphere, rotation
 
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
@@ -441,3 +441,42 @@ def test_a_mesh_may_have_many_bodies():
         assert abs(solution.volume_change) < 1e-12
         assert solution.handle_error < 1e-3
         assert len(np.unique(mesh.components[top])) == 4
+
+
+def with_specks(distance: float, count: int = 3) -> Mesh:
+    """Return the sausage with small tetrahedra around it, at a *distance* in diagonals."""
+    speck, faces = TETRAHEDRON
+    mesh = SCENE.mesh
+    turn = np.linspace(0.3, 5.0, count)
+    ways = np.stack([0.3 * np.cos(3 * turn), np.cos(turn), np.sin(turn)], axis=1)
+    away = mesh.vertices @ (ways / np.linalg.norm(ways, axis=1)[:, None]).T
+    skin = mesh.vertices[away.argmax(axis=0)]
+    at = skin + distance * mesh.diagonal * ways
+    specks = (at[:, None] + 0.002 * mesh.diagonal * speck).reshape(-1, 3)
+    theirs = np.arange(count)[:, None, None] * len(speck) + faces + mesh.n_vertices
+    return Mesh(
+        np.concatenate([mesh.vertices, specks]),
+        np.concatenate([mesh.faces, theirs.reshape(-1, 3)]),
+    )
+
+
+@pytest.mark.parametrize("distance", every(2, [0.02, 0.2]))
+def test_loose_specks_around_a_body_do_not_hinder_its_pose(distance):
+    mesh = with_specks(distance)
+    regions = segment(mesh)
+    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 60))
+    held = deformer.hold(fixed=SCENE.fixed, handle=SCENE.handle)
+    solution = held.solve(SCENE.turned(60, axis=(0.0, 0.0, 1.0)))
+    assert solution.status is Status.CONVERGED
+    assert solution.steps < 40
+    moved = np.linalg.norm(solution.vertices - mesh.vertices, axis=1)
+    specks = moved[SCENE.mesh.n_vertices :].reshape(-1, 4)
+    if distance > 0.1:  # none of them is moved by anything
+        assert specks.max() < 1e-9 * mesh.diagonal
+    else:
+        reach = np.linalg.norm(
+            mesh.vertices[SCENE.mesh.n_vertices :: 4, None]
+            - mesh.vertices[: SCENE.mesh.n_vertices],
+            axis=2,
+        ).argmin(axis=1)
+        assert np.abs(specks - moved[reach, None]).max() < 0.1 * mesh.diagonal

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import CUBE, TETRAHEDRON, icosphere
+from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere
 from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh, sizes
@@ -220,6 +220,13 @@ def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
             read_polydata(tmp_path / "a.ply")
     (tmp_path / "a.ply").write_bytes(whole)
     assert read_mesh(tmp_path / "a.ply").n_faces == 4
+
+
+def test_the_first_line_may_be_in_capitals(tmp_path):
+    path = tmp_path / "a.ply"
+    write_mesh(path, Mesh(*OCTAHEDRON))
+    path.write_bytes(b"PLY" + path.read_bytes()[3:])
+    assert read_polydata(path).n_cells == 8
 
 
 def test_a_word_among_numbers_is_shown(tmp_path):

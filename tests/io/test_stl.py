@@ -38,6 +38,13 @@ def test_a_wrong_count_of_triangles_is_an_error(tmp_path, count):
         read_polydata(path)
 
 
+def test_a_file_that_ends_in_its_header_says_so(tmp_path):
+    path, data = octahedron(tmp_path)
+    path.write_bytes(data[:80])
+    with pytest.raises(MeshError, match=r"a\.stl: ends after 80 bytes, in its header: it was cut"):
+        read_polydata(path)
+
+
 def test_binary_files_may_start_like_text_and_have_trailing_bytes(tmp_path):
     path, data = octahedron(tmp_path)
     path.write_bytes(b"solid facet vertex 1 2 3 endsolid".ljust(80) + data[80:])

@@ -187,3 +187,16 @@ def test_the_error_for_another_type_says_how_to_make_a_mesh(call):
         with pytest.raises(sd.errors.MeshError, match=says.format(name)):
             call(given)
     assert isinstance(sd.Surface(polydata).mesh, sd.Mesh)
+
+
+def test_the_mesh_of_some_components_has_their_vertices_faces_and_borders():
+    ball, open_ball = icosphere(1), icosphere(1)
+    faces = np.concatenate([ball[1], open_ball[1][2:] + len(ball[0])])
+    mesh = Mesh(np.concatenate([ball[0], open_ball[0] + 3.0]), faces)
+    for which, single in ((0, Mesh(*ball)), (1, Mesh(open_ball[0] + 3.0, open_ball[1][2:]))):
+        part, kept = mesh.of_components(np.arange(2) == which)
+        assert_array_equal(part.vertices, mesh.vertices[kept])
+        assert_array_equal(part.vertices, single.vertices)
+        assert_array_equal(part.faces, single.faces)
+        assert_array_equal(part.boundary, single.boundary)
+        assert_array_equal(part.edges, single.edges)

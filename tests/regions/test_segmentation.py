@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from campaign import every
+from numpy.testing import assert_array_equal
 from real_meshes import botsch_sorkine
 from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
@@ -123,6 +124,47 @@ def test_fewer_regions_than_components_join_the_nearest():
     assert len(np.unique(regions.labels[mesh.components == 2])) == 1
     second, third = (regions.labels[mesh.components == k][0] for k in (1, 2))
     assert second == third != regions.labels[mesh.components == 0][0]
+
+
+def with_buttons(n=40, gap=0.05):
+    """Return the limbed body with *n* small balls around its upper limb, and their vertices."""
+    body, (ball, faces) = limbed(), icosphere(1)
+    turn = np.arange(n) * 2.4
+    z = np.linspace(7.8, 9.6, n)
+    at = np.stack([(0.45 + gap) * np.cos(turn), (0.45 + gap) * np.sin(turn), z], axis=1)
+    balls = (at[:, None] + 0.05 * ball).reshape(-1, 3)
+    theirs = (np.arange(n)[:, None, None] * len(ball) + faces).reshape(-1, 3)
+    vertices = np.concatenate([body.vertices, balls])
+    mesh = Mesh(vertices, np.concatenate([body.faces, theirs + body.n_vertices]))
+    return mesh, np.arange(body.n_vertices, mesh.n_vertices)
+
+
+def test_small_components_join_the_region_that_they_are_nearest_to():
+    mesh, buttons = with_buttons()
+    labels = cores(mesh, None).labels
+    body = limbed()
+    assert_array_equal(labels[: body.n_vertices], cores(body, None).labels)
+    limb = labels[np.argmax(body.vertices[:, 2])]
+    assert (labels[buttons] == limb).all()
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_small_components_far_from_the_others_are_a_region(count):
+    mesh, buttons = with_buttons(count, gap=3.0)
+    labels = cores(mesh, None).labels
+    assert len(set(labels[buttons])) == 1
+    assert labels[buttons[0]] not in labels[: buttons[0]]
+
+
+def test_of_many_equal_components_sixteen_are_regions():
+    ball, faces = icosphere(1)
+    at = 3.0 * np.stack(np.unravel_index(np.arange(60), (3, 4, 5)), axis=1)
+    vertices = (at[:, None] + ball).reshape(-1, 3)
+    mesh = Mesh(vertices, (np.arange(60)[:, None, None] * len(ball) + faces).reshape(-1, 3))
+    labels = cores(mesh, None).labels
+    assert labels.max() == 15
+    of_ball = labels.reshape(60, -1)
+    assert (of_ball == of_ball[:, :1]).all()  # none is cut
 
 
 def test_the_result_is_invariant_under_translation_rotation_and_scaling():

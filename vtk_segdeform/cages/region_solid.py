@@ -107,11 +107,13 @@ class Patch:
         touching = members[surface.faces].any(axis=1)
         corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
         length = surface.longest[touching]
+        least = _SHORTEST * np.ptp(surface.points, axis=0).max()
         if thirds.sum() <= _FLAT * (length @ length):  # count flat faces by their length instead
-            least = _SHORTEST * np.ptp(surface.points, axis=0).max()
             thirds = np.maximum(length, least) ** 2 / 12.0
         weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
+        if not touching.any():  # decimation may have left no face of a small component
+            weights[members] = least**2
         around = np.flatnonzero(weights)
         return cls(
             surface, members, weights, principal_axes(surface.points[around], weights[around])

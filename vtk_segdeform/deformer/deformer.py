@@ -50,7 +50,7 @@ from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
 from ..geometry import Lids, lids_of
 from ..kernels import compiled_kernels, one_blas_thread
-from ..mesh import Mesh, new_crossings, require_mesh
+from ..mesh import Mesh, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import (
@@ -114,6 +114,7 @@ _VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_LOOSE = 1e-4  # weight of the anchors of a loose component, times the scale of the energy
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
@@ -429,11 +430,13 @@ class Deformer:
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
         near = vertex, float(reach) / self._frame.size, follows
-        quadratic = self._samples.quadratic(*near)
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
+        quadratic = weight * self._samples.quadratic(*near)
         before, p = self._constraints.solver, self._p
+        if before.positions.anchors is not None:
+            quadratic += before.positions.anchors.quadratic
         rows, soft, of_target = before.positions.rows.copy(), [], []
-        anchors = Anchors(weight * quadratic, p, np.zeros_like(p))
+        anchors = Anchors(quadratic, p, np.zeros_like(p))
         energy, flat = self._with_flat_rings(anchors, spread / self._frame.size)
         for number, ids in enumerate(self._constraints.handles):
             row = flat.get(number)
@@ -454,7 +457,7 @@ class Deformer:
         least = _FIRM * energy.scale
         is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
         steady = solver.steadying(p, least) if is_loaded else 0.0
-        anchors = Anchors(weight * quadratic + steady * energy.mass, p, load)
+        anchors = Anchors(quadratic + steady * energy.mass, p, load)
         solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
         keeps = self._samples.weights(*near)
@@ -806,7 +809,7 @@ class Deformer:
     def _is_from_elsewhere(self, goal: FloatArray) -> bool:
         """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
         own = self._constraints
-        if own.solver.positions.anchors is not None or np.array_equal(goal, self._half_turned):
+        if own.keeps is not None or np.array_equal(goal, self._half_turned):
             return False
         return is_half_turn(self._rest.vertices[self.handle], goal, own.handles)
 
@@ -1043,6 +1046,10 @@ class Deformer:
         positions = position_term(
             self.subspace, self._rest, [ids[places] for places in order], weight
         )
+        if len(ids) and self.mesh.components.any():
+            start = self._rest_cages
+            anchors = Anchors(self._of_loose_parts(ids), start, np.zeros_like(start))
+            positions = positions.local(positions.rows, anchors)
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
         contact = self._contact_of()
@@ -1070,6 +1077,36 @@ class Deformer:
             pulled=_PulledPoints(),
         )
         self.reset()
+
+    def _of_loose_parts(self, ids: IntArray) -> FloatArray:
+        """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
+
+        Nothing determines where they are.  Those that share no region with other components stay.
+        The others follow these; the anchors are so weak that they only prevent drifting.
+        """
+        of_component, of_region = self._linked_parts
+        component, samples, scale = self.mesh.components, self._samples, self._binding.energy.scale
+        has_ids = np.zeros(len(of_component), dtype=bool)
+        has_ids[component[ids]] = True
+        stays = ~np.isin(of_region, of_component[has_ids])
+        own = [len(cage.vertices) for cage in self.cages]
+        quadratic = np.diag(np.where(np.repeat(stays, own), scale, 0.0))
+        of_sample = np.empty(len(samples.points), dtype=np.int64)
+        of_sample[samples.cells] = component
+        loose = ~has_ids[of_sample]
+        weight = _LOOSE * scale / np.bincount(of_sample)[of_sample[loose]]
+        rows = samples.rows[loose]
+        return np.asarray(quadratic + (rows.T * weight) @ rows)
+
+    @cached_property
+    def _linked_parts(self) -> tuple[IntArray, IntArray]:
+        """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
+        component = self.mesh.components
+        count = int(component.max()) + 1
+        pairs = [np.unique(component[members]) for members in self.regions.membership]
+        region = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])
+        part = connected(count + len(pairs), np.concatenate([_NONE, *pairs]), count + region)
+        return part[:count], part[count:]
 
     def _anchors(self, surface: ScaledSurface | None, fixed_at: FloatArray) -> FloatArray:
         """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.

@@ -13,6 +13,9 @@ distance move it a fifth as much, and the smaller ones nearby take fewer steps o
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
 
+Small components near a large one, such as buttons, are joined to it where they are nearest, and so
+come along.
+
 The samples are the cells of the coarse volume, or the vertices of a small mesh, and distances are
 along the edges between them, so a press takes some milliseconds whatever the size of the mesh; to
 fix as many vertices would take a second.
@@ -53,7 +56,7 @@ from scipy import linalg, sparse
 from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import faces_between
+from ..geometry import attached, faces_between
 from ..mesh import Mesh
 from ..solver import CoarseVolume, ContactSurface
 
@@ -162,9 +165,19 @@ class SurfaceSamples:
         np.maximum.at(heights, self.cells, over)
         return surface.with_heights(heights)
 
+    @cached_property
+    def _joined(self) -> sparse.csr_array:
+        """The edges, and one to the nearest sample for each small component; see `attached`."""
+        _, component = csgraph.connected_components(self.edges, directed=False)
+        one, other = attached(self.points, self.areas, component)
+        gap = np.linalg.norm(self.points[one] - self.points[other], axis=1)
+        least = np.finfo(float).tiny  # csgraph reads a zero as "no edge"
+        joints = sparse.coo_array((np.maximum(gap, least), (one, other)), self.edges.shape)
+        return sparse.csr_array(self.edges + joints)
+
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""
-        found = csgraph.dijkstra(self.edges, directed=False, indices=self.cells[vertex])
+        found = csgraph.dijkstra(self._joined, directed=False, indices=self.cells[vertex])
         return np.asarray(found, dtype=np.float64)
 
     def weights(self, vertex: int, reach: float, follows: float) -> FloatArray:
@@ -179,7 +192,7 @@ class SurfaceSamples:
         weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
         if len(far):
-            _, part = csgraph.connected_components(self.edges[far][:, far], directed=False)
+            _, part = csgraph.connected_components(self._joined[far][:, far], directed=False)
             size = np.bincount(part, self.areas[far])
             weights[far[(size < follows * size.max())[part]]] = 0.0
         return weights

@@ -10,6 +10,7 @@ The files, in reading order:
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     decimation      a mesh with one vertex for each cluster of neighbours
+    attached        small components that belong to another one
     normals         vertex normals for drawing
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
@@ -17,6 +18,7 @@ The files, in reading order:
     up_axis         a guess of the axis that points up
 """
 
+from .attached import SMALL_COMPONENT, attached, component_shares, nearest_pairs
 from .decimation import decimated
 from .differential import (
     area_gradients,
@@ -45,15 +47,18 @@ from .volume import (
 )
 
 __all__ = [
+    "SMALL_COMPONENT",
     "IntrinsicTriangulation",
     "Lids",
     "LocalVolume",
     "NormalTransport",
     "VertexNormals",
     "area_gradients",
+    "attached",
     "closest_rotations",
     "cluster_positions",
     "cluster_within_parts",
+    "component_shares",
     "corner_and_edges",
     "cotangent_laplacian",
     "decimated",
@@ -67,6 +72,7 @@ __all__ = [
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
+    "nearest_pairs",
     "nearest_source",
     "rigid_fit",
     "signed_volume",

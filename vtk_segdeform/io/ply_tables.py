@@ -29,7 +29,7 @@ TYPES = {
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
-_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
+_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r)", re.IGNORECASE)
 _END = re.compile(rb"(?:^|[\r\n])[ \t]*end_header[ \t]*(?=[\r\n]|\Z)")
 _LINE = re.compile(rb"\r\n|\n|\r")
 

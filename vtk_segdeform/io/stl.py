@@ -87,11 +87,10 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
 
 
 def _of_bytes(data: bytes, count: int) -> Any:
-    stored = (len(data) - _START) // _SIZE
-    if len(data) < _START or stored != count:
-        raise MeshError(
-            f"declares {count} triangles, but its {len(data)} bytes contain {max(stored, 0)}"
-        )
+    if len(data) < _START:
+        raise MeshError(f"ends after {len(data)} bytes, in its header: it was cut off")
+    if (stored := (len(data) - _START) // _SIZE) != count:
+        raise MeshError(f"declares {count} triangles, but its {len(data)} bytes contain {stored}")
     return np.frombuffer(data, _ROW, count, _START)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray, as_points, bounds_of, frozen
+from ..arrays import BoolArray, FloatArray, IntArray, as_points, bounds_of, frozen
 from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
@@ -213,6 +213,19 @@ class Mesh(Frozen):
         areas = np.asarray(a + b + c, dtype=np.float64)
         frozen(areas)
         return areas
+
+    def of_components(self, which: BoolArray) -> tuple[Mesh, IntArray]:
+        """Return the mesh of the components *which*, (c,) bool, and its vertices (k,) in this one.
+
+        At least one component.
+        """
+        kept = which[self.components]
+        number = np.cumsum(kept) - 1
+        part = object.__new__(Mesh)
+        faces = number[self.faces[kept[self.faces[:, 0]]]]
+        part.__setstate__({"vertices": self.vertices[kept], "faces": faces})
+        part.__dict__["boundary"] = read_only(number[self.boundary[kept[self.boundary[:, 0]]]])
+        return part, np.flatnonzero(kept)
 
     def with_vertices(self, vertices: ArrayLike) -> Mesh:
         """Return a mesh with the same triangles and other positions (n, 3).

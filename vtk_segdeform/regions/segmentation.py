@@ -6,6 +6,9 @@ separated; if more, the largest parts are cut into slices of about equal area (`
 is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh and
 hardly depends on the resolution of the mesh.
 
+Large components have regions of their own.  Buttons, teeth and screws belong to the part that they
+are nearest to; small components far from everything share a region.
+
 Finally the borders between parts are shortened and moved into creases on the mesh (`borders`), or,
 of a large mesh, on a decimated one.
 """
@@ -17,10 +20,16 @@ from operator import itemgetter
 import numpy as np
 
 from .. import sizes
-from ..arrays import IntArray, is_whole
+from ..arrays import BoolArray, IntArray, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
-from ..geometry import decimated
+from ..geometry import (
+    SMALL_COMPONENT,
+    attached,
+    component_shares,
+    decimated,
+    nearest_pairs,
+)
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
@@ -56,6 +65,7 @@ def segment(
     n_regions : int, optional
         Number of regions, 1 to n.  None separates every limb and nothing else: one region for
         a sphere, three for a cactus with two arms, six for a man: head, arms, legs and trunk.
+        Small components near a large one, and all but the 16 largest, get no region of their own.
     overlap : int, optional
         Number of edge rings by which each region grows over its neighbours.  None means a tenth of
         the width of a region in edges, sqrt(n / regions) / 10, at least 2: the same width in space
@@ -68,9 +78,10 @@ def segment(
     Returns
     -------
     regions : Regions
-        Each is connected before it is grown, and no region spans two components of the mesh.  If
-        *n_regions* is less than the number of components, each of the largest components is a
-        region, and the others are added to the nearest one.
+        Before they are grown, their parts of one component are connected.  If *n_regions* is less
+        than the number of components, each of the largest components is a region; every other
+        component is added to the region of the vertex that it is nearest to.  For None, small
+        components far from large ones share a region.
 
     Raises
     ------
@@ -90,14 +101,18 @@ def segment(
     if not is_whole(seed, 0):
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "sampling vertices")
+    whole, kept = mesh, np.arange(n)
+    main, far = _main_components(mesh, n_regions)
+    if not main.all():
+        mesh, kept = mesh.of_components(main)
     shape = mesh
-    if n_regions is not None and n_regions <= mesh.components.max() + 1:
-        labels = _merged_components(_without_ties(mesh), int(n_regions))
+    if n_regions is not None and n_regions <= main.sum():
+        labels = mesh.components
     else:
         n_regions = None if n_regions is None else int(n_regions)
         points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
         cluster = None
-        if n > max(sizes.DECIMATED, points):
+        if mesh.n_vertices > max(sizes.DECIMATED, points):
             shape, _, cluster = decimated(mesh, max(sizes.DECIMATED_POINTS, points))
         shape = _without_ties(shape)
         sampling = part(progress, 0.02, 0.1)
@@ -112,7 +127,7 @@ def segment(
     tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
-    regions = Regions.from_labels(mesh, labels, overlap)
+    regions = Regions.from_labels(whole, _with_others(whole, kept, labels, far), overlap)
     tell(progress, 1.0, "regions found")
     return regions
 
@@ -173,12 +188,36 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
     return labels
 
 
-def _merged_components(mesh: Mesh, n_regions: int) -> IntArray:
-    """Return one label per large component; the others join the one with the nearest centre."""
-    component, size = mesh.components, np.bincount(mesh.components)
-    sums = [np.bincount(component, mesh.vertices[:, axis]) for axis in range(3)]
-    centres = np.stack(sums, axis=1) / size[:, None]
-    large = np.sort(np.argsort(-size, kind="stable")[:n_regions])
-    nearest = np.linalg.norm(centres[:, None] - centres[large], axis=2).argmin(axis=1)
-    nearest[large] = np.arange(n_regions)
-    return np.asarray(nearest[component])
+def _main_components(mesh: Mesh, n_regions: int | None) -> tuple[BoolArray, BoolArray]:
+    """Return which components are segmented, and which others are small and far, (c,) bool each."""
+    main = np.ones(int(mesh.components.max()) + 1, dtype=bool)
+    far = np.zeros_like(main)
+    if len(main) == 1 or (n_regions is not None and n_regions >= len(main)):
+        return main, far
+    share = component_shares(mesh.vertex_areas, mesh.components)
+    main[np.argsort(-share, kind="stable")[n_regions or _SMALL :]] = False
+    if n_regions is None:
+        small = share < SMALL_COMPONENT
+        small[share.argmax()] = False
+        main &= ~small
+        far = small.copy()
+        far[mesh.components[attached(mesh.vertices, mesh.vertex_areas, mesh.components)[0]]] = False
+    return main, far
+
+
+def _with_others(mesh: Mesh, kept: IntArray, labels: IntArray, far: BoolArray) -> IntArray:
+    """Return the labels (n,) of all vertices, from those of the *kept* ones.
+
+    Other components have the label of the nearest of these, those that are *far* one of their own.
+    """
+    if len(kept) == mesh.n_vertices:
+        return labels
+    component, every = mesh.components, np.full(mesh.n_vertices, -1, dtype=np.int64)
+    every[kept] = labels
+    one, other, _ = nearest_pairs(
+        _without_ties(mesh).vertices, component, np.isin(np.arange(len(far)), component[kept])
+    )
+    of_component = np.empty(len(far), dtype=np.int64)
+    of_component[component[one]] = every[other]
+    of_component[far] = labels.max() + 1
+    return np.where(every < 0, of_component[component], every)
