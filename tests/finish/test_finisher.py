@@ -153,6 +153,19 @@ def test_components_without_places_stay_where_they_are(monkeypatch):
     assert_allclose(found.vertices[:n], one.finish().vertices, atol=1e-6)
 
 
+def test_a_body_in_the_way_that_nothing_holds_stays_where_it_is():
+    x, (ball, faces) = SCENE.mesh.vertices, icosphere(2)
+    start = np.concatenate([x, 0.4 * ball + [0.0, 0.9, 0.0]])
+    mesh = Mesh(start, np.concatenate([SCENE.mesh.faces, faces + len(x)]))
+    held = np.append(np.abs(x[:, 0]) > 2.4, np.zeros(len(ball), dtype=bool))
+    places = start.copy()
+    right = np.flatnonzero(held & (start[:, 0] > 0.0))  # pushed to the left: the middle bulges
+    places[right] = start[right] @ rotation([0, 0, 1], 0.6).T - [0.8, 0.0, 0.0]
+    found = Problem(mesh, held, places[held], start).finish()
+    assert not len(new_crossings(found.vertices, start, mesh.faces))
+    assert_array_equal(found.vertices[len(x) :], start[len(x) :])
+
+
 def test_all_vertices_held_are_put_in_their_places():
     mesh = SCENE.mesh
     places = mesh.vertices + 1.0

@@ -10,8 +10,11 @@ from scenes import sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform import sizes
+from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions.segmentation import segment
 from vtk_segdeform.solver import exact_volume
 from vtk_segdeform.solver.exact_volume import scale_to_volume
 from vtk_segdeform.solver.solution import Status
@@ -153,3 +156,25 @@ def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
     there = deformer.solve(TARGETS)
     assert_array_equal(there.vertices, here.vertices)
     assert deformer._constraints.scaled._gpu is None
+
+
+def test_bodies_whose_coarse_volume_vanishes_keep_theirs(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 40)
+    plate, faces = icosphere(2)
+    plate = plate * [1.5, 0.6, 0.05]  # a dozen points of both sides enclose nothing
+    count = 4
+    at = np.arange(count)[:, None, None] * [0.0, 1.0, 0.02]
+    vertices = (plate + at).reshape(-1, 3)
+    mesh = Mesh(vertices, (np.arange(count)[:, None, None] * len(plate) + faces).reshape(-1, 3))
+    deformer = Deformer(mesh, regions := segment(mesh, 1), fit_cages(mesh, regions, 40))
+    x = mesh.vertices
+    fixed, handle = np.flatnonzero(x[:, 0] < -1.0), np.flatnonzero(x[:, 0] > 1.0)
+    held = deformer.hold(fixed=fixed, handle=handle)
+    coarse = held.step_volumes.constraints
+    assert min(abs(each.target) for each in coarse) < 1e-3 * max(
+        abs(each.target) for each in coarse
+    )
+    solution = held.solve(x[handle] @ rotation([0.0, 1.0, 0.0], 0.5).T)
+    for body in held.preserved_volumes:
+        assert abs(body.relative(solution.vertices)) < 1e-13

@@ -69,6 +69,7 @@ from ..solver import (
     VolumeConstraint,
     Volumes,
     WeightContinuation,
+    are_met,
     connected_sets,
     errors_at,
     is_half_turn,
@@ -960,10 +961,23 @@ class Deformer:
             return self._map(self._p * size), 0.0
         if self._constraints.scaled is not None:
             return self._scaled(self._constraints.scaled)
+        preserved = self._constraints.preserved
+        x = self._moved_to_volume(preserved, directions)
+        if len(preserved) > 1 and not are_met(preserved, x):
+            # Of small bodies the coarse volumes, and so these directions, may vanish.
+            gradients = self.subspace.adjoints([each.gradient(x) / size for each in preserved])
+            x = self._moved_to_volume(preserved, self._constraints.solver.directions(gradients))
+        return x, 0.0
+
+    def _moved_to_volume(
+        self, preserved: Sequence[VolumeConstraint], directions: Sequence[FloatArray]
+    ) -> FloatArray:
+        """Move the cages along *directions* (m, 3) to the exact volumes; return the mesh."""
+        size = self._frame.size
         paths = self._map(self._p * size, [z * size for z in directions])
-        steps = steps_to_volume(self._constraints.preserved, paths)
+        steps = steps_to_volume(preserved, paths)
         self._p = self._p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
-        return moved_along(paths, steps), 0.0
+        return moved_along(paths, steps)
 
     def _scaled(self, surface: ScaledSurface) -> tuple[FloatArray, float]:
         """Scale the mesh and its cages to the exact volume; return the mesh and by how much."""

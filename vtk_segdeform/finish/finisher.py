@@ -120,7 +120,7 @@ class Finisher:
         free = anchored[mesh.components] & ~held
         self._mesh, self._energy = mesh, energy.near(free)
         self._crossings, self._avoid_contact = Crossings(mesh.vertices, mesh.faces), avoid_contact
-        self._held, self._free = held, np.flatnonzero(free)
+        self._held, self._stays, self._free = held, ~free, np.flatnonzero(free)
         rows = energy.laplacian[self._free]
         self._to_held = rows[:, np.flatnonzero(held)]
         self._solve = factored(rows[:, self._free], progress)
@@ -155,16 +155,15 @@ class Finisher:
         before = self._crossings.at(begin)
         crossing = least = self._grown(found.vertices, before)
         best, end, steps = found, found.vertices, found.steps
-        stays = np.zeros(len(begin), dtype=bool)
+        stays = self._stays
         for turn, (share, rings) in enumerate(_PARTLY):
             if not len(least):
                 break
-            stays |= around(self._mesh, crossing, rings)
+            stays = stays | around(self._mesh, crossing, rings)
             own = part(progress, *(0.5 * (turn + np.arange(2)) / len(_PARTLY)))
-            held = self._held | stays
-            places = begin[held] + share * (end[held] - begin[held])
-            places[self._held[held]] = end[self._held]
-            problem = Finisher(self._mesh, self._energy, held, self._constraints, own)
+            places = begin[stays] + share * (end[stays] - begin[stays])
+            places[self._held[stays]] = end[self._held]
+            problem = Finisher(self._mesh, self._energy, stays, self._constraints, own)
             found = problem._run(problem._at_places(end, places), own)
             steps += found.steps
             crossing = self._grown(found.vertices, before)
@@ -185,7 +184,7 @@ class Finisher:
         if apart is x or len(self._crossings.at(apart)):
             return apart
         for rings in _RELAXED:
-            held = self._held | around(self._mesh, crossing, rings)
+            held = self._stays | around(self._mesh, crossing, rings)
             problem = Finisher(self._mesh, self._energy, held, self._constraints, progress)
             relaxed = problem._run(apart, progress).vertices
             if not len(self._crossings.at(relaxed)):

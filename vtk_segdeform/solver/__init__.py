@@ -22,7 +22,7 @@ from .anderson import Anderson
 from .barrier import Barrier
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
-from .exact_volume import ScaledSurface, moved_along, steps_to_volume
+from .exact_volume import ScaledSurface, are_met, moved_along, steps_to_volume
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
@@ -56,6 +56,7 @@ __all__ = [
     "VolumeConstraint",
     "Volumes",
     "WeightContinuation",
+    "are_met",
     "connected_sets",
     "errors_at",
     "is_half_turn",

@@ -25,6 +25,7 @@ from .volume_constraints import VolumeConstraint
 _log = logging.getLogger(__name__)
 _NEWTON_STEPS = 8
 _EXACT = 1e-15  # error of a volume, as a share of all
+_MET = 1e-13  # the same, for telling whether the directions were good enough
 _SMALL = 1e-6  # error below which the derivatives of the last step are near enough
 _CACHED = 1 << 14  # vertices moved together
 _SHARES = 4  # of a mesh that threads scale; smaller ones take less time than waking a thread
@@ -53,6 +54,12 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
         t += np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
         here, before = moved_along(paths, t), error
     return t
+
+
+def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
+    """Return whether the vertices *x* (n, 3) meet all constraints, up to a few roundings."""
+    unit = sum(abs(constraint.target) for constraint in constraints)
+    return all(abs(each.violation(x)) <= _MET * unit for each in constraints)
 
 
 def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:

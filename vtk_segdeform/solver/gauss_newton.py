@@ -398,6 +398,10 @@ class GaussNewton:
         forces[:, : len(rows)] = rows.T
         return np.asarray(rows @ self._factor.solve(forces)[:, : len(rows)])
 
+    def directions(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return H^-1 of each of *rows* (m, 3), with the H of (21): volumes change most that way."""
+        return self._factor.solve_all([np.asarray(row) for row in rows])
+
     def steadying(self, p: FloatArray, least: float) -> float:
         """Return the weight of anchors over the surface that make *p* a firm minimum.
 
