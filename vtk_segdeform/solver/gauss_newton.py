@@ -399,7 +399,7 @@ class GaussNewton:
         return np.asarray(rows @ self._factor.solve(forces)[:, : len(rows)])
 
     def directions(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return H^-1 of each of *rows* (m, 3), with the H of (21): volumes change most that way."""
+        """Return H^-1 of *rows* (m, 3) each, with the H of (21), as directions of volumes."""
         return self._factor.solve_all([np.asarray(row) for row in rows])
 
     def steadying(self, p: FloatArray, least: float) -> float:
