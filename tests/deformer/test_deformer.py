@@ -184,7 +184,7 @@ def test_a_reset_discards_the_running_state():
     deformer.solve(SCENE.turned(20), max_steps=3)
     deformer.solve(SCENE.turned(10), max_steps=3)
     deformer.reset()
-    again, anew = deformer.solve(SCENE.turned(20)), SCENE.deformer().solve(SCENE.turned(20))
+    again, anew = deformer.solve(SCENE.turned(20)), SCENE.held().solve(SCENE.turned(20))
     assert again.steps == anew.steps
     assert_array_equal(again.vertices, anew.vertices)
 
