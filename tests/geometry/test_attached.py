@@ -1,11 +1,13 @@
-"""Small components near a large one are attached to it, where they are nearest."""
+"""Small components near a large one are attached to it; those of a part are joined."""
+
+import itertools
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from solids import icosphere, rotation
 
-from vtk_segdeform.geometry import attached
+from vtk_segdeform.geometry import attached, joints
 from vtk_segdeform.mesh import Mesh
 
 BALL, FACES = icosphere(2)
@@ -53,3 +55,23 @@ def test_what_is_attached_does_not_depend_on_the_frame(scale):
     moved = mesh.with_vertices(scale * (mesh.vertices @ turn.T + [5.0, -7.0, 2.0]))
     for expected, found in zip(pairs(mesh), pairs(moved), strict=True):
         assert_array_equal(expected, found)
+
+
+def test_the_components_of_a_part_are_joined_into_one_each_to_its_nearest():
+    radii = [1.0, 0.8, 0.9, 0.05, 0.05, 0.7]
+    at = np.array([[0, 0, 0], [2.0, 0, 0], [4.0, 0, 0], [1.2, 0, 0], [4.0, 1.0, 0], [0, 0, 9.0]])
+    pieces = [r * BALL + place for r, place in zip(radii, at, strict=True)]
+    starts = len(BALL) * np.arange(len(at))
+    mesh = Mesh(np.concatenate(pieces), np.concatenate([FACES + start for start in starts]))
+    part = np.where(mesh.components == 5, 1, 0)
+    one, other = joints(mesh.vertices, mesh.vertex_areas, mesh.components, part)
+    found = set(zip(mesh.components[one], mesh.components[other], strict=True))
+    # 2 to 0, as 1 between them is smaller; the small ones to any large one.
+    assert found == {(2, 0), (1, 0), (3, 1), (4, 2)}
+    apart = {
+        pair: np.linalg.norm(pieces[pair[0]][:, None] - pieces[pair[1]], axis=2).min()
+        for pair in itertools.permutations(range(5), 2)
+    }
+    for i, j in zip(one, other, strict=True):
+        pair = int(mesh.components[i]), int(mesh.components[j])
+        assert np.linalg.norm(mesh.vertices[i] - mesh.vertices[j]) == pytest.approx(apart[pair])

@@ -433,7 +433,7 @@ TARGETS = [
     Creature("as lists", lambda: _there().tolist()),
     Creature("in single precision", lambda: _there().astype(np.float32)),
     Creature("ten sizes away", lambda: _there() + [60.0, 0, 0]),
-    Creature("a hundred sizes away", lambda: _there() + [0, 600.0, 0], "more than 10 mesh diagonals away"),
+    Creature("a hundred sizes away", lambda: _there() + [0, 600.0, 0], "same unit|more than 10 mesh diagonals away"),
     Creature("mirrored", lambda: _there() * [1.0, -1.0, 1.0]),
     Creature("rotated by 180 degrees", lambda: _there() * [1.0, -1.0, -1.0]),
     Creature("on the other side of the body", lambda: _there() * [-1.0, 1.0, -1.0]),

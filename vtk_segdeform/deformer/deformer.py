@@ -353,7 +353,8 @@ class Deformer:
         at_origin = self._frame.about_origin(mesh.vertices)
         self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
         self._enclose()
-        self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume)
+        of_component, _ = self._linked_parts
+        self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume, of_component)
         self._constrain(fixed, handle)
         if compiled_kernels(mesh.n_vertices):
             tell(progress, _BOUND, "taking a trial step")
@@ -1116,6 +1117,8 @@ class Deformer:
     def _linked_parts(self) -> tuple[IntArray, IntArray]:
         """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
         component = self.mesh.components
+        if not component.any():
+            return np.zeros(1, dtype=np.int64), np.zeros(self.regions.n_regions, dtype=np.int64)
         count = int(component.max()) + 1
         pairs = [np.unique(component[members]) for members in self.regions.membership]
         region = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])

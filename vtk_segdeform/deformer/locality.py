@@ -13,8 +13,8 @@ distance move it a fifth as much, and the smaller ones nearby take fewer steps o
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
 
-Small components near a large one, such as buttons, are joined to it where they are nearest, and so
-come along.
+Components that share a region, such as a coat and its buttons, move with the same cage.  So they
+are joined where they are nearest, and come along.
 
 The samples are the cells of the coarse volume, or the vertices of a small mesh, and distances are
 along the edges between them, so a press takes some milliseconds whatever the size of the mesh; to
@@ -56,7 +56,7 @@ from scipy import linalg, sparse
 from scipy.sparse import csgraph
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import attached, faces_between
+from ..geometry import faces_between, joints
 from ..mesh import Mesh
 from ..solver import CoarseVolume, ContactSurface
 
@@ -123,6 +123,8 @@ class SurfaceSamples:
         Lengths of the edges between them.
     rest : Mesh, optional
         The surface.
+    parts : (s,) int, optional
+        The part of each: components of the same part move together.  None: each alone.
     """
 
     cells: IntArray
@@ -132,10 +134,14 @@ class SurfaceSamples:
     faces: IntArray
     edges: sparse.csr_array
     rest: Mesh | None = None
+    parts: IntArray | None = None
 
     @classmethod
-    def of(cls, rest: Mesh, coarse: CoarseVolume) -> SurfaceSamples:
-        """Return the samples of a mesh at *rest* with its *coarse* volume."""
+    def of(cls, rest: Mesh, coarse: CoarseVolume, parts: IntArray) -> SurfaceSamples:
+        """Return the samples of a mesh at *rest* with its *coarse* volume.
+
+        *parts* (c,) are those of its components.
+        """
         n = rest.n_vertices
         cells, faces, points = np.arange(n), rest.faces, rest.vertices
         if coarse.cells is not None and coarse.shares is not None:
@@ -149,7 +155,11 @@ class SurfaceSamples:
         lengths = np.linalg.norm(points[near.row] - points[near.col], axis=1)
         edges = sparse.coo_array((lengths, (near.row, near.col)), (count, count)).tocsr()
         rows = coarse.surface.at(np.arange(count))
-        return cls(cells, rows, points, areas / areas.sum(), faces, edges, rest)
+        of_sample = None
+        if len(parts) > 1:
+            of_sample = np.empty(count, dtype=np.int64)
+            of_sample[cells] = parts[rest.components]
+        return cls(cells, rows, points, areas / areas.sum(), faces, edges, rest, of_sample)
 
     @cached_property
     def contact_surface(self) -> ContactSurface:
@@ -167,13 +177,15 @@ class SurfaceSamples:
 
     @cached_property
     def _joined(self) -> sparse.csr_array:
-        """The edges, and one to the nearest sample for each small component; see `attached`."""
+        """The edges, and those between the nearest samples of components that move together."""
+        if self.parts is None:
+            return self.edges
         _, component = csgraph.connected_components(self.edges, directed=False)
-        one, other = attached(self.points, self.areas, component)
+        one, other = joints(self.points, self.areas, component, self.parts)
         gap = np.linalg.norm(self.points[one] - self.points[other], axis=1)
         least = np.finfo(float).tiny  # csgraph reads a zero as "no edge"
-        joints = sparse.coo_array((np.maximum(gap, least), (one, other)), self.edges.shape)
-        return sparse.csr_array(self.edges + joints)
+        more = sparse.coo_array((np.maximum(gap, least), (one, other)), self.edges.shape)
+        return sparse.csr_array(self.edges + more)
 
     def distances(self, vertex: int) -> FloatArray:
         """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""

@@ -10,7 +10,7 @@ The files, in reading order:
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     decimation      a mesh with one vertex for each cluster of neighbours
-    attached        small components that belong to another one
+    attached        components that belong together
     normals         vertex normals for drawing
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
@@ -18,7 +18,7 @@ The files, in reading order:
     up_axis         a guess of the axis that points up
 """
 
-from .attached import SMALL_COMPONENT, attached, component_shares, nearest_pairs
+from .attached import SMALL_COMPONENT, attached, component_shares, joints, nearest_pairs
 from .decimation import decimated
 from .differential import (
     area_gradients,
@@ -69,6 +69,7 @@ __all__ = [
     "guess_up_axis",
     "inner_balls",
     "inner_vertices",
+    "joints",
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",

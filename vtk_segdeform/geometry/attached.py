@@ -1,10 +1,13 @@
-"""Small components that belong to another one: buttons, teeth, screws.
+"""Components that belong together: a coat and its buttons, a jaw and its teeth.
 
-A component is attached to the nearest large one if it is smaller than the smallest limb that the
-segmentation looks for, and near: it has no region of its own, and a pull takes it along.
+A component is *attached* to the nearest large one if it is smaller than the smallest limb that the
+segmentation looks for, and near: it has no region of its own.  The components of a *part*, those
+that share regions, are joined where they are nearest, so that distances along the surface go on.
 """
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -39,6 +42,41 @@ def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> tupl
     one, other, gap = nearest_pairs(points, component, large)
     near = gap <= _NEAR * float(np.linalg.norm(np.ptp(points, axis=0)))
     return one[near], other[near]
+
+
+def joints(
+    points: FloatArray, areas: FloatArray, component: IntArray, part: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return the nearest pairs of points that join the components of each part.
+
+    A large component is joined to the nearest larger one, a small one to the nearest large one.
+
+    Parameters
+    ----------
+    points, areas, component
+        As above.
+    part : (n,) int
+        The same at all points of a component.
+
+    Returns
+    -------
+    one, other : (k,) int
+        One pair less than a part has components.
+    """
+    share = component_shares(areas, component)
+    part_of, order = np.empty(len(share), dtype=np.int64), np.argsort(-share, kind="stable")
+    part_of[component] = part
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    for own in (order[part_of[order] == k] for k in np.unique(part)):
+        n_large = max(1, np.count_nonzero(share[own] >= SMALL_COMPONENT))
+        for larger, end in itertools.pairwise([*range(1, n_large + 1), len(own)]):
+            if larger < end:
+                some = np.flatnonzero(np.isin(component, own[:end]))
+                is_larger = np.isin(np.arange(len(share)), own[:larger])
+                one, other, _ = nearest_pairs(points[some], component[some], is_larger)
+                pairs.append(np.stack([some[one], some[other]]))
+    one, other = np.concatenate(pairs, axis=1)
+    return one, other
 
 
 def component_shares(areas: FloatArray, component: IntArray) -> FloatArray:
