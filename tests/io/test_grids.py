@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 from test_vtk_xml import contents
 from vtkmodules.vtkCommonCore import vtkFloatArray, vtkIdTypeArray, vtkStringArray
 
+from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.surface import Surface
 
@@ -102,3 +103,34 @@ def test_the_types_of_other_cells_are_not_used(tmp_path):
     types[types == 9] = 5  # not of four corners
     write_mesh(tmp_path / "c.vtu", surface)
     assert sorted(pv.read(tmp_path / "c.vtu").celltypes) == [1, 2, 3, 4, *[5] * 4, 6, *[9] * 7]
+
+
+@pytest.mark.parametrize("sort", [pv.StructuredGrid, pv.RectilinearGrid, pv.ImageData])
+@pytest.mark.parametrize("binary", [True, False])
+def test_structured_grids_of_two_dimensions_are_quads(tmp_path, sort, binary):
+    x, y = np.linspace(0.0, 3.0, 7), np.linspace(0.0, 1.0, 5)
+    made = {
+        pv.StructuredGrid: lambda: pv.StructuredGrid(*np.meshgrid(x, y, [0.5], indexing="ij")),
+        pv.RectilinearGrid: lambda: pv.RectilinearGrid(x, y, [0.5]),
+        pv.ImageData: lambda: pv.ImageData(
+            dimensions=(7, 5, 1), spacing=(0.5, 0.25, 1.0), origin=(0.0, 0.0, 0.5)
+        ),
+    }[sort]()
+    made.point_data["place"] = np.arange(35)
+    made.cell_data["number"] = np.arange(24)
+    made.save(tmp_path / "a.vtk", binary=binary)
+    surface = Surface.read(tmp_path / "a.vtk")
+    assert (surface.mesh.n_vertices, surface.mesh.n_faces) == (35, 48)
+    assert surface.given.area == pytest.approx(3.0, rel=1e-6)
+    surface.write(tmp_path / "b.vtk", surface.mesh.vertices + [0.0, 0.0, 1.0])
+    back = pv.read(tmp_path / "b.vtk")
+    assert set(back.celltypes) == {9}
+    assert_array_equal(back["place"], made["place"])
+    assert_array_equal(back["number"], made["number"])
+    assert_array_equal(back.points[:, 2], 1.5)
+
+
+def test_grids_of_three_dimensions_say_what_to_do(tmp_path):
+    pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "a.vtk")
+    with pytest.raises(MeshError, match=r"a\.vtk: .* extract its surface first"):
+        Surface.read(tmp_path / "a.vtk")

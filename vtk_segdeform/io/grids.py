@@ -20,6 +20,7 @@ from ..mesh import ragged_arange
 from .array_names import CELL_TYPES
 from .polygons import polydata_of
 
+_PIXEL, _QUAD = 8, 9
 # VTK's types of the cells of a grid, by where PolyData has them.
 _KINDS = {"verts": (1, 2), "lines": (3, 4), "faces": (5, 7, 9), "strips": (6,)}
 _SIZES = {1: 1, 3: 2, 5: 3, 9: 4}  # numbers of corners of types for which there is one
@@ -29,16 +30,21 @@ def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.Poly
     """Return the surface cells of a *grid* as a PolyData; empty if there are no polygons.
 
     The types are stored if a grid that is made from the result would have others, or another order.
-    With *only_as_grid* they are always stored, because the format has PolyData as well.
+    With *only_as_grid* they are always stored, because the format has PolyData as well.  Pixels, whose
+    sides are parallel to axes, become quads, which may bend.
     """
     types = grid.celltypes
+    starts, corners = _rows(grid.GetCells())
+    if len(pixels := np.flatnonzero(types == _PIXEL)):
+        types, corners = np.where(types == _PIXEL, _QUAD, types), corners.copy()
+        third = starts[pixels] + 2
+        corners[third], corners[third + 1] = corners[third + 1], corners[third]
     if not set(types.tolist()) <= {each for kind in _KINDS.values() for each in kind}:
         raise MeshError(
             "contains cells other than triangles and polygons; extract its surface first"
         )
     if not np.isin(types, (*_KINDS["faces"], *_KINDS["strips"])).any():
         return pv.PolyData()
-    starts, corners = _rows(grid.GetCells())
     order, points = _order(types), np.asarray(grid.points, dtype=float)
     if np.isin(types, _KINDS["faces"]).all():
         surface = polydata_of(points, np.diff(starts), corners)

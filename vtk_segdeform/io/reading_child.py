@@ -30,6 +30,9 @@ _WRITERS = {
     "vtkPolyData": (".vtp", "vtkXMLPolyDataWriter"),
     "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
 }
+_STRUCTURED = (
+    "vtkStructuredGrid", "vtkRectilinearGrid", "vtkStructuredPoints", "vtkImageData",
+)  # fmt: skip
 _REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
 # In VTK's messages.  The second is only a warning, but missing numbers are returned as zeros.
 _FAILURE = re.compile(r"ERROR:|Error reading")
@@ -67,6 +70,8 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
             _require_whole(type(reader)(), data, own)
             core.vtkOutputWindow.SetInstance(window)
         for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
+            if piece.GetClassName() in _STRUCTURED:
+                piece = _unstructured(piece)
             _write_piece(piece, folder / str(number), writers)
             if _FAILURE.search(window.GetOutput()):
                 raise ValueError(window.GetOutput())
@@ -96,6 +101,16 @@ def _require_whole(reader: Any, data: bytes, window: Any) -> None:
     reader.Update()
     if _END.decode() not in window.GetOutput():
         raise ValueError("its numbers do not fit their counts: it is damaged, or was cut off")
+
+
+def _unstructured(grid: Any) -> Any:
+    """Return the cells of a structured *grid*: of two dimensions, quads and pixels."""
+    append = importlib.import_module("vtkmodules.vtkFiltersCore").vtkAppendFilter()
+    append.SetInputData(grid)
+    append.Update()
+    cells = append.GetOutput()
+    cells.GetFieldData().ShallowCopy(grid.GetFieldData())
+    return cells
 
 
 def _write_piece(piece: Any, path: Path, writers: Any) -> None:
