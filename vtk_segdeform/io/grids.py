@@ -30,8 +30,8 @@ def surface_of_grid(grid: pv.UnstructuredGrid, *, only_as_grid: bool) -> pv.Poly
     """Return the surface cells of a *grid* as a PolyData; empty if there are no polygons.
 
     The types are stored if a grid that is made from the result would have others, or another order.
-    With *only_as_grid* they are always stored, because the format has PolyData as well.  Pixels, whose
-    sides are parallel to axes, become quads, which may bend.
+    With *only_as_grid* they are always stored, because the format has PolyData as well.  Pixels,
+    whose sides are parallel to axes, become quads, which may bend.
     """
     types = grid.celltypes
     starts, corners = _rows(grid.GetCells())
