@@ -156,9 +156,13 @@ def shell_depths(
         for one in inside:
             points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
             extremes.append(points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])])
-        begins = np.cumsum([0, *map(len, extremes[:-1])])
-        is_inside = _surrounded(np.concatenate(extremes), vertices[owned], its_faces)
-        depth[inside] += np.logical_and.reduceat(is_inside, begins)
+        firsts = np.array([points[0] for points in extremes])
+        left = np.flatnonzero(_surrounded(firsts, vertices[owned], its_faces))  # few, if any
+        if len(left):
+            begins = np.cumsum([0, *(len(extremes[k]) for k in left[:-1])])
+            others = np.concatenate([extremes[k] for k in left])
+            is_inside = _surrounded(others, vertices[owned], its_faces)
+            depth[inside[left]] += np.logical_and.reduceat(is_inside, begins)
     return depth
 
 
