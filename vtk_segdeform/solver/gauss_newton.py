@@ -73,6 +73,7 @@ from .volume_constraints import Volumes
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
+_MOST_RAISES = 4  # of the damping, to ten times as much each
 _SHORTEST = 1.0 / 64.0  # least epsilon of section 3.3
 _SHORTEST_ACTIVE = 1.0 / 4096.0  # the same while a term is active
 # Step lengths, root mean square over the surface of a mesh of size 1:
@@ -251,13 +252,17 @@ class GaussNewton:
         # near zero) leave H singular.  A share of the identity damps the step there; d, and with
         # it every stationary point, stays the same.
         trace = np.trace(hessian) / len(hessian)
-        damping = np.diag(np.full(len(hessian), _DAMPING * trace))
+        share = np.eye(len(hessian))
         if not len(self.positions.rows):  # without positions rounding would move the whole mesh
             mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
-            damping += trace * (mean @ mean.T) / np.vdot(mean, mean)
-        self._hessian = hessian + damping
-        factor = quadratic_factor(self._hessian)
-        if factor is None:
+            share += mean @ mean.T / (_DAMPING * np.vdot(mean, mean))
+        # Needles may leave H slightly indefinite.
+        for damping in _DAMPING * 10.0 ** np.arange(_MOST_RAISES + 1):
+            self._hessian = hessian + damping * trace * share
+            factor = quadratic_factor(self._hessian)
+            if factor is not None:
+                break
+        else:
             raise CageError(
                 "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
