@@ -51,7 +51,11 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
         if jacobian is None or error > _SMALL * unit:
             gradients = [c.gradient(here) for c in constraints]
             jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
-        t += np.linalg.lstsq(jacobian, -g, rcond=1e-12)[0]
+        # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
+        scale = np.sqrt(np.abs(np.diag(jacobian)))
+        scale[scale == 0.0] = 1.0
+        scaled = jacobian / scale[:, None] / scale
+        t += np.linalg.lstsq(scaled, -g / scale, rcond=1e-12)[0] / scale
         here, before = moved_along(paths, t), error
     return t
 
