@@ -14,7 +14,7 @@ from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 from vtk_segdeform.cages import fit
 from vtk_segdeform.cages.cage import Cage, cage_faults
 from vtk_segdeform.cages.contour import contour_surface
-from vtk_segdeform.cages.fit import fit_cage, fit_cages
+from vtk_segdeform.cages.fit import fit_cage, fit_cages, suggested_size
 from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
 from vtk_segdeform.cages.simplify import roundness, simplify
 from vtk_segdeform.cages.spacing import thickness
@@ -365,3 +365,16 @@ def test_too_many_cage_vertices_are_an_error_before_any_work():
     with pytest.raises(CageError, match=r"300 regions need 2400 .* use 200 regions or fewer"):
         fit_cages(mesh, many, 3000, progress=progress)
     assert reports == []
+
+
+def test_regions_that_are_parts_get_twice_as_many_cage_vertices_as_whole_bodies():
+    ball, faces = icosphere(1)
+    at = 3.0 * np.stack(np.unravel_index(np.arange(12), (3, 2, 2)), axis=1)
+    every = (np.arange(12)[:, None, None] * len(ball) + faces).reshape(-1, 3)
+    balls = Mesh((at[:, None] + ball).reshape(-1, 3), every)
+    bodies = Regions(balls, balls.components == np.arange(12)[:, None])
+    assert suggested_size(bodies) == 12 * 15
+    halves = np.array([ball[:, 0] < 0.3, ball[:, 0] > -0.3])
+    masks = [np.kron(np.arange(12) == k, half) for k in range(12) for half in halves]
+    assert suggested_size(Regions(balls, np.array(masks, dtype=bool))) == 24 * 30
+    assert suggested_size(Regions.single(balls)) == 155

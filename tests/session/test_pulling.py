@@ -409,6 +409,35 @@ def test_small_parts_near_the_grabbed_one_come_along():
     assert np.linalg.norm(moved[starts[2]]) < 0.05
 
 
+def pipe(wall: float, around: int = 40, along: int = 24) -> Mesh:
+    """Return a pipe of length 4 and radius 1 with a thin *wall*, closed at its rims."""
+    z = np.linspace(-2.0, 2.0, along)
+    outline = np.concatenate([np.stack([0 * z + 1.0, z], 1), np.stack([0 * z + 1 - wall, -z], 1)])
+    turn = 2.0 * np.pi * np.arange(around) / around
+    radius, height = np.broadcast_arrays(outline[:, :1], turn), outline[:, 1:] + 0.0 * turn
+    points = np.stack([radius[0] * np.cos(turn), radius[0] * np.sin(turn), height], axis=-1)
+    n = len(outline)
+    i, j = (each.ravel() for each in np.meshgrid(np.arange(n), np.arange(around), indexing="ij"))
+    a, b = i * around + j, i * around + (j + 1) % around
+    c, d = (i + 1) % n * around + (j + 1) % around, (i + 1) % n * around + j
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return Mesh(points.reshape(-1, 3), faces)
+
+
+@pytest.mark.parametrize("locality", [0.2, 1.0])
+def test_the_two_sides_of_a_thin_wall_go_together(locality):
+    session = Session(pipe(0.04))
+    session.segment()
+    session.fit_cages()
+    x = session.mesh.vertices
+    grabbed = int(np.argmax(x[:, 0] - 0.1 * np.abs(x[:, 2])))
+    inner = int(np.argmin(np.linalg.norm(x - x[grabbed] + [0.04, 0.0, 0.0], axis=1)))
+    session.pull(grabbed, x[grabbed] + [0.5, 0.0, 0.0], locality=locality)
+    moved = session.vertices - x
+    assert moved[inner, 0] > 0.35  # 0.001 or 0.04 if each side is held where it is
+    assert np.linalg.norm(moved, axis=1).max() < 0.75
+
+
 def _volumes(session: Session):
     state = session.state
     bound = Deformer(session.mesh, state.regions, state.cages, handle=state.handle)

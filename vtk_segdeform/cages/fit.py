@@ -52,7 +52,7 @@ _ROUND, _NEAR = 0.2, 0.2  # least roundness, and distance in offsets, of a good 
 _NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
 _FEWER = 3.0  # by which nodes are fewer if spacing varies: half the time, and as good poses
 _FEWEST = 8  # vertices of a cage
-_SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each region
+_SUGGESTED, _SUGGESTED_EACH, _SUGGESTED_ALONE = 155, 30, 15  # cage vertices in total, and each
 _SHELL = 6  # fewest vertices of each component of a cage with several
 _FLOOR = 12  # vertices of each cage before the rest is distributed
 _CLOSE, _WIDEST = 0.05, 11.9  # quantile of spacings that is the unit; largest, in that unit
@@ -68,12 +68,25 @@ _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)])
 _log = logging.getLogger(__name__)
 
 
-@one_blas_thread()
 def suggested_size(regions: Regions) -> int:
-    """Return a total number of cage vertices for *regions*: 155, or 30 each if that is more."""
-    return min(max(_SUGGESTED, _SUGGESTED_EACH * regions.n_regions), MOST_CAGE_VERTICES)
+    """Return a total number of cage vertices for *regions*, at least 155.
+
+    30 for each region that is a part of something, such as a limb, and 15 for one that bends by
+    itself, such as one of many stones.
+    """
+    component = regions.mesh.components
+    has = np.array(
+        [
+            np.bincount(component[members], minlength=1 + component.max()) > 0
+            for members in regions.membership
+        ]
+    )
+    is_part = (has & (has.sum(axis=0) > 1)).any(axis=1)
+    size = _SUGGESTED_EACH * is_part.sum() + _SUGGESTED_ALONE * (~is_part).sum()
+    return int(min(max(_SUGGESTED, size), MOST_CAGE_VERTICES))
 
 
+@one_blas_thread()
 def fit_cages(
     mesh: Mesh,
     regions: Regions,
