@@ -181,7 +181,7 @@ class SurfaceSamples:
     @cached_property
     def _joined(self) -> sparse.csr_array:
         """The edges, and lines between samples that move together without an edge."""
-        _, component = csgraph.connected_components(self.edges, directed=False)
+        component = csgraph.connected_components(self.edges, directed=False)[1].astype(np.int64)
         pairs = [self._across_walls(component)]
         if self.parts is not None:
             pairs.append(np.stack(joints(self.points, self.areas, component, self.parts)))

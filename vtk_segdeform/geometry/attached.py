@@ -68,7 +68,7 @@ def joints(
     part_of[component] = part
     pairs = [np.empty((2, 0), dtype=np.int64)]
     for own in (order[part_of[order] == k] for k in np.unique(part)):
-        n_large = max(1, np.count_nonzero(share[own] >= SMALL_COMPONENT))
+        n_large = max(1, int(np.count_nonzero(share[own] >= SMALL_COMPONENT)))
         for larger, end in itertools.pairwise([*range(1, n_large + 1), len(own)]):
             if larger < end:
                 some = np.flatnonzero(np.isin(component, own[:end]))
@@ -82,7 +82,7 @@ def joints(
 def component_shares(areas: FloatArray, component: IntArray) -> FloatArray:
     """Return the share of each component in the area, (c,), rounded: equal ones are equal."""
     area = np.bincount(component, areas)
-    return np.round(area / area.sum(), 9)
+    return np.asarray(np.round(area / area.sum(), 9))
 
 
 def nearest_pairs(
@@ -95,7 +95,7 @@ def nearest_pairs(
     is_large = large[component]
     there, here = np.flatnonzero(is_large), np.flatnonzero(~is_large)
     tree = cKDTree(points[there], compact_nodes=False, balanced_tree=False)
-    away, nearest = tree.query(points[here])
+    away, nearest = (np.asarray(each) for each in tree.query(points[here]))
     order = np.lexsort((away, component[here]))
     _, first = np.unique(component[here[order]], return_index=True)
     chosen = order[first]
