@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import gc
-import resource
-import sys
 
 import pytest
 from monkey import Monkey
+from soaking import resident
 
 
 @pytest.mark.parametrize(
@@ -22,15 +21,15 @@ from monkey import Monkey
 )
 def test_random_events_preserve_the_volume(seed, count, tmp_path):
     monkey = Monkey(seed, tmp_path)
-    unit = 1024 if sys.platform == "linux" else 1
     half = 0
     for k in range(count):
         monkey.act()
         if k == count // 2:
             gc.collect()
-            half = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit
+            half = resident()
     monkey.release_all()
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit - half
+    gc.collect()
+    grown = resident() - half
     print(
         f"seed {seed}: {count} events, {monkey.frames} frames, {monkey.posed} of them deformed, "
         f"{monkey.pulled} with pulls, {monkey.pinned} pins, {monkey.turned} events of turns, "
