@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray, as_numbers, is_number
+from ..arrays import BoolArray, FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
@@ -115,6 +115,7 @@ _VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_DRAG = 1e-3  # of a part that is free to turn, in traces of the energy of its region
 _LOOSE = 1e-4  # weight of the anchors of a loose component, times the scale of the energy
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
@@ -433,7 +434,7 @@ class Deformer:
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
         near = vertex, float(reach) / self._frame.size, follows
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
-        quadratic = weight * self._samples.quadratic(*near)
+        quadratic = weight * self._samples.quadratic(*near) + self._drag_of(*near)
         before, p = self._constraints.solver, self._p
         if before.positions.anchors is not None:
             quadratic += before.positions.anchors.quadratic
@@ -469,6 +470,20 @@ class Deformer:
         other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
         other._begin(p, self._targets)
         return other
+
+    def _drag_of(self, vertex: int, reach: float, follows: float) -> FloatArray:
+        """Return the quadratic (m, m) of a weak drag, if all of the grabbed part is free to move.
+
+        It would turn about the grabbed point without any resistance.
+        """
+        samples, energy = self._samples, self._binding.energy
+        near = np.isfinite(samples.distances(vertex))
+        if not np.isfinite(reach) or samples.weights(vertex, reach, follows)[near].any():
+            return np.zeros_like(energy.quadratic)
+        traces = self._traces[self.regions.membership[:, vertex]]
+        weight = _DRAG * float(traces.min()) * samples.areas[near] / samples.areas[near].sum()
+        rows = samples.rows[near]
+        return np.asarray((rows.T * weight) @ rows)
 
     def _with_flat_rings(
         self, anchors: Anchors, spread: float
@@ -1097,33 +1112,47 @@ class Deformer:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
 
         Nothing determines where they are.  Those that share no region with other components stay.
-        The others follow these; the anchors are so weak that they only prevent drifting.
+        The others follow these; the anchors are so weak, compared with the energy of the least
+        region that they are in, that they only prevent drifting.
         """
         of_component, of_region = self._linked_parts
-        component, samples, scale = self.mesh.components, self._samples, self._binding.energy.scale
+        component, samples, energy = self.mesh.components, self._samples, self._binding.energy
         has_ids = np.zeros(len(of_component), dtype=bool)
         has_ids[component[ids]] = True
         stays = ~np.isin(of_region, of_component[has_ids])
         own = [len(cage.vertices) for cage in self.cages]
-        quadratic = np.diag(np.where(np.repeat(stays, own), scale, 0.0))
+        quadratic = np.diag(np.where(np.repeat(stays, own), energy.scale, 0.0))
+        least = np.where(self._in_regions, self._traces[:, None], np.inf).min(axis=0)
         of_sample = np.empty(len(samples.points), dtype=np.int64)
         of_sample[samples.cells] = component
         loose = ~has_ids[of_sample]
-        weight = _LOOSE * scale / np.bincount(of_sample)[of_sample[loose]]
+        weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
         rows = samples.rows[loose]
         return np.asarray(quadratic + (rows.T * weight) @ rows)
 
     @cached_property
     def _linked_parts(self) -> tuple[IntArray, IntArray]:
         """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
-        component = self.mesh.components
-        if not component.any():
-            return np.zeros(1, dtype=np.int64), np.zeros(self.regions.n_regions, dtype=np.int64)
-        count = int(component.max()) + 1
-        pairs = [np.unique(component[members]) for members in self.regions.membership]
-        region = np.repeat(np.arange(len(pairs)), [len(each) for each in pairs])
-        part = connected(count + len(pairs), np.concatenate([_NONE, *pairs]), count + region)
+        region, component = np.nonzero(self._in_regions)
+        n_regions, count = self._in_regions.shape
+        part = connected(count + n_regions, component, count + region)
         return part[:count], part[count:]
+
+    @property
+    def _traces(self) -> FloatArray:
+        """The trace of the energy in the cage vertices of each region, (r,)."""
+        starts = np.cumsum([0, *(len(cage.vertices) for cage in self.cages[:-1])])
+        return np.add.reduceat(np.diag(self._binding.energy.quadratic), starts)
+
+    @cached_property
+    def _in_regions(self) -> BoolArray:
+        """Whether each region has vertices of each component of the mesh, (r, c) bool."""
+        component = self.mesh.components
+        count = int(component.max()) + 1
+        if count == 1:
+            return np.ones((self.regions.n_regions, 1), dtype=bool)
+        masks = self.regions.membership
+        return np.array([np.bincount(component[each], minlength=count) > 0 for each in masks])
 
     def _anchors(self, surface: ScaledSurface | None, fixed_at: FloatArray) -> FloatArray:
         """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.
