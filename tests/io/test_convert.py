@@ -282,7 +282,7 @@ def test_errors_say_what_is_wrong_with_the_file(tmp_path):
     with pytest.raises(MeshError, match="other than triangles"):
         read_mesh(tmp_path / "a.vtu")
     pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
-    with pytest.raises(MeshError, match="not a surface"):
+    with pytest.raises(MeshError, match="extract its surface first"):
         read_mesh(tmp_path / "image.vtk")
     with pytest.raises(MeshError, match=r"\.jpg files cannot be written"):
         write_mesh(tmp_path / "a.jpg", shuffled())

@@ -494,6 +494,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
     "Mesh.of.search": lambda: Search(*as_soup(mesh().vertices, mesh().faces)),
+    "Mesh.of_components.which": lambda: [0],
     "Surface.moved.vertices": lambda: given().mesh.vertices,
     "Surface.read.path": lambda: _file("mesh.ply"),
     "Surface.targets_at.points": lambda: [0, 5],

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import BoolArray, FloatArray, IntArray, as_points, bounds_of, frozen
+from ..arrays import FloatArray, IntArray, as_ids, as_points, bounds_of, frozen
 from ..checks import require
 from ..errors import MeshError
 from ..freezing import Frozen, read_only
@@ -214,12 +214,17 @@ class Mesh(Frozen):
         frozen(areas)
         return areas
 
-    def of_components(self, which: BoolArray) -> tuple[Mesh, IntArray]:
-        """Return the mesh of the components *which*, (c,) bool, and its vertices (k,) in this one.
+    def of_components(self, which: ArrayLike) -> tuple[Mesh, IntArray]:
+        """Return the mesh of some components, and its vertices (k,) in this one.
 
-        At least one component.
+        *which* are their numbers, or a mask (c,); at least one.
         """
-        kept = which[self.components]
+        count = int(self.components.max()) + 1
+        chosen = np.zeros(count, dtype=bool)
+        chosen[as_ids(which, count, "which")] = True
+        if not chosen.any():
+            raise MeshError("which is empty; a mesh has at least one component")
+        kept = chosen[self.components]
         number = np.cumsum(kept) - 1
         part = object.__new__(Mesh)
         faces = number[self.faces[kept[self.faces[:, 0]]]]
