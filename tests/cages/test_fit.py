@@ -373,6 +373,7 @@ def test_regions_that_are_parts_get_twice_as_many_cage_vertices_as_whole_bodies(
     every = (np.arange(12)[:, None, None] * len(ball) + faces).reshape(-1, 3)
     balls = Mesh((at[:, None] + ball).reshape(-1, 3), every)
     bodies = Regions(balls, balls.components == np.arange(12)[:, None])
+    assert_array_equal(bodies.components, np.eye(12, dtype=bool))
     assert suggested_size(bodies) == 12 * 15
     halves = np.array([ball[:, 0] < 0.3, ball[:, 0] > -0.3])
     masks = [np.kron(np.arange(12) == k, half) for k in range(12) for half in halves]

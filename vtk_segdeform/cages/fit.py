@@ -74,13 +74,7 @@ def suggested_size(regions: Regions) -> int:
     30 for each region that is a part of something, such as a limb, and 15 for one that bends by
     itself, such as one of many stones.
     """
-    component = regions.mesh.components
-    has = np.array(
-        [
-            np.bincount(component[members], minlength=1 + component.max()) > 0
-            for members in regions.membership
-        ]
-    )
+    has = regions.components
     is_part = (has & (has.sum(axis=0) > 1)).any(axis=1)
     size = _SUGGESTED_EACH * is_part.sum() + _SUGGESTED_ALONE * (~is_part).sum()
     return int(min(max(_SUGGESTED, size), MOST_CAGE_VERTICES))

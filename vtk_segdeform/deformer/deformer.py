@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .. import sizes
-from ..arrays import BoolArray, FloatArray, IntArray, as_numbers, is_number
+from ..arrays import FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
@@ -115,8 +115,8 @@ _VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
-_DRAG = 1e-3  # of a part that is free to turn, in traces of the energy of its region
-_LOOSE = 1e-4  # weight of the anchors of a loose component, times the scale of the energy
+_DRAG = 1e-3  # weight of the drag on a part that is free to turn, in traces of its energy
+_LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
@@ -435,9 +435,8 @@ class Deformer:
         near = vertex, float(reach) / self._frame.size, follows
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
         quadratic = weight * self._samples.quadratic(*near) + self._drag_of(*near)
+        quadratic += self._of_loose_parts()
         before, p = self._constraints.solver, self._p
-        if before.positions.anchors is not None:
-            quadratic += before.positions.anchors.quadratic
         rows, soft, of_target = before.positions.rows.copy(), [], []
         anchors = Anchors(quadratic, p, np.zeros_like(p))
         energy, flat = self._with_flat_rings(anchors, spread / self._frame.size)
@@ -1076,9 +1075,9 @@ class Deformer:
         positions = position_term(
             self.subspace, self._rest, [ids[places] for places in order], weight
         )
-        if len(ids) and self.mesh.components.any():
+        if (loose := self._of_loose_parts()).any():
             start = self._rest_cages
-            anchors = Anchors(self._of_loose_parts(ids), start, np.zeros_like(start))
+            anchors = Anchors(loose, start, np.zeros_like(start))
             positions = positions.local(positions.rows, anchors)
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved, volumes, scaled = self._preserved_volumes()
@@ -1108,21 +1107,24 @@ class Deformer:
         )
         self.reset()
 
-    def _of_loose_parts(self, ids: IntArray) -> FloatArray:
-        """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
+    def _of_loose_parts(self) -> FloatArray:
+        """Return the quadratic (m, m) of anchors for components without fixed vertices and handles.
 
         Nothing determines where they are.  Those that share no region with other components stay.
         The others follow these; the anchors are so weak, compared with the energy of the least
         region that they are in, that they only prevent drifting.
         """
-        of_component, of_region = self._linked_parts
         component, samples, energy = self.mesh.components, self._samples, self._binding.energy
+        ids, inside = np.concatenate([self.handle, self.fixed]), self.regions.components
+        if not len(ids) or inside.shape[1] == 1:
+            return np.zeros_like(energy.quadratic)
+        of_component, of_region = self._linked_parts
         has_ids = np.zeros(len(of_component), dtype=bool)
         has_ids[component[ids]] = True
         stays = ~np.isin(of_region, of_component[has_ids])
         own = [len(cage.vertices) for cage in self.cages]
         quadratic = np.diag(np.where(np.repeat(stays, own), energy.scale, 0.0))
-        least = np.where(self._in_regions, self._traces[:, None], np.inf).min(axis=0)
+        least = np.where(inside, self._traces[:, None], np.inf).min(axis=0)
         of_sample = np.empty(len(samples.points), dtype=np.int64)
         of_sample[samples.cells] = component
         loose = ~has_ids[of_sample]
@@ -1133,8 +1135,8 @@ class Deformer:
     @cached_property
     def _linked_parts(self) -> tuple[IntArray, IntArray]:
         """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
-        region, component = np.nonzero(self._in_regions)
-        n_regions, count = self._in_regions.shape
+        region, component = np.nonzero(self.regions.components)
+        n_regions, count = self.regions.components.shape
         part = connected(count + n_regions, component, count + region)
         return part[:count], part[count:]
 
@@ -1143,16 +1145,6 @@ class Deformer:
         """The trace of the energy in the cage vertices of each region, (r,)."""
         starts = np.cumsum([0, *(len(cage.vertices) for cage in self.cages[:-1])])
         return np.add.reduceat(np.diag(self._binding.energy.quadratic), starts)
-
-    @cached_property
-    def _in_regions(self) -> BoolArray:
-        """Whether each region has vertices of each component of the mesh, (r, c) bool."""
-        component = self.mesh.components
-        count = int(component.max()) + 1
-        if count == 1:
-            return np.ones((self.regions.n_regions, 1), dtype=bool)
-        masks = self.regions.membership
-        return np.array([np.bincount(component[each], minlength=count) > 0 for each in masks])
 
     def _anchors(self, surface: ScaledSurface | None, fixed_at: FloatArray) -> FloatArray:
         """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.

@@ -18,8 +18,10 @@ SMALL_COMPONENT = 0.0125  # of the whole area
 _NEAR = 0.05  # gap, in diagonals of all points
 
 
-def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> tuple[IntArray, ...]:
-    """Return the nearest pair of points between each attached component and the large ones.
+def attached(
+    points: FloatArray, areas: FloatArray, component: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return where small components are attached to large ones: the nearest pairs of points.
 
     Parameters
     ----------
@@ -88,9 +90,9 @@ def component_shares(areas: FloatArray, component: IntArray) -> FloatArray:
 def nearest_pairs(
     points: FloatArray, component: IntArray, large: BoolArray
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Return the nearest points of each component that is not *large* and of those that are.
+    """Return for each component that is not *large*, (c,) bool, the nearest point of a large one.
 
-    The pairs and their distances, (k,) each, by component.
+    Its own nearest point, that of the large one, and their distance, (k,) each.
     """
     is_large = large[component]
     there, here = np.flatnonzero(is_large), np.flatnonzero(~is_large)

@@ -153,6 +153,19 @@ class Regions(Frozen):
         return len(self.membership)
 
     @cached_property
+    def components(self) -> BoolArray:
+        """(r, c) bool: the components of the mesh of which each region has vertices."""
+        component = self.mesh.components
+        count = int(component.max()) + 1
+        if count == 1:
+            found = np.ones((self.n_regions, 1), dtype=bool)
+        else:
+            counts = [np.bincount(component[each], minlength=count) for each in self.membership]
+            found = np.array(counts) > 0
+        found.flags.writeable = False
+        return found
+
+    @cached_property
     def border_distance(self) -> FloatArray:
         """(r, n) float: distance along the surface to the border of each region, 0 outside it.
 
