@@ -66,6 +66,7 @@ _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight o
 _FEWEST = 4  # samples that determine an affine motion
 _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
+_AROUND = 20  # nearest samples that are looked at
 _EDGES = 2000  # about, of which the median motion is computed
 _FINE = 8.0  # edges in the spread of a pull from which its ring needs no resistance to bending
 _RIGID = 0.1  # weight of the edges of a ring together, as a share of that of y
@@ -185,7 +186,7 @@ class SurfaceSamples:
         pairs = [self._across_walls(component)]
         if self.parts is not None:
             pairs.append(np.stack(joints(self.points, self.areas, component, self.parts)))
-        one, other = np.concatenate(pairs, axis=1)
+        one, other = np.unique(np.sort(np.concatenate(pairs, axis=1), axis=0), axis=1)
         if not len(one):
             return self.edges
         gap = np.linalg.norm(self.points[one] - self.points[other], axis=1)
@@ -204,10 +205,13 @@ class SurfaceSamples:
             return np.empty((2, 0), dtype=np.int64)
         spacing, some = float(self.edges.data.mean()), slice(None, None, 1 + len(i) // _EDGES)
         alike = np.median(np.abs(self.rows[i[some]] - self.rows[j[some]]).sum(axis=1))
-        pairs = cKDTree(self.points).query_pairs(spacing, output_type="ndarray").astype(np.int64)
-        one, other = pairs.T
+        count = min(_AROUND, len(self.points))  # not all: a dense patch would have millions
+        away, near = cKDTree(self.points).query(self.points, count, distance_upper_bound=spacing)
+        one, rank = np.nonzero(np.isfinite(away.reshape(-1, count)))
+        other = near.reshape(-1, count)[one, rank]
         facing = np.einsum("ij,ij->i", self._normals[one], self._normals[other])
-        one, other = pairs[(facing < 0.0) | (component[one] != component[other])].T
+        layered = (facing < 0.0) | (component[one] != component[other])
+        one, other = one[layered], other[layered]
         apart = np.abs(self.rows[one] - self.rows[other]).sum(axis=1)
         return np.stack([one, other])[:, apart < alike]
 
