@@ -206,9 +206,10 @@ class SurfaceSamples:
         spacing, some = float(self.edges.data.mean()), slice(None, None, 1 + len(i) // _EDGES)
         alike = np.median(np.abs(self.rows[i[some]] - self.rows[j[some]]).sum(axis=1))
         count = min(_AROUND, len(self.points))  # not all: a dense patch would have millions
-        away, near = cKDTree(self.points).query(self.points, count, distance_upper_bound=spacing)
-        one, rank = np.nonzero(np.isfinite(away.reshape(-1, count)))
-        other = near.reshape(-1, count)[one, rank]
+        found = cKDTree(self.points).query(self.points, count, distance_upper_bound=spacing)
+        away, near = (np.reshape(each, (-1, count)) for each in found)
+        one, rank = np.nonzero(np.isfinite(away))
+        other = near[one, rank]
         facing = np.einsum("ij,ij->i", self._normals[one], self._normals[other])
         layered = (facing < 0.0) | (component[one] != component[other])
         one, other = one[layered], other[layered]
