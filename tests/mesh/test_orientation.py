@@ -13,6 +13,7 @@ from solids import CUBE, icosphere, rotation, together, torus
 from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import triangles_of
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import find_faults, mesh_of, winding_number
 from vtk_segdeform.mesh.faults import Search
 from vtk_segdeform.mesh.orientation import faces_to_flip
@@ -21,6 +22,15 @@ from vtk_segdeform.mesh.topology import HalfEdges
 
 SPHERE = icosphere(2)
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
+
+
+@pytest.fixture(params=["numba", "numpy"])
+def with_and_without_numba(request, monkeypatch):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if request.param == "numba":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
 def flipped(faces, which):
@@ -168,37 +178,62 @@ def test_sheets_that_meet_along_a_line_agree_where_they_continue_each_other():
         assert (up > 0.0).all() or (up < 0.0).all()
 
 
-@pytest.mark.parametrize("is_closed", [True, False])
-def test_many_shells_are_found_inside_a_surface_by_columns_as_by_winding_numbers(is_closed):
-    ball, faces = icosphere(3)
-    small, small_faces = icosphere(1)
+@pytest.mark.usefixtures("with_and_without_numba")
+@pytest.mark.parametrize("around", ["closed", "holes", "turned", "branching", "box"])
+def test_shells_are_found_inside_a_surface_by_its_winding_number(around):
+    outer, faces = icosphere(3)
     rng = np.random.default_rng(2)
+    flip = None
+    if around == "holes":
+        faces = faces[(rng.random(len(faces)) < 0.97) & (np.arange(len(faces)) > 100)]
+    elif around == "turned":  # and most of them turned back
+        turn = rng.random(len(faces)) < 0.3
+        faces = flipped(faces, turn)[80:]
+        flip = turn[80:] & (np.arange(len(faces)) > 60)
+        flip = np.append(flip, np.zeros(80 * len(SPHERE[1]), dtype=bool))
+    elif around == "branching":  # a disc across it, and a hole below
+        disc = faces[outer[faces][:, :, 2].max(axis=1) < 0.1][:, ::-1]
+        faces = np.concatenate([faces, disc])[30:]
+    elif around == "box":
+        outer, faces = box([(0, 1)])
+        outer = 1.5 * outer - 0.75
+    small, small_faces = SPHERE
     places = rng.normal(size=(80, 3))
     places *= (rng.choice([0.4, 0.8, 1.0, 1.2], size=80) / np.linalg.norm(places, axis=1))[:, None]
-    points = np.concatenate([ball, *(0.02 * small + place for place in places)])
-    if not is_closed:
-        faces = faces[100:]
-    many = [faces, *(small_faces + len(ball) + k * len(small) for k in range(80))]
-    shells = np.repeat(np.arange(81), [len(each) for each in many])
-    depth = shell_depths(points, np.concatenate(many), shells, np.ones(81, dtype=bool))
-    extremes = points[len(ball) :].reshape(80, -1, 3)
-    number = winding_number(extremes.reshape(-1, 3), ball, faces).reshape(80, -1)
-    assert_array_equal(depth[1:], (number > 0.5).all(axis=1))
+    points = np.concatenate([outer, *(0.02 * small + place for place in places)])
+    many = [faces, *(small_faces + len(outer) + k * len(small) for k in range(80))]
+    half_edges = HalfEdges(np.concatenate(many), len(points))
+    depth = shell_depths(points, half_edges, np.ones(81, dtype=bool), flip)
+    given = faces if flip is None else flipped(faces, flip[: len(faces)])
+    extremes = points[len(outer) :].reshape(80, -1, 3)
+    number = winding_number(extremes.reshape(-1, 3), outer, given).reshape(80, -1)
+    assert_array_equal(depth[1:], (np.abs(number) > 0.5).all(axis=1))
     assert depth[0] == 0
-    assert 20 < depth.sum() < 70
+    assert 10 < depth.sum() < 70
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_volumes_known_after_flipping_are_those_of_the_flipped_shells(compiled, monkeypatch):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0 if compiled else 10**9)
+@pytest.mark.usefixtures("with_and_without_numba")
+@pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["upright", "turned"])
+def test_a_body_that_stands_on_the_ground_of_a_room_is_not_inside(turn):
+    room, faces = box(n=3)
+    for x, y in np.random.default_rng(5).random((30, 2)) / 2 + 0.1:
+        for height in (0.0, 0.1):
+            points, all_faces = together((room, faces), (0.3 * room + [x, y, height], faces))
+            half_edges = HalfEdges(all_faces, len(points))
+            depth = shell_depths(points @ turn.T + 7.0, half_edges, np.ones(2, dtype=bool))
+            assert_array_equal(depth, [0, height > 0.0])
+
+
+@pytest.mark.usefixtures("with_and_without_numba")
+def test_volumes_known_after_flipping_are_those_of_the_flipped_shells():
     band = np.asarray(moebius().points, float), triangles_of(moebius())
     x, faces = together(SPHERE, torus(9, 6), (0.3 * SPHERE[0], SPHERE[1]), band, box([(0, 1)]))
     some = np.random.default_rng(3).random(len(faces)) < 0.1
     turned = (faces, faces[:, ::-1], flipped(faces, some))
     for given in (*turned, flipped(faces, np.arange(len(faces)) < len(SPHERE[1]))):
         half_edges = HalfEdges(given, len(x))
-        flip, sums = faces_to_flip(x, half_edges)
-        found = Search.known(x, half_edges.flipped(flip), sums)
+        flip, sums, depth = faces_to_flip(x, half_edges)
+        found = Search.known(x, half_edges.flipped(flip), sums, depth)
         fresh = Search(x, flipped(given, flip))
         for one, other in zip(sums, fresh.shell_sums, strict=True):
             assert_array_equal(one, other)

@@ -22,6 +22,7 @@ import pyvista as pv
 
 from ..errors import MeshError
 from ..kernels import compiled_checks, inputs
+from ..mesh import first_equal_row
 from .array_names import HEADER, decoded, get_names, set_names, warn_left_out
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
@@ -122,16 +123,7 @@ def _rows_of_text(data: bytes) -> tuple[Any, int, int, bool]:
 
 def _merged(corners: Any) -> tuple[Any, Any]:
     """Return the unique rows (n, 3), by first occurrence, and the index of each corner's row."""
-    if not len(corners):
-        return np.empty((0, 3)), np.empty(0, dtype=np.int64)
-    x, y, z = corners.astype("<f4").view("<u4").astype("u8").T
-    keys = (z, x | y << np.uint64(32))
-    order = np.lexsort(keys)
-    new = np.append(True, np.logical_or(*(np.diff(key[order]) != 0 for key in keys)))
-    group = np.empty(len(corners), dtype=np.int64)
-    group[order] = np.cumsum(new) - 1
-    first = order[new]  # lexsort is stable: the first corner of each
-    rank = np.empty(len(first), dtype=np.int64)
-    by_first = np.argsort(first)
-    rank[by_first] = np.arange(len(first))
-    return corners[first[by_first]].astype(np.float64), rank[group]
+    points = corners.astype(np.float64)
+    first = first_equal_row(points)
+    is_first = first == np.arange(len(first))
+    return points[is_first], (np.cumsum(is_first) - 1)[first]

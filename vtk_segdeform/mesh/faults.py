@@ -22,7 +22,7 @@ from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
-from .shells import ShellSums, closed_shells, shell_faults, shell_volumes
+from .shells import ShellSums, closed_shells, shell_depths, shell_faults, shell_volumes
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
@@ -76,16 +76,25 @@ class Search:
     triangles: IntArray
 
     @classmethod
-    def known(cls, points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None) -> Search:
+    def known(
+        cls,
+        points: FloatArray,
+        half_edges: HalfEdges,
+        sums: ShellSums | None = None,
+        depth: IntArray | None = None,
+    ) -> Search:
         """Return the search of the faces of *half_edges*, none degenerate or duplicate.
 
-        All *points* are in faces; *sums* are those of the shells, if known.
+        All *points* are in faces; *sums* are those of the shells, and *depth* the number of shells
+        around each closed one, if known.
         """
         search, none = cls(points, half_edges.faces), np.zeros(len(half_edges.faces), dtype=bool)
         search.__dict__["_corners"] = np.ones(len(points), dtype=bool), 0
         search.__dict__["_distinct"] = none, none, half_edges
         if sums is not None:
             search.__dict__["shell_sums"] = sums
+        if depth is not None:
+            search.__dict__["depth"] = depth
         return search
 
     def at(self, points: FloatArray) -> Search:
@@ -98,6 +107,11 @@ class Search:
     def shell_sums(self) -> ShellSums:
         """`shell_volumes` of `half_edges`."""
         return shell_volumes(self.points, self.half_edges.faces, self.half_edges.shells)
+
+    @cached_property
+    def depth(self) -> IntArray:
+        """`shell_depths` of the closed shells of `half_edges`."""
+        return shell_depths(self.points, self.half_edges, closed_shells(self.half_edges))
 
     @cached_property
     def _corners(self) -> tuple[BoolArray, int | None]:
@@ -380,19 +394,17 @@ def _inward_and_flat_shells(search: Search, finite: BoolArray | None) -> tuple[I
     Only shells that are closed and consistently oriented; others may be around them.  *finite* (n,)
     says which points are, if not all.
     """
-    faces, shells = search.half_edges.faces, search.half_edges.shells
-    closed = closed_shells(search.half_edges)
+    half_edges = search.half_edges
     if finite is not None:
-        valid = finite[faces].all(axis=1)
-        closed[shells[~valid]] = False
-        faces = faces[valid]
-        left, shells = np.unique(shells[valid], return_inverse=True)
-        closed = closed[left]
+        valid = finite[half_edges.faces].all(axis=1)
+        half_edges = HalfEdges(half_edges.faces[valid], len(search.points))
+    closed = closed_shells(half_edges)
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    sums = search.shell_sums if finite is None else None
-    wrong, flat, first = shell_faults(search.points, faces, shells, closed, sums=sums)
-    return faces[first[wrong & ~flat], 0], faces[first[flat], 0]
+    known = (search.shell_sums, search.depth) if finite is None else (None, None)
+    wrong, flat = shell_faults(search.points, half_edges, closed, *known)
+    first = half_edges.faces[first_members(half_edges.shells), 0]
+    return first[wrong & ~flat], first[flat]
 
 
 def _some(kind: Kind, where: IntArray, edges_of: HalfEdges | None = None) -> Iterator[Fault]:

@@ -5,12 +5,15 @@ Vertices and faces are numbered from 0 without gaps, so tables replace compariso
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, inputs, scratch
 
+_PIECE = 1 << 20  # rows of `ragged_arange` at once
 _MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, with irregular bits: a multiplicative hash
 
 
@@ -162,6 +165,15 @@ def ragged_arange(counts: IntArray) -> tuple[IntArray, IntArray]:
     """
     i = np.repeat(np.arange(len(counts)), counts)
     return i, np.arange(len(i)) - np.repeat(counts.cumsum() - counts, counts)
+
+
+def ragged_pieces(counts: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield the result of `ragged_arange` in pieces of bounded size."""
+    some = np.flatnonzero(counts)
+    run = counts[some].cumsum() // _PIECE
+    for piece in np.split(some, np.flatnonzero(np.diff(run)) + 1):
+        i, k = ragged_arange(counts[piece])
+        yield piece[i], k
 
 
 def row_hashes(rows: NDArray[np.generic]) -> NDArray[np.uint64]:

@@ -24,28 +24,29 @@ Engineering 30(2), 125-126, 1983.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
 from ..kernels import in_parallel
-from .grouping import ragged_arange
+from .grouping import ragged_pieces
 from .triangles import corner_columns, cross, norm
 
 _BLOCK = 1 << 17  # numbers per temporary array: a megabyte, which fits into the cache
-_PAIRS = 1 << 20  # pairs of face and column processed at once
 _BAND = 1 << 14  # points per task
 
 Column = FloatArray | IntArray  # coordinates of columns, (k,)
 
 
-def winding_number(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> FloatArray:
+def winding_number(
+    points: ArrayLike, vertices: ArrayLike, faces: ArrayLike, near: float = 0.0
+) -> FloatArray:
     """Return the winding number of a surface at each point, (n,): 1 inside, 0 outside.
 
     The surface, *vertices* (m, 3) and *faces* (k, 3), may be open: the winding number then
-    decreases smoothly from inside to outside.  Memory is bounded for any n and k.
+    decreases smoothly from inside to outside.  At a distance of at most *near* from the plane of a
+    face, that face counts as 0; so the winding number is 0.5 on a flat part of a closed surface,
+    whatever the rounding.  Memory is bounded for any n and k.
     """
     x = as_points(points, "points")
     p = as_points(vertices, "vertices")
@@ -55,6 +56,8 @@ def winding_number(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
     centre = p.mean(axis=0)
     x, p = x - centre, p - centre
     corners = corner_columns(p, faces)
+    a, b, c = corners
+    flat = near * norm(cross(b - a, c - a))[:, None]
     number = np.empty(len(x))
 
     def work(start: int, stop: int) -> None:
@@ -63,7 +66,8 @@ def winding_number(points: ArrayLike, vertices: ArrayLike, faces: ArrayLike) -> 
         d_a, d_b, d_c = norm(a), norm(b), norm(c)
         below = d_a * d_b * d_c + (a * b).sum(axis=0) * d_c
         below += (b * c).sum(axis=0) * d_a + (c * a).sum(axis=0) * d_b
-        half_omega = np.arctan2((a * cross(b, c)).sum(axis=0), below)
+        volume = (a * cross(b, c)).sum(axis=0)
+        half_omega = np.where(np.abs(volume) <= flat, 0.0, np.arctan2(volume, below))
         number[start:stop] = half_omega.sum(axis=0) / (2.0 * np.pi)
 
     in_parallel(work, len(x), max(1, _BLOCK // (9 * len(faces))))
@@ -105,7 +109,7 @@ def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, i
     last = np.floor(high).clip(max=[nx - 1, ny - 1]).astype(np.int64)
     extent = (last - first + 1).clip(0)
     change = np.zeros(nx * ny * (nz + 1))
-    for f, k in _pairs(extent.prod(axis=1)):
+    for f, k in ragged_pieces(extent.prod(axis=1)):
         column = first[f] + np.stack([k // extent[f, 1], k % extent[f, 1]], axis=1)
         met, height, sign = _crossings(vertices, faces[f], *column.T)
         above = np.ceil(height).clip(0, nz).astype(np.int64)
@@ -135,7 +139,7 @@ def winding_by_columns(points: FloatArray, vertices: FloatArray, faces: IntArray
         first = np.searchsorted(y, low[near, 1], side="left")
         last = np.searchsorted(y, high[near, 1], side="right")
         winding = np.zeros(len(band))
-        for f, k in _pairs(last - first):
+        for f, k in ragged_pieces(last - first):
             at, its_faces = first[f] + k, near[f]
             beside = (x[at] >= low[its_faces, 0]) & (x[at] <= high[its_faces, 0])
             at, its_faces = at[beside], its_faces[beside]
@@ -165,15 +169,6 @@ def _boxes(xy: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
     a, b, c = xy[faces[:, 0]], xy[faces[:, 1]], xy[faces[:, 2]]
     low = np.minimum(np.minimum(a, b), c)
     return low, np.maximum(np.maximum(a, b), c)
-
-
-def _pairs(counts: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield the result of `ragged_arange` in pieces of bounded size."""
-    some = np.flatnonzero(counts)
-    run = counts[some].cumsum() // _PAIRS
-    for piece in np.split(some, np.flatnonzero(np.diff(run)) + 1):
-        i, k = ragged_arange(counts[piece])
-        yield piece[i], k
 
 
 def _crossings(

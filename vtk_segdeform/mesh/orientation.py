@@ -30,12 +30,12 @@ _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to 
 
 def faces_to_flip(
     points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None = None
-) -> tuple[BoolArray, ShellSums | None]:
+) -> tuple[BoolArray, ShellSums | None, IntArray]:
     """Return which faces (m,) to flip; those of a second call are none.
 
     Afterwards all pairs agree, except on one-sided patches, and no closed shell is inside-out.
     *sums* are those of the shells, if known and if all pairs agree before.  Those after the flips
-    are returned, too, unless shells branch.
+    are returned, too, unless shells branch, and the number of shells around each closed shell.
     """
     patch, flip, two_sided = _patches(half_edges)
     unit = patch
@@ -51,11 +51,12 @@ def faces_to_flip(
         one_sided[unit[~two_sided[patch]]] = True
     faces = flipped_faces(half_edges.faces, flip) if flip.any() else half_edges.faces
     sums = sums or shell_volumes(points, faces, unit)
-    wrong = _inside_out(points, half_edges, faces, flip, unit, one_sided, sums)
+    wrong, depth = _inside_out(points, half_edges, flip, unit, one_sided, sums)
     if wrong.any():
         flip = flip ^ wrong[unit]
         sums = np.where(wrong, -sums[0], sums[0]), *sums[1:]
-    return flip, None if len(half_edges.crowded) else sums  # of units, which are shells then
+    of_shells = None if len(half_edges.crowded) else sums  # shells are units then
+    return flip, of_shells, depth
 
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:
@@ -134,13 +135,15 @@ def _angles(
 def _inside_out(
     points: FloatArray,
     half_edges: HalfEdges,
-    faces: IntArray,
     flip: BoolArray,
     unit: IntArray,
     one_sided: BoolArray,
     sums: ShellSums,
-) -> BoolArray:
-    """Return which units enclose a volume of the wrong sign, (u,) bool, with faces flipped."""
+) -> tuple[BoolArray, IntArray]:
+    """Return which units enclose a volume of the wrong sign, (u,) bool, with faces flipped.
+
+    Also the number of shells around each shell that has an outside, (k,) int.
+    """
     shells = half_edges.shells
     of_shell = unit[first_members(shells)]
     alone = np.ones(len(of_shell), dtype=bool)  # whether the shell is a unit
@@ -154,12 +157,12 @@ def _inside_out(
     tiny = NO_VOLUME * (area * size)
     wrong = encloses & (volume < -tiny)
     wrong[of_shell[alone]] = False  # first those on which the winding numbers of shells depend
-    faces = flipped_faces(faces, wrong[unit]) if wrong.any() else faces
-    depth = shell_depths(points, faces, shells, alone & encloses[of_shell])
+    flip = flip ^ wrong[unit] if wrong.any() else flip
+    depth = shell_depths(points, half_edges, alone & encloses[of_shell], flip)
     outward = outward_signs(volume[of_shell], depth, closed)[alone]
     of_shell = of_shell[alone]
     wrong[of_shell] = encloses[of_shell] & (outward * volume[of_shell] < -tiny[of_shell])
-    return np.asarray(wrong)
+    return wrong, depth
 
 
 def _lids(

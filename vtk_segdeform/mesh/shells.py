@@ -12,21 +12,23 @@ winding numbers", ACM Trans. Graph. 32(4), 33, 2013.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs
-from .grouping import first_members
-from .inside import winding_by_columns, winding_number
+from .edges import flipped_faces
+from .grouping import first_members, ragged_pieces
+from .inside import winding_number
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 _PIECE = 10_000  # faces per task; their data fit into the cache
 NO_VOLUME = 1e-14  # relative to area times size: about the rounding error for a flat shell
-_MANY = 100  # points for which columns are quicker
+_NEAR = 1e-9  # of the size of a shell: on its surface, up to rounding
+_FEW_PAIRS = 16  # of shells per task
 _INSIDE = 0.5 + 1e-6  # at a flat part of a shell it is 0.5: not inside
 
 # Volume, area and size of each shell, (k,) float each.
@@ -43,32 +45,30 @@ def closed_shells(half_edges: HalfEdges) -> BoolArray:
 
 def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray:
     """Return which closed shells are inside-out or enclose no volume, (k,) bool."""
-    faces, shells, closed = half_edges.faces, half_edges.shells, closed_shells(half_edges)
-    return shell_faults(vertices, faces, shells, closed)[0]
+    return shell_faults(vertices, half_edges, closed_shells(half_edges))[0]
 
 
 def shell_faults(
     vertices: FloatArray,
-    faces: IntArray,
-    shells: IntArray,
+    half_edges: HalfEdges,
     closed: BoolArray,
-    *,
     sums: ShellSums | None = None,
-) -> tuple[BoolArray, BoolArray, IntArray]:
+    depth: IntArray | None = None,
+) -> tuple[BoolArray, BoolArray]:
     """Return which shells are inside-out or enclose no volume.
 
     Parameters
     ----------
     vertices : (n, 3) float
         Finite.
-    faces : (m, 3) int
+    half_edges : HalfEdges
         Of all shells.
-    shells : (m,) int
-        The shell of each face, 0..k-1.
     closed : (k,) bool
-        The shells to test, closed and consistently oriented.  Others may be around them.
+        The shells to test, those of `closed_shells`.  Others may be around them.
     sums : ShellSums, optional
         Those of `shell_volumes`, if they are known.
+    depth : (k,) int, optional
+        `shell_depths`, if it is known.
 
     Returns
     -------
@@ -76,16 +76,14 @@ def shell_faults(
         Whether the shell is inside-out or encloses no volume.
     flat : (k,) bool
         Whether it encloses no volume, up to rounding.
-    first : (k,) int
-        Its first face.
     """
-    first = first_members(shells)
-    volume, area, size = sums or shell_volumes(vertices, faces, shells)
+    volume, area, size = sums or shell_volumes(vertices, half_edges.faces, half_edges.shells)
     tiny = NO_VOLUME * (area * size)
-    outward = outward_signs(volume, shell_depths(vertices, faces, shells, closed), closed)
+    depth = shell_depths(vertices, half_edges, closed) if depth is None else depth
+    outward = outward_signs(volume, depth, closed)
     wrong = outward * volume <= tiny
     flat = np.abs(volume) <= tiny
-    return np.asarray(wrong & closed), np.asarray(flat & closed), first
+    return np.asarray(wrong & closed), np.asarray(flat & closed)
 
 
 def outward_signs(volume: FloatArray, depth: IntArray, closed: BoolArray) -> IntArray:
@@ -124,46 +122,104 @@ def shell_volumes(vertices: FloatArray, faces: IntArray, shells: IntArray) -> Sh
 
 
 def shell_depths(
-    vertices: FloatArray, faces: IntArray, shells: IntArray, inner: BoolArray
+    vertices: FloatArray, half_edges: HalfEdges, inner: BoolArray, flip: BoolArray | None = None
 ) -> IntArray:
     """Return the number of other shells around each of the shells *inner* (k,), (k,) int.
 
     All extreme vertices of a shell must be inside the other one, so that a shell which only
-    reaches into another, such as a limb pushed into a body, does not count as a cavity.
+    reaches into another, such as a limb pushed into a body, does not count as a cavity.  The faces
+    *flip* (m,) have the other direction.
     """
     depth = np.zeros(len(inner), dtype=np.int64)
     if len(inner) < 2 or not inner.any():
         return depth
-    low, high = _boxes(vertices, faces, shells)
+    low, high = _boxes(vertices, half_edges.faces, half_edges.shells)
     order, begin, end = _beginning_within(low, high)
-    within = []
-    for outer in np.flatnonzero(end > begin):
-        near = order[begin[outer] : end[outer]]
-        near = near[inner[near]]
-        near = near[((low[near] > low[outer]) & (high[near] < high[outer])).all(axis=1)]
-        if len(near):
-            within.append((outer, near))
-    if not within:  # as for most surfaces
-        return depth
-    by_shell = np.argsort(shells, kind="stable")
-    ends = np.cumsum(np.bincount(shells))
-    starts = ends - np.bincount(shells)
-    for outer, inside in within:
-        owned, its_faces = _owned(faces[by_shell[starts[outer] : ends[outer]]])
-        if its_faces[0, 1] > its_faces[0, 2]:  # the same rounding for both orientations
-            its_faces = its_faces[:, [0, 2, 1]]
-        extremes = []
-        for one in inside:
-            points = vertices[_owned(faces[by_shell[starts[one] : ends[one]]])[0]]
-            extremes.append(points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])])
-        firsts = np.array([points[0] for points in extremes])
-        left = np.flatnonzero(_surrounded(firsts, vertices[owned], its_faces))  # few, if any
-        if len(left):
-            begins = np.cumsum([0, *(len(extremes[k]) for k in left[:-1])])
-            others = np.concatenate([extremes[k] for k in left])
-            is_inside = _surrounded(others, vertices[owned], its_faces)
-            depth[inside[left]] += np.logical_and.reduceat(is_inside, begins)
+    pieces = [np.empty((0, 2), dtype=np.int64)]
+    for outer, k in ragged_pieces((end - begin).clip(0)):
+        inside = order[begin[outer] + k]
+        is_in = inner[inside]
+        for axis in range(3):
+            is_in &= low[inside, axis] > low[outer, axis]
+            is_in &= high[inside, axis] < high[outer, axis]
+        pieces.append(np.stack([outer[is_in], inside[is_in]], axis=1))
+    pairs = np.concatenate(pieces)
+    if len(pairs):  # not for most surfaces
+        near_to = _NEAR * (high - low).max(axis=1)
+        found = _are_around(vertices, half_edges, flip, pairs, near_to)
+        np.add.at(depth, pairs[found, 1], 1)
     return depth
+
+
+def _are_around(
+    vertices: FloatArray,
+    half_edges: HalfEdges,
+    flip: BoolArray | None,
+    pairs: IntArray,
+    near: FloatArray,
+) -> BoolArray:
+    """Return for which *pairs* (p, 2) of shells the first one is around the second one, (p,).
+
+    *pairs* are in the order of the first ones.  Nearer than *near* (k,), rounding matters.
+    """
+    flip = np.zeros(len(half_edges.faces), dtype=bool) if flip is None else flip
+    faces = flipped_faces(half_edges.faces, flip)
+    faces, (starts, stops) = _by_shell(faces, half_edges.shells, len(near))
+    found = np.zeros(len(pairs), dtype=bool)
+    if kernels := compiled_checks(int((stops - starts)[pairs[:, 0]].sum())):
+        extremes = np.full((len(stops), 6), -1)
+        some = np.unique(pairs[:, 1])
+        kernels.shell_extremes(extremes, *inputs(some, vertices, faces, starts, stops))
+        cones, ends = _cones(half_edges, flip)
+        given = inputs(near, vertices, faces, starts, stops, cones, *ends)
+        work = partial(kernels.shells_around, found, *inputs(pairs, extremes), _INSIDE, *given)
+        in_parallel(work, len(pairs), _FEW_PAIRS)
+        return found
+    for at in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(pairs[:, 0])) + 1):
+        one = pairs[at[0], 0]
+        its_vertices, its_faces = _owned(vertices, faces[starts[one] : stops[one]])
+        tested = []
+        for other in pairs[at, 1]:
+            points = _owned(vertices, faces[starts[other] : stops[other]])[0]
+            tested.append(points[np.unique([points.argmin(axis=0), points.argmax(axis=0)])])
+        firsts = np.array([points[0] for points in tested])
+        found[at] = np.abs(winding_number(firsts, its_vertices, its_faces, near[one])) > _INSIDE
+        some = np.flatnonzero(found[at])  # few, if any
+        if len(some):
+            begins = np.cumsum([0, *(len(tested[k]) for k in some[:-1])])
+            others = np.concatenate([tested[k] for k in some])
+            number = np.abs(winding_number(others, its_vertices, its_faces, near[one]))
+            found[at[some]] = np.logical_and.reduceat(number > _INSIDE, begins)
+    return found
+
+
+def _cones(half_edges: HalfEdges, flip: BoolArray) -> tuple[IntArray, tuple[IntArray, IntArray]]:
+    """Return faces (c, 3) that close the shells, by shell, and the first and the last of each.
+
+    A cone over the half-edges without opposites, after the flips, to the first vertex of these.
+    """
+    half = half_edges.unpaired
+    if not half_edges.is_oriented:
+        one, other = half_edges.neighbours.T
+        turned = half_edges.tail[one] == half_edges.tail[other]
+        turned = turned ^ flip[one // 3] ^ flip[other // 3]
+        half = np.concatenate([half, one[turned], other[turned]])
+    ends = np.stack([half_edges.tail[half], half_edges.head_of(half)], axis=1)
+    turned = flip[half // 3]
+    ends[turned] = ends[turned, ::-1]
+    n_shells = int(half_edges.shells.max(initial=-1)) + 1
+    ends, (starts, stops) = _by_shell(ends, half_edges.shells[half // 3], n_shells)
+    apex = np.repeat(ends[starts[starts < stops], 0], (stops - starts)[starts < stops])
+    return np.column_stack([ends[:, ::-1], apex]), (starts, stops)
+
+
+def _by_shell(
+    rows: IntArray, shells: IntArray, n_shells: int
+) -> tuple[IntArray, tuple[IntArray, IntArray]]:
+    """Return *rows* (r, ...) ordered by shell, and where those of each begin and end, (k,) each."""
+    counts = np.bincount(shells, minlength=n_shells)
+    stops = np.cumsum(counts)
+    return rows[np.argsort(shells, kind="stable")], (stops - counts, stops)
 
 
 def _boxes(
@@ -185,34 +241,10 @@ def _boxes(
     return low, high
 
 
-def _surrounded(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
-    """Return around which of *points* (n, 3) the winding number of a shell is 1 or -1 or more.
-
-    Columns are far quicker for many points, but they need a closed shell, and do not say whether a
-    point is on it; a point is not if the nearest vertex is farther than any edge is long.
-    """
-    by_columns = np.zeros(len(points), dtype=bool)
-    if len(points) >= _MANY and _is_closed(faces):
-        corners = vertices[faces]
-        longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max()
-        by_columns = cKDTree(vertices).query(points)[0] > longest
-    found = np.zeros(len(points), dtype=bool)
-    found[by_columns] = np.abs(winding_by_columns(points[by_columns], vertices, faces)) > _INSIDE
-    found[~by_columns] = np.abs(winding_number(points[~by_columns], vertices, faces)) > _INSIDE
-    return found
-
-
-def _is_closed(faces: IntArray) -> bool:
-    """Return whether each edge has as many faces in one direction as in the other."""
-    tail, head = faces.T, faces[:, [1, 2, 0]].T
-    n = int(faces.max(initial=0)) + 1
-    return np.array_equal(np.sort((tail * n + head).ravel()), np.sort((head * n + tail).ravel()))
-
-
-def _owned(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the vertices of *faces* (k, 3), sorted, and the faces over these."""
+def _owned(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return the vertices (v, 3) of *faces* (k, 3), and the faces over these."""
     owned, numbers = np.unique(faces, return_inverse=True)
-    return owned, numbers.reshape(-1, 3)
+    return vertices[owned], numbers.reshape(-1, 3)
 
 
 def _beginning_within(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray, IntArray]:

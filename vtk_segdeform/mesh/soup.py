@@ -169,18 +169,18 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     is_found = half_edges is found.half_edges
     if is_found and half_edges.is_oriented and not len(half_edges.crowded):
         sums = found.shell_sums
-    flip, sums = faces_to_flip(valid, half_edges, sums)
+    flip, sums, depth = faces_to_flip(valid, half_edges, sums)
     left = found.used
-    if not (same := is_found and found.n_repeating == 0 and kept.all()):
+    if not (is_found and found.n_repeating == 0 and kept.all()):
         left = np.zeros(len(valid), dtype=bool)
         left[half_edges.faces] = True
     vertex_of, loose, flipped = target, _NONE, half_edges.flipped(flip)
     if left.all():
-        mesh = Mesh.of(found if same and not flip.any() else Search.known(valid, flipped, sums))
+        mesh = Mesh.of(Search.known(valid, flipped, sums, depth))
     else:
         number = np.cumsum(left) - 1
         flipped = flipped.renumbered(number, int(left.sum()))
-        mesh = Mesh.of(Search.known(valid[left], flipped, sums))
+        mesh = Mesh.of(Search.known(valid[left], flipped, sums, depth))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)

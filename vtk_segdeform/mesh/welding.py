@@ -42,7 +42,7 @@ def sewn(found: Search) -> tuple[IntArray, Search] | None:
     half_edges = HalfEdges(faces, len(vertices))
     if not half_edges.one_fan_after_flips:
         return None
-    after = Search.known(vertices, half_edges, None)
+    after = Search.known(vertices, half_edges)
     after.__dict__["first_at"] = np.arange(len(vertices))
     return target, after
 
@@ -107,12 +107,17 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     for end in (tail, head):
         np.minimum.at(shortest, end, np.where(length > same, length, np.inf))
     shortest[np.isinf(shortest)] = 0.0
-    found = cKDTree(points[border]).query(points[border], min(_NEAREST + 1, len(border)))
-    away, other = (np.ravel(each) for each in found)
-    one = np.repeat(border, len(other) // len(border))
-    other = border[other]
+    shortest = shortest[border]
+    most = np.nextafter(_NEARLY * shortest.max(initial=0.0), np.inf)  # farther ones are not sought
+    tree = cKDTree(points[border])
+    found = tree.query(points[border], min(_NEAREST + 1, len(border)), distance_upper_bound=most)
+    away, other = (np.reshape(each, (len(border), -1)) for each in found)
+    one, k = np.nonzero(np.isfinite(away))
+    away, other = away[one, k], other[one, k]
     is_near = (one != other) & (away <= _NEARLY * np.minimum(shortest[one], shortest[other]))
-    pairs = np.stack([one, other], axis=1)[is_near]
+    pairs: IntArray = border[np.stack([one, other], axis=1)[is_near]]
+    if not len(pairs):
+        return pairs
     keys, n = np.sort(pairs, axis=1) @ [len(points), 1], len(points)
     is_edge = np.isin(keys, np.minimum(tail, head) * n + np.maximum(tail, head))
     kept: IntArray = pairs[~is_edge | (away[is_near] <= same)]

@@ -16,8 +16,9 @@
     crossings       `near_faces.near_faces`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
-    triangles       `faults.Search`, `shells.shell_volumes`, `shells.shell_depths`,
-                    `grouping.first_equal_row`, `Mesh.face_areas`, `polygons.cut_into_triangles`
+    shells          `shells.shell_volumes`, `shells.shell_depths`
+    triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`,
+                    `polygons.cut_into_triangles`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
                     `ply_tables.tables_of`
 
@@ -51,6 +52,7 @@ from .pairs import facing_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
+from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
 from .text import (
     corners_of_lines,
     facet_corners,
@@ -65,8 +67,6 @@ from .triangles import (
     flat_faces,
     quad_cuts,
     quad_halves,
-    shell_boxes,
-    shell_sums,
     wrongly_cut,
 )
 from .volumes import (
@@ -125,7 +125,9 @@ __all__ = [
     "rows_of_lists",
     "same_across",
     "shell_boxes",
+    "shell_extremes",
     "shell_sums",
+    "shells_around",
     "solve_factored",
     "solve_sparse",
     "sorted_edges",

@@ -1,4 +1,4 @@
-"""Areas and volumes of triangles, and equal points, for `mesh`.
+"""Areas and cuts of faces, and equal points, for `mesh` and `polygons`.
 
 The same operations in the same order as their equivalents in numpy, so that results are equal.
 """
@@ -47,51 +47,6 @@ def face_areas(areas, points, faces, start, stop):
         vx, vy, vz = points[k, 0] - ax, points[k, 1] - ay, points[k, 2] - az
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         areas[f] = 0.5 * np.sqrt((x * x + y * y) + z * z)
-
-
-@_compile
-def shell_sums(volume, area, size, origins, points, faces, shells):
-    """Add to *volume* and *area* (k,) of each shell six times and twice those of its faces.
-
-    The origin (k, 3) of a shell is the apex of volumes, and *size* (k,) becomes the largest
-    distance of a first corner from it.  *shells* (m,) is not read if there is only one.
-    """
-    several = len(origins) > 1
-    for f in range(len(faces)):
-        s = shells[f] if several else 0
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ox, oy, oz = origins[s, 0], origins[s, 1], origins[s, 2]
-        ax, ay, az = points[i, 0] - ox, points[i, 1] - oy, points[i, 2] - oz
-        bx, by, bz = points[j, 0] - ox, points[j, 1] - oy, points[j, 2] - oz
-        cx, cy, cz = points[k, 0] - ox, points[k, 1] - oy, points[k, 2] - oz
-        x, y, z = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-        volume[s] += (ax * x + ay * y) + az * z
-        ux, uy, uz = bx - ax, by - ay, bz - az
-        vx, vy, vz = cx - ax, cy - ay, cz - az
-        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        area[s] += np.sqrt((x * x + y * y) + z * z)
-        size[s] = max(size[s], np.sqrt((ax * ax + ay * ay) + az * az))
-
-
-@_compile
-def shell_boxes(low, high, last, points, faces, shells):
-    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices.
-
-    *last* (n,) must be filled with -1.
-    """
-    for f in range(len(faces)):
-        s = shells[f]
-        for c in range(3):
-            v = faces[f, c]
-            if last[v] == s:
-                continue
-            last[v] = s
-            for axis in range(3):
-                x = points[v, axis]
-                if x < low[s, axis]:
-                    low[s, axis] = x
-                if x > high[s, axis]:
-                    high[s, axis] = x
 
 
 @_compile
