@@ -109,7 +109,7 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     shortest[np.isinf(shortest)] = 0.0
     shortest = shortest[border]
     most = np.nextafter(_NEARLY * shortest.max(initial=0.0), np.inf)  # farther ones are not sought
-    tree = cKDTree(points[border])
+    tree = cKDTree(points[border], compact_nodes=False, balanced_tree=False)  # sooner built
     found = tree.query(points[border], min(_NEAREST + 1, len(border)), distance_upper_bound=most)
     away, other = (np.reshape(each, (len(border), -1)) for each in found)
     one, k = np.nonzero(np.isfinite(away))
