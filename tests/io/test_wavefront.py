@@ -43,6 +43,24 @@ def names_of(surface, key):
     return [names[k] for k in surface.cell_data[key]]
 
 
+def test_comments_above_the_vertices_are_kept(tmp_path, caplog):
+    text = BLENDER.replace("# Blender 4.2\n", "# Blender 4.2\n#\n#  für alle \n")
+    (tmp_path / "a.obj").write_text(text.replace("usemtl a", "# later\nusemtl a"), encoding="utf-8")
+    (tmp_path / "Körper.mtl").touch()
+    surface = read_polydata(tmp_path / "a.obj")
+    assert get_names(surface, "Comments") == ["Blender 4.2", "", "für alle"]
+    write_mesh(tmp_path / "b.obj", surface)
+    lines = (tmp_path / "b.obj").read_text(encoding="utf-8").split("\n")
+    assert lines[:4] == ["# Blender 4.2", "#", "# für alle", "mtllib Körper.mtl"]
+    assert caplog.text == ""
+    set_names(surface, "Comments", ["one\ntwo", "C:\\"])  # must not continue on the next line
+    write_mesh(tmp_path / "b.obj", surface)
+    assert get_names(read_polydata(tmp_path / "b.obj"), "Comments") == ["one", "two", "C:"]
+    surface.field_data["Comments"] = [1.0]
+    write_mesh(tmp_path / "b.obj", surface)
+    assert "Comments" in caplog.text
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_names_that_are_not_ascii_are_read_and_written(tmp_path, encoding, newline):
@@ -77,7 +95,7 @@ def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
     at = lines.index("o Körper")
     assert lines[at : at + 4] == ["o Körper", "g links oben", "usemtl Haut #1", "s 1"]
     assert lines.count("s off") == 1
-    assert lines[0] == "mtllib Körper.mtl"
+    assert lines[:2] == ["# Blender 4.2", "mtllib Körper.mtl"]
 
 
 def test_a_material_library_that_is_not_beside_the_file_is_told(tmp_path, caplog):

@@ -18,6 +18,7 @@ from vtkmodules.vtkCommonCore import vtkStringArray
 from ..errors import MeshError
 
 HEADER = "Header"  # a field array with the title of a file, in formats that have one
+COMMENTS = "Comments"  # a field array with the comments of a file, likewise
 CELL_TYPES = "types of the cells of a grid"  # a field array, see `grids`
 _log = logging.getLogger(__name__)
 _LONGEST = 200  # characters; some readers store names in buffers of fixed size

@@ -26,7 +26,14 @@ import pyvista as pv
 
 from ..arrays import IntArray
 from ..errors import MeshError
-from .array_names import get_names, plain_names, set_names, warn_left_out, warn_renamed
+from .array_names import (
+    COMMENTS,
+    get_names,
+    plain_names,
+    set_names,
+    warn_left_out,
+    warn_renamed,
+)
 from .ply_tables import Lists, Table, comments_of, tables_of
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, unstripped
 
@@ -41,7 +48,7 @@ _WIDTHS = {"RGB": 3, "RGBA": 4}
 _NORMAL = ("nx", "ny", "nz")
 _CORNERS = ("vertex_indices", "vertex_index")
 _POINT_TEXTURE, _CORNER_TEXTURE = "TextureCoordinates", "TextureCorners"
-_LINES = {"comment": "Comments", "obj_info": "ObjectInfo"}  # field arrays of lines of the header
+_LINES = {"comment": COMMENTS, "obj_info": "ObjectInfo"}  # field arrays of lines of the header
 _PLAIN = re.compile(r"[!-~]+")
 _COMMON = 255  # corners of a face; VTK and MeshLab store the number in a byte
 _NO_NUMBERS = np.empty(0, dtype=np.int64)

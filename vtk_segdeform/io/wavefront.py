@@ -13,6 +13,7 @@ its vertices.  Here vertices remain as in the file:
                         "ObjectNames", "GroupNames" and "MaterialNames"
     s                   cell array "Smoothing": smoothing group, 0 is off
     mtllib              field array "MaterialLibrary"
+    # ...               before the first vertex: field array "Comments"; others are ignored
 
 A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
 texture coordinates.
@@ -32,6 +33,7 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import (
+    COMMENTS,
     decoded,
     get_names,
     plain_names,
@@ -74,10 +76,12 @@ def read_obj(path: Path) -> pv.PolyData:
     above = np.stack([lines.above(word) for word in _WORDS], axis=1)
     cells: dict[str, list[list[int]]] = {"p": [], "l": []}
     runs: _Runs = {word: [] for word in (*_NAMED, "s")}
-    libraries = []
+    libraries, comments = [], []
     for number, word, rest in statements:
         n_points, *_, n_faces = above[number].tolist()
-        if word in cells:
+        if word.startswith("#"):
+            comments += [f"{word} {rest}"[1:].strip()] if not n_points else []
+        elif word in cells:
             ends = [each.partition("/")[0] for each in _words(rest)]
             if len(ends) > (word == "l"):
                 cells[word].append([_number(each, n_points) for each in ends])
@@ -107,8 +111,9 @@ def read_obj(path: Path) -> pv.PolyData:
     normals = _table("normal", lines, "vn", (3,))
     _keep_corners(surface, "normal", normals, counts, indices[:, [0, 2]])
     _keep_runs(surface, runs)
-    if libraries:
-        set_names(surface, _LIBRARY, libraries)
+    for name, kept in ((_LIBRARY, libraries), (COMMENTS, comments)):
+        if kept:
+            set_names(surface, name, kept)
     return surface
 
 
@@ -267,6 +272,8 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     libraries = plain_names(get_names(surface, _LIBRARY))
     warn_renamed("material library", libraries)
     kept["field"] += [_LIBRARY] if libraries else []
+    comments = [line for text in get_names(surface, COMMENTS) for line in text.splitlines() or [""]]
+    kept["field"] += [COMMENTS] if comments else []
     if missing := [name for name in libraries.values() if not os.path.exists(path.parent / name)]:
         _log.warning("the OBJ file refers to %s: copy it to the same folder", ", ".join(missing))
     table = np.asarray(surface.points, dtype=float)
@@ -278,6 +285,7 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     words = _corner_words(corners, texture_of, normal_of)
     ends = np.cumsum(counts).tolist()
     with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(f"# {line}".rstrip(" \\") + "\n" for line in comments)
         file.writelines(f"mtllib {name}\n" for name in libraries.values())
         file.writelines(f"v {' '.join(map(repr, row))}\n" for row in table.tolist())
         file.writelines(f"vt {u!r} {v!r}\n" for u, v in texture.tolist())
