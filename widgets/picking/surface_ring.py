@@ -2,7 +2,8 @@
 
 So the ring does not appear on a finger beside the one under the pointer.  The distances of a large
 mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that,
-and until it is finished there is no ring.  A ring of a few of its triangles is a plane circle.
+and until it is finished there is no ring.  A ring of a few of its triangles is a plane circle, and so is one
+that is farther than the component reaches, such as a button.
 """
 
 from __future__ import annotations
@@ -70,7 +71,8 @@ class SurfaceRing:
             away = sample.distance.within(x, centres, start, radius)
             near = (away[sample.faces] <= radius).any(axis=1)
             faces = sample.faces[near]
-            return contour(x[faces], away[faces], radius)
+            if len(segments := contour(x[faces], away[faces], radius)):
+                return segments
         return _circle(points[corner], centre, radius)
 
     def _ready_sample(self) -> _Sample | None:

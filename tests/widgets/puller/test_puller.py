@@ -281,6 +281,22 @@ def test_the_ring_is_on_the_part_below_the_pointer_alone():
     np.testing.assert_allclose(np.arccos(np.clip(cosine, -1.0, 1.0)), 0.8, atol=0.04)
 
 
+def test_the_ring_about_a_small_part_is_a_circle_in_its_plane():
+    ball, faces = icosphere(3)
+    mesh = Mesh(0.1 * ball, faces)
+    face = 17
+    centre = mesh.vertices[faces[face]].mean(axis=0)
+    across = 0.1 * np.pi  # from pole to pole along the surface
+    for radius in (0.8 * across, 1.2 * across):
+        ring = SurfaceRing(mesh).around(mesh.vertices, centre=centre, face=face, radius=radius)
+        assert len(ring) > 20
+        on_ball = np.linalg.norm(ring, axis=2) < 0.11
+        assert on_ball.all() == (radius < across)
+    np.testing.assert_allclose(np.linalg.norm(ring - centre, axis=2), radius)
+    a, b, c = mesh.vertices[faces[face]]
+    np.testing.assert_allclose((ring - centre) @ np.cross(b - a, c - a), 0.0, atol=1e-12)
+
+
 def test_the_caption_is_beside_the_point_off_the_body_and_in_the_window():
     view = plain_view((400, 300))
     view.camera.ParallelProjectionOn()
