@@ -17,6 +17,8 @@ its vertices.  Here vertices remain as in the file:
 
 A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
 texture coordinates.
+
+Long because the reader and the writer of each statement are beside each other.
 """
 
 from __future__ import annotations

@@ -52,6 +52,7 @@ def shell_faults(
     vertices: FloatArray,
     half_edges: HalfEdges,
     closed: BoolArray,
+    *,
     sums: ShellSums | None = None,
     depth: IntArray | None = None,
 ) -> tuple[BoolArray, BoolArray]:

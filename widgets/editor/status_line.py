@@ -136,7 +136,7 @@ class StatusLine:
 
 
 def letter_size(width: int, height: int) -> float:
-    """Return the font size for a window, in pixels: on a large one, not much above that of labels."""
+    """Return the font size for a window, in pixels; on a large one, little above that of labels."""
     return float(np.clip(min(height / 36.0, width / 48.0), 11.0, max(19.0, height / 80.0)))
 
 

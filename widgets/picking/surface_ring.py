@@ -2,8 +2,8 @@
 
 So the ring does not appear on a finger beside the one under the pointer.  The distances of a large
 mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that,
-and until it is finished there is no ring.  A ring of a few of its triangles is a plane circle, and so is one
-that is farther than the component reaches, such as a button.
+and until it is finished there is no ring.  A ring of a few of its triangles is a plane
+circle, and so is one beyond the whole component, such as a button.
 """
 
 from __future__ import annotations
