@@ -401,8 +401,8 @@ def _inward_and_flat_shells(search: Search, finite: BoolArray | None) -> tuple[I
     closed = closed_shells(half_edges)
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    known = {"sums": search.shell_sums, "depth": search.depth} if finite is None else {}
-    wrong, flat = shell_faults(search.points, half_edges, closed, **known)
+    sums, depth = (search.shell_sums, search.depth) if finite is None else (None, None)
+    wrong, flat = shell_faults(search.points, half_edges, closed, sums=sums, depth=depth)
     first = half_edges.faces[first_members(half_edges.shells), 0]
     return first[wrong & ~flat], first[flat]
 
