@@ -52,7 +52,9 @@ def test_comments_above_the_vertices_are_kept(tmp_path, caplog):
     write_mesh(tmp_path / "b.obj", surface)
     lines = (tmp_path / "b.obj").read_text(encoding="utf-8").split("\n")
     assert lines[:4] == ["# Blender 4.2", "#", "# für alle", "mtllib Körper.mtl"]
-    assert caplog.text == ""
+    (tmp_path / "plain.obj").write_text("# by hand\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    write_mesh(tmp_path / "plain.stl", read_polydata(tmp_path / "plain.obj"))
+    assert caplog.text == ""  # comments are no data
     set_names(surface, "Comments", ["one\ntwo", "C:\\"])  # must not continue on the next line
     write_mesh(tmp_path / "b.obj", surface)
     assert get_names(read_polydata(tmp_path / "b.obj"), "Comments") == ["one", "two", "C:"]

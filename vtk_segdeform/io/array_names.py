@@ -102,6 +102,8 @@ def warn_left_out(
 ) -> None:
     """Log a warning that lists the arrays and cells of *surface* that the format cannot store.
 
+    Comments are no data, and most files have some, so they are left out without a warning.
+
     Parameters
     ----------
     format_ : str
@@ -113,11 +115,12 @@ def warn_left_out(
     cells : bool
         Whether vertex and line cells are written.
     """
+    silent = (CELL_TYPES, COMMENTS) if get_names(surface, COMMENTS) else (CELL_TYPES,)
     lost = [
         f"{sort} array {name!r}"
         for sort in ("point", "cell", "field")
         for name in list(getattr(surface, f"{sort}_data"))
-        if name not in (*kept.get(sort, ()), CELL_TYPES)
+        if name not in (*kept.get(sort, ()), *(silent if sort == "field" else ()))
     ]
     for count, sort in ((surface.n_verts, "vertex"), (surface.n_lines, "line")):
         if count and not cells:

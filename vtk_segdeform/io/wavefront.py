@@ -13,7 +13,7 @@ its vertices.  Here vertices remain as in the file:
                         "ObjectNames", "GroupNames" and "MaterialNames"
     s                   cell array "Smoothing": smoothing group, 0 is off
     mtllib              field array "MaterialLibrary"
-    # ...               before the first vertex: field array "Comments"; others are ignored
+    # ...               above the first vertex: field array "Comments"; others are ignored
 
 A name is the rest of its line, in UTF-8 or Latin-1; names are written in UTF-8.  Lines have no
 texture coordinates.

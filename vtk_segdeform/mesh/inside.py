@@ -121,14 +121,9 @@ def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, i
 
 def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return which of (n, 3) *points* are inside a closed, outward oriented surface."""
-    return winding_by_columns(points, vertices, faces) > 0.5
-
-
-def winding_by_columns(points: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the winding number of a closed surface at each of (n, 3) *points*, (n,) whole."""
     low, high = _boxes(vertices[:, :2], faces)
     order = np.argsort(points[:, 0], kind="stable")
-    number = np.empty(len(points))
+    inside = np.zeros(len(points), dtype=bool)
 
     def work(start: int, stop: int) -> None:  # a band in x; each face meets a range in y of it
         band = order[start:stop]
@@ -146,10 +141,10 @@ def winding_by_columns(points: FloatArray, vertices: FloatArray, faces: IntArray
             met, height, sign = _crossings(vertices, faces[its_faces], x[at], y[at])
             below = height < z[at[met]]
             winding += np.bincount(at[met[below]], sign[below], minlength=len(band))
-        number[band] = winding
+        inside[band] = winding > 0.5
 
     in_parallel(work, len(points), _BAND)
-    return number
+    return inside
 
 
 def _between(xy: FloatArray, faces: IntArray, nx: int, ny: int) -> BoolArray:

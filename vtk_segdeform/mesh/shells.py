@@ -4,6 +4,10 @@ A shell inside an even number of other shells bounds a body, so its volume must 
 an odd number it bounds a cavity, so its volume must be negative.  A point is inside a shell if the
 shell's generalized winding number there is 1 or -1, so shells with small holes count too.
 
+A compiled kernel finds that number by a cone over the border of the shell, which closes it: what
+shell and cone have together is counted along a column, see `inside`, and that of the cone, a few
+faces, is subtracted.  A point on the shell, up to rounding, is not inside.
+
 Source
 ------
 A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using generalized
@@ -161,7 +165,7 @@ def _are_around(
 ) -> BoolArray:
     """Return for which *pairs* (p, 2) of shells the first one is around the second one, (p,).
 
-    *pairs* are in the order of the first ones.  Nearer than *near* (k,), rounding matters.
+    *pairs* are in the order of the first ones.  Points at most *near* (k,) from a shell are on it.
     """
     flip = np.zeros(len(half_edges.faces), dtype=bool) if flip is None else flip
     faces = flipped_faces(half_edges.faces, flip)

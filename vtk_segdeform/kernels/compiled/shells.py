@@ -1,6 +1,7 @@
 """Volumes and boxes of shells, and which shell is around which, for `mesh`.
 
-The same operations in the same order as their equivalents in numpy, so that results are equal.
+The same operations in the same order as their equivalents in numpy, so that results are equal;
+only `shells_around` counts where numpy computes winding numbers.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import numpy as np
 from .kernels import kernel
 
 _compile = kernel()
-_NEAR = 1 << 40  # a number that no winding number has
+_UNSURE = 1 << 40  # a count that no surface has
 
 
 @_compile
@@ -92,7 +93,7 @@ def _side(points, tail, head, x, y):
 def _faces_below(points, faces, start, stop, x, y, z, near):
     """Return how many of faces start..stop are below, +1 looking down, -1 looking up.
 
-    `_NEAR` if the distance to one of them may be at most *near*.
+    `_UNSURE` if the distance to one of them may be at most *near*.
     """
     count = 0
     for f in range(start, stop):
@@ -113,7 +114,7 @@ def _faces_below(points, faces, start, stop, x, y, z, near):
             nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
             height = ax * nx + ay * ny + az * nz
             if height * height <= near * near * (nx * nx + ny * ny + nz * nz):
-                return _NEAR
+                return _UNSURE
             is_below = height * nz < 0.0
         one, two = _side(points, i, j, x, y) > 0.0, _side(points, j, k, x, y) > 0.0
         if is_below and one == two and one == (_side(points, k, i, x, y) > 0.0):
@@ -166,7 +167,7 @@ def shells_around(
             x, y, z = points[v, 0], points[v, 1], points[v, 2]
             count = _faces_below(points, faces, begin, end, x, y, z, near[outer])
             more = _faces_below(points, cones, first, last, x, y, z, near[outer])
-            if count == _NEAR or more == _NEAR:
+            if count == _UNSURE or more == _UNSURE:
                 number = _winding(points, faces, begin, end, x, y, z, near[outer])
             else:
                 number = count + more - _winding(points, cones, first, last, x, y, z, 0.0)
