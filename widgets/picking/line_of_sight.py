@@ -68,7 +68,7 @@ def faces_in_beam(
 
     The beam goes through *origin* (3,) along *way* (3,); its sides are *width* away from that line.
     """
-    axes = _across(way)
+    axes = perpendicular(way)
     kernels = compiled_kernels(len(faces))
     if kernels:
         sides = np.empty(len(points), dtype=np.uint8)
@@ -91,7 +91,7 @@ def faces_in_beam(
     return np.flatnonzero((first & second & third) == 0)
 
 
-def _across(way: FloatArray) -> NDArray[np.float64]:
+def perpendicular(way: FloatArray) -> NDArray[np.float64]:
     """Return two unit vectors (2, 3), perpendicular to *way* and to each other."""
     first = np.cross(way, np.eye(3)[np.abs(way).argmin()])
     first /= np.linalg.norm(first)

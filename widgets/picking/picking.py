@@ -99,7 +99,11 @@ class Picker:
         if self._ring is None:
             self._ring = SurfaceRing(self._mesh)
         return self._ring.around(
-            self._surface.points, centre=hit.point, face=hit.face, radius=radius
+            self._surface.points,
+            centre=hit.point,
+            face=hit.face,
+            radius=radius,
+            sight=self._view.view_direction,
         )
 
     def component(self, vertex: int) -> BoolArray:

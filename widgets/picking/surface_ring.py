@@ -3,7 +3,8 @@
 So the ring does not appear on a finger beside the one under the pointer.  The distances of a large
 mesh are those of its decimated mesh, whose vertices lie on the surface; another thread makes that,
 and until it is finished there is no ring.  A ring of a few of its triangles is a plane
-circle, and so is one beyond the whole component, such as a button.
+circle in one of them; one beyond the whole component, such as a button, is a circle that faces the
+camera.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from vtk_segdeform.arrays import FloatArray, IntArray
 from vtk_segdeform.geometry import decimated
 from vtk_segdeform.mesh import Mesh
 
+from .line_of_sight import perpendicular
 from .surface_distance import SurfaceDistance
 
 _SMALLEST = 1.5  # sides of the triangles, at least, in the radius of a ring that follows them
@@ -42,7 +44,7 @@ class SurfaceRing:
             self._sample = _Sample.of(mesh.faces, every, every)
 
     def around(
-        self, points: FloatArray, *, centre: FloatArray, face: int, radius: float
+        self, points: FloatArray, *, centre: FloatArray, face: int, radius: float, sight: FloatArray
     ) -> FloatArray:
         """Return the segments (k, 2, 3) of the ring about *centre*.
 
@@ -56,6 +58,8 @@ class SurfaceRing:
             The triangle that contains it.
         radius : float
             Above 0.
+        sight : (3,) float
+            The viewing direction, of length 1.
         """
         corner = self._mesh.faces[face]
         sample = self._ready_sample()
@@ -71,9 +75,13 @@ class SurfaceRing:
             away = sample.distance.within(x, centres, start, radius)
             near = (away[sample.faces] <= radius).any(axis=1)
             faces = sample.faces[near]
-            if len(segments := contour(x[faces], away[faces], radius)):
-                return segments
-        return _circle(points[corner], centre, radius)
+            segments = contour(x[faces], away[faces], radius)
+            return segments if len(segments) else _circle(perpendicular(sight), centre, radius)
+        side, other = points[corner[1:]] - points[corner[0]]
+        normal = np.cross(side, other)
+        if not (length := np.linalg.norm(normal)) > 0.0:
+            return np.empty((0, 2, 3))
+        return _circle(perpendicular(normal / length), centre, radius)
 
     def _ready_sample(self) -> _Sample | None:
         """Return the sample; None if it is not finished yet."""
@@ -126,14 +134,8 @@ def contour(corners: FloatArray, values: FloatArray, level: float) -> FloatArray
     return np.asarray((start + fraction[:, None] * (end - start)).reshape(-1, 2, 3))
 
 
-def _circle(corners: FloatArray, centre: FloatArray, radius: float) -> FloatArray:
-    """Return a circle in the plane of a triangle, as segments (k, 2, 3)."""
-    side = corners[1] - corners[0]
-    normal = np.cross(side, corners[2] - corners[0])
-    lengths = np.linalg.norm(side), np.linalg.norm(normal)
-    if not min(lengths) > 0.0:
-        return np.empty((0, 2, 3))
-    x, normal = side / lengths[0], normal / lengths[1]
-    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS + 1)[:, None]
-    line = centre + radius * (np.cos(angle) * x + np.sin(angle) * np.cross(normal, x))
+def _circle(axes: FloatArray, centre: FloatArray, radius: float) -> FloatArray:
+    """Return a circle in the plane of two *axes* (2, 3), unit vectors, as segments (k, 2, 3)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS + 1)
+    line = centre + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes
     return np.stack([line[:-1], line[1:]], axis=1)
