@@ -13,11 +13,16 @@ COMPILED = 2_000
 Handing arrays to a kernel takes some microseconds, and importing numba half a second.  The volume
 of 8,000 faces takes 0.03 ms instead of 0.13."""
 
-COMPILED_LATE = 100_000
-"""The same for the first mesh of an editor, until that has been dragged.
+COMPILED_LATE = 300_000
+"""The same for the first mesh of an editor, until its stand-in can be pulled.
 
-A mesh of 5,400 vertices, dragged at once, follows after 1.1 to 1.2 s of processor time instead of
-1.8 to 2.1."""
+A mesh of 50,000 vertices is drawn after 0.4 s instead of 1.2, and follows the pointer after 1.5 s
+instead of 2.8."""
+
+COMPILED_PREPARATION = 12_000
+"""Vertices from which the preparation of such a mesh then waits for the kernels.
+
+At 12,000 it takes 2.5 s with their import and without them, at 5,400 vertices 2.5 s and 1.8."""
 
 COMPILED_CHECKS = 1_500_000
 """Faces that checks of meshes process without compiled kernels before they import numba.
@@ -75,6 +80,11 @@ Both depend on the shape only: for a million vertices they take 2.7 s of process
 
 DECIMATED_POINTS = 12_000
 """Vertices of the decimated mesh, about: several hundred for each limb."""
+
+STAND_IN_POINTS = 800
+"""Vertices of the decimated mesh that is pulled until the mesh itself is bound, about.
+
+It is bound in 0.1 s."""
 
 DRAFT = 20_000
 """Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.

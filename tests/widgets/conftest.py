@@ -13,5 +13,5 @@ from vtk_segdeform.widgets.editor import preparing
 def unprepared() -> Iterator[None]:
     """Do not prepare sessions for pulls in the background: for tests of the other modes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "lacking", lambda _: None)
+        patch.setattr(preparing, "lacking", lambda *_: None)
         yield

@@ -2,6 +2,7 @@
 
     kernels = compiled_kernels()        the module `compiled`, or None
     kernels = compiled_checks(size)     the same for short checks, which are not worth an import
+    load()                              import them now
     load_early()                        import them before they are needed
     load_late()                         do without them for small arrays until then
 
@@ -59,13 +60,23 @@ def compiled_checks(size: int) -> Any:
     return _kernels()
 
 
+def load() -> None:
+    """Load the compiled kernels, and set up the compiler; in any thread."""
+    try:
+        kernels = _kernels()
+        if kernels is not None:
+            kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
+    finally:
+        _is_late[0] = False
+
+
 def load_early() -> None:
     """Begin to load the compiled kernels in another thread, if they are not loaded yet.
 
     Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.
     """
     if not _kernels.cache_info().currsize:
-        Thread(target=_load, name="segdeform kernels").start()
+        Thread(target=load, name="segdeform kernels").start()
 
 
 def load_late() -> None:
@@ -135,15 +146,6 @@ def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]
     ends = np.cumsum(sizes)
     room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
     return np.split(room[: ends[-1]], ends[:-1])
-
-
-def _load() -> None:
-    try:
-        kernels = _kernels()
-        if kernels is not None:
-            kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
-    finally:
-        _is_late[0] = False
 
 
 @functools.cache

@@ -10,6 +10,7 @@ The files, in reading order:
     painting       painting, merging and splitting regions
     finishing      poses finished on the mesh itself
     pose_solver    poses of states, with cached solvers
+    stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes
     naming         names of regions and handles
     store          saving and loading sessions
@@ -23,6 +24,7 @@ from .listeners import Change
 from .naming import region_name
 from .pulling import automatic_locality, middle_vertex
 from .session import Effort, Preparation, Session
+from .stand_in import StandIn
 from .state import Options, State
 from .store import load_session, save_session, saved_view
 
@@ -33,6 +35,7 @@ __all__ = [
     "Options",
     "Preparation",
     "Session",
+    "StandIn",
     "State",
     "automatic_locality",
     "load_session",

@@ -22,7 +22,13 @@ from .anderson import Anderson
 from .barrier import Barrier
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
-from .exact_volume import ScaledSurface, are_met, moved_along, steps_to_volume
+from .exact_volume import (
+    ScaledSurface,
+    are_met,
+    moved_along,
+    scale_to_volume,
+    steps_to_volume,
+)
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import Solution, Status
@@ -63,6 +69,7 @@ __all__ = [
     "moved_along",
     "position_term",
     "region_volumes",
+    "scale_to_volume",
     "steps_to_volume",
     "total_volume",
     "waypoints",

@@ -14,7 +14,8 @@ two properties of the coordinates: they sum to 1, and give each vertex its place
 With h a tenth of the distance between cage vertices, poses differ from those of the coordinates
 themselves by up to 4e-5 of the diagonal and normals by up to 0.4 degrees, if the cage vertices move
 at random by a third of that distance; where a cage is closer to the surface than `fit_cages` makes
-it, a check of some vertices makes h smaller, or gives up.
+it, a check of some vertices makes h smaller, or gives up.  Rough rows, with twice that h, have an
+eighth of the nodes, and poses that differ by up to 1.3e-3 of the diagonal.
 
 A vertex stores its offset from the nearest node only.  A map computes the motion of the nodes first
 and then, for each vertex, the sum over the 27 nodes around it.
@@ -24,12 +25,14 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage, mean_value_coordinates
 from ..kernels import compiled_kernels, inputs
@@ -38,6 +41,7 @@ from ..progress import Progress, part
 _SPACING = 0.08  # h, relative to sqrt(area of the cage / its vertices)
 _HALVINGS = 1  # of h, where the error is too large
 _CHECKED, _TOLERANCE = 256, 0.01  # vertices; largest sum of the errors in a row
+_ROUGH_SPACING, _ROUGH_TOLERANCE = 0.16, 0.1
 _WORTHWHILE = 0.5  # nodes per vertex; with more, the coordinates themselves are as fast
 _SOME = 1 << 15  # nodes or vertices processed together
 _MARGIN = 3  # nodes around those of the vertices: B-splines and second differences need two
@@ -69,9 +73,17 @@ class InterpolatedBlock:
 
     @classmethod
     def of(
-        cls, points: FloatArray, blend: FloatArray, cage: Cage, progress: Progress | None = None
+        cls,
+        points: FloatArray,
+        blend: FloatArray,
+        cage: Cage,
+        *,
+        rough: bool = False,
+        progress: Progress | None = None,
     ) -> InterpolatedBlock | None:
         """Return the rows of *points* (n, 3); None if the coordinates themselves are better."""
+        widest = _ROUGH_SPACING if rough else _SPACING
+        tolerance = _ROUGH_TOLERANCE if rough else _TOLERANCE
         edges = cage.vertices[cage.faces]
         normals = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
         area = 0.5 * float(np.linalg.norm(normals, axis=1).sum())
@@ -79,12 +91,12 @@ class InterpolatedBlock:
         exact = mean_value_coordinates(points[checked], cage.vertices, cage.faces)
         exact *= blend[checked, None]
         for k in range(_HALVINGS + 1):
-            spacing = 0.5**k * _SPACING * np.sqrt(area / cage.n_vertices)
+            spacing = 0.5**k * widest * np.sqrt(area / cage.n_vertices)
             share = part(progress, k / (_HALVINGS + 1), (k + 1) / (_HALVINGS + 1))
             block = cls._on_grid(points, blend, cage, spacing, share)
             if block is None:
                 return None
-            if np.abs(block[checked] - exact).sum(axis=1).max() <= _TOLERANCE:
+            if np.abs(block[checked] - exact).sum(axis=1).max() <= tolerance:
                 return block
         return None
 
@@ -142,7 +154,7 @@ class InterpolatedBlock:
     def __getitem__(self, rows: IntArray | slice) -> FloatArray:
         """Return some rows, (k, m)."""
         own = self._of(rows)
-        if kernels := compiled_kernels():
+        if kernels := compiled_kernels(len(self.blend)):
             out = np.empty((len(own[0]), self.values.shape[1]))
             kernels.interpolated_rows(out, *inputs(*own, self.lines, self.values))
             return out
@@ -170,7 +182,7 @@ class InterpolatedBlock:
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return the transpose times *y* (n, k): (m, k)."""
         own, at_nodes = self._of(slice(None)), np.zeros((len(self.values), y.shape[1]))
-        if kernels := compiled_kernels():
+        if kernels := compiled_kernels(len(self.blend)):
             kernels.add_interpolated_adjoint(at_nodes, *inputs(y, *own, self.lines))
             return np.asarray(self.values.T @ at_nodes)
         for start in range(0, len(y), _SOME):
@@ -183,11 +195,19 @@ class InterpolatedBlock:
     ) -> None:
         """Add the motion of vertices start..stop to *rows* of *x*, given that of the nodes."""
         piece = slice(start, stop)
-        if kernels := compiled_kernels():
+        if kernels := compiled_kernels(len(self.blend)):
             arguments = inputs(rows[piece], *self._of(piece), self.lines, at_nodes)
             kernels.add_interpolated(x, *arguments)
             return
-        x[rows[piece]] += self._weights(slice(None), self._of(piece)) @ at_nodes
+        if len(self.blend) <= sizes.INTERPOLATED:
+            weights = self._all_weights[piece]
+        else:
+            weights = self._weights(slice(None), self._of(piece))
+        x[rows[piece]] += weights @ at_nodes
+
+    @cached_property
+    def _all_weights(self) -> sparse.csr_array:
+        return self._weights(slice(None), self._of(slice(None)))
 
     def _of(self, rows: IntArray | slice) -> tuple[Any, ...]:
         return self.blend[rows], self.offsets[rows], self.cells[rows]

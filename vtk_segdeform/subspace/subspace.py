@@ -363,6 +363,7 @@ def cage_subspace(
     cages: Sequence[Cage],
     *,
     blend: ArrayLike | None = None,
+    rough: bool = False,
     progress: Progress | None = None,
 ) -> Subspace:
     """Return W~: every mesh vertex expressed by the cages of its regions.
@@ -376,6 +377,8 @@ def cage_subspace(
     blend : (r, n) float, optional
         Blend weights instead of ``regions.weights``: non-negative, columns that sum to 1, zero
         outside each region.
+    rough : bool
+        Interpolate the rows of a large mesh roughly: poses differ by some 1e-3 diagonals.
     progress : Progress, optional
         Called as the coordinates of each region are computed.
 
@@ -396,8 +399,11 @@ def cage_subspace(
         members = np.flatnonzero(weights[r] > 0.0)
         points = regions.mesh.vertices[members]
         interpolated = None
-        if regions.mesh.n_vertices > sizes.INTERPOLATED:
-            interpolated = InterpolatedBlock.of(points, weights[r, members], cage, share)
+        fewest = sizes.DECIMATED if rough else sizes.INTERPOLATED
+        if regions.mesh.n_vertices > fewest:
+            interpolated = InterpolatedBlock.of(
+                points, weights[r, members], cage, rough=rough, progress=share
+            )
         rows.append(members)
         if interpolated is not None:
             blocks.append(interpolated)

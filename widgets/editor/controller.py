@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice, is_first_run, load_early, load_late
 from vtk_segdeform.progress import Progress, part
@@ -283,7 +284,9 @@ class Controller:
         self.refresh()
 
     def _listen(self) -> None:
-        self._stop_listening = self.session.on_change(self._session_changed)
+        session = self.session
+        self._stop_listening = session.on_change(self._session_changed)
+        self.widgets.puller.stand_in = lambda: self._preparing.stand_in(session)
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
@@ -349,6 +352,8 @@ class Controller:
                 self.messages.note(outcome)
             self._apply_mode()
 
+        if self.session.mesh.n_vertices > sizes.COMPILED_PREPARATION:
+            load_early()
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
             self.settling.flush()

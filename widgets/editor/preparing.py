@@ -7,34 +7,63 @@
 A stage is cancelled if its inputs change: the mesh, the regions, the cages or the options of the
 binding.  The next stage starts once the last one has ended, so only one runs at a time.  A stage
 that failed, or that the user has cancelled, is not repeated for the same inputs unless requested.
+
+A new mesh gets a `StandIn` first, which can be pulled long before the session is bound.
 """
 
 from __future__ import annotations
 
 import copy
+import logging
 from collections.abc import Callable
 from typing import Any
 
-from vtk_segdeform.errors import SegDeformError, SessionError
-from vtk_segdeform.progress import Progress
-from vtk_segdeform.session import Preparation, Session
+from vtk_segdeform import kernels, sizes
+from vtk_segdeform.errors import Cancelled, SegDeformError, SessionError
+from vtk_segdeform.progress import Progress, part
+from vtk_segdeform.session import Preparation, Session, StandIn
 
 from .job import Job, Timer
 from .messages import error_text
 
+_STAND_IN = 0.15  # of the progress of the first stage
 _STEP = 0.05  # the fraction that is shown is a multiple of this: each change draws the view
+
+_log = logging.getLogger(__name__)
 
 Work = Callable[[Progress], Preparation]
 
 
-def lacking(session: Session) -> Work | None:
+def lacking(session: Session, made: Callable[[StandIn], object] | None = None) -> Work | None:
     """Return the next stage of the preparation of *session*; None if it needs none.
 
-    The work uses a copy of the session, which has no listeners, so another thread may run it.
+    It passes a stand-in to *made*, if one is useful, before it begins.  The work uses a copy of the
+    session, which has no listeners, so another thread may run it.
     """
     if session.is_bound:
         return None
-    return copy.copy(session).preparation
+    own = copy.copy(session)
+    is_new = not (own.cages or _is_posed(own)) and own.mesh.n_vertices > sizes.STAND_IN_POINTS
+
+    def work(progress: Progress) -> Preparation:
+        if made is not None and is_new:
+            try:
+                made(StandIn.of(own.mesh, own.options.lids, part(progress, 0.0, _STAND_IN)))
+            except Cancelled:
+                raise
+            except (SegDeformError, ArithmeticError, ValueError, MemoryError) as fault:
+                _log.info("no stand-in", exc_info=fault)  # a pull waits for the session
+        if own.mesh.n_vertices > sizes.COMPILED_PREPARATION:
+            kernels.load()
+        return own.preparation(part(progress, _STAND_IN, 1.0))
+
+    return work
+
+
+def _is_posed(session: Session) -> bool:
+    """Return whether a pull would depend on more than the mesh."""
+    state = session.state
+    return state.pose is not None or bool(state.handles) or len(state.fixed) > 0
 
 
 class Preparing:
@@ -68,11 +97,17 @@ class Preparing:
         self._inputs: tuple[Any, ...] = ()  # of the running stage
         self._declined: tuple[Any, ...] = ()
         self._fraction: float | None = None
+        self._stand_in: StandIn | None = None
 
     @property
     def fraction(self) -> float | None:
         """Completed fraction of the running stage, 0..1, coarsely; None if none is running."""
         return self._fraction
+
+    def stand_in(self, session: Session) -> StandIn | None:
+        """Return what can be pulled instead of *session*; None if there is nothing yet."""
+        made = self._stand_in
+        return made if made and made.mesh is session.mesh and not _is_posed(session) else None
 
     def update(self, session: Session, *, start: bool, again: bool = False) -> None:
         """Cancel the running stage if its inputs have changed; *start* one if *session* lacks it.
@@ -86,7 +121,9 @@ class Preparing:
             if inputs != self._inputs:
                 self._job.cancel()
             return
-        if start and inputs != self._declined and (work := lacking(session)) is not None:
+        made = None if self.stand_in(session) is not None else self._made
+        work = lacking(session, made) if start and inputs != self._declined else None
+        if work is not None:
             self._inputs = inputs
             self._job = Job(
                 self._timer,
@@ -117,8 +154,11 @@ class Preparing:
         """Cancel the running stage without waiting for its end."""
         if self._job is not None:
             self._job.abandon()
-            self._job = None
+            self._job = self._stand_in = None
             self._show(None)
+
+    def _made(self, stand_in: StandIn) -> None:
+        self._stand_in = stand_in  # in the thread of the work
 
     def _watch(self, job: Job[Preparation]) -> None:
         if not job.is_running:
@@ -129,6 +169,7 @@ class Preparing:
             self._ended()
 
     def _finish(self, session: Session, result: Preparation) -> None:
+        self._stand_in = None
         if _key(session) == self._inputs:
             self._accept(session, result)
         self._ended()

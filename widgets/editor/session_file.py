@@ -17,7 +17,7 @@ from vtk_segdeform.session import Session, load_session, save_session
 from ..scene import drawn_triangles
 
 _SUFFIX = ".segdeform"
-_LARGE = 1 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
+_LARGE = 8 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
 _READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
 _MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
 # Types of files in dialogs.

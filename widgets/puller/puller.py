@@ -18,6 +18,7 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -29,7 +30,7 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session, automatic_locality
+from vtk_segdeform.session import Change, Session, StandIn, automatic_locality
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
@@ -47,6 +48,7 @@ GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _POLL = 40  # milliseconds
+_PAUSE = 3.0  # between two poses of a stand-in, in times that one takes
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
 _PREPARING = "Preparing: the pull starts in a moment"
@@ -69,6 +71,8 @@ class Puller(Widget):
     binds : bool
         Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
         done elsewhere.
+    stand_in : callable
+        Returns what is pulled instead of a session that is not ready, or None.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -76,6 +80,7 @@ class Puller(Widget):
         if surface is not None:
             require(surface, SurfaceDisplay, "surface")
         self.binds = True
+        self.stand_in: Callable[[], StandIn | None] = lambda: None
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._picker = Picker(self._surface)
@@ -88,6 +93,9 @@ class Puller(Widget):
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
         self._pending: Callable[[], None] | None = None  # a released pull that could not start yet
+        self._standing_in: StandIn | None = None  # whose pose is shown
+        self._wanted: tuple[int, FloatArray] | None = None  # a pull that is not shown yet
+        self._next_pose = -math.inf
         self._stop_polling: Stop | None = None
         self._live = LiveSolve(self.view, session, self.cancel)
         self._stop_listening = session.on_change(self._changed)
@@ -272,10 +280,12 @@ class Puller(Widget):
                 to = motion.of(start)
                 if self._is_ready:
                     has_moved = True
-                    self._live.solve(partial(pull, to))
+                    self._solve(partial(pull, to))
                 else:
                     self._live.begin()
                     self._wait()
+                    self._wanted = vertex, to
+                    self._pose_stand_in()
             if pointer.phase is Phase.RELEASE:
                 if to is not None and not has_moved:
                     self._pull_later(partial(pull, to))
@@ -312,6 +322,12 @@ class Puller(Widget):
         if self.effective_locality != before:
             self.remark += f". Local is now {100.0 * self.effective_locality:.0f} %"
 
+    def _solve(self, pull: Callable[..., Solution]) -> None:
+        if self._standing_in is not None:
+            pull()  # to the end, because a pose on the way would look like a way back
+        self._live.solve(pull)
+        self._stop_standing_in()
+
     # Pulls that wait for the session.
 
     @property
@@ -323,23 +339,53 @@ class Puller(Widget):
             self._stop_polling = self.view.every(_POLL, self._poll)
             self._invoke("ModifiedEvent")
 
+    def _pose_stand_in(self) -> None:
+        """Show the pose of the stand-in for the wanted pull, if there is one already.
+
+        It leaves most of the time to the thread that prepares the session: a pull that is wanted
+        too soon is shown by a later poll.
+        """
+        stand_in, began = self.stand_in(), time.perf_counter()
+        if self._wanted is None or stand_in is None or began < self._next_pose:
+            return
+        (vertex, to), self._wanted = self._wanted, None
+        is_first = self._standing_in is None
+        self._standing_in = stand_in
+        x = stand_in.pulled(vertex, to, radius=self.radius, locality=self.locality)
+        self._surface.instead = x
+        now = time.perf_counter()
+        self._next_pose = now + _PAUSE * (now - began)
+        if is_first:
+            self.view.render()  # at once, as this is what the user has waited for
+
+    def _stop_standing_in(self) -> None:
+        self._wanted = None
+        if self._standing_in is not None:
+            self._standing_in.release()
+            self._standing_in = None
+            self._surface.instead = None
+
     def _poll(self) -> None:
         if not self._is_ready:
+            self._pose_stand_in()
             return
-        pending = self._pending
-        self._drop_pending()
+        pending, self._pending = self._pending, None
+        self._stop_waiting()
         if self.is_grabbing:
             self._send(Phase.MOVE, "InteractionEvent")
         elif pending is not None:
             self.remark = ""
-            pending()
+            try:
+                pending()
+            finally:
+                self._stop_standing_in()
             self._invoke("EndInteractionEvent")
 
     def _pull_later(self, pull: Callable[..., Solution]) -> None:
         """Pull once the session is ready, unless another press or change comes first."""
 
         def begin() -> None:
-            self._live.solve(pull)
+            self._solve(pull)
             self.session.commit("pull")
             self._live.resume()
 
@@ -351,8 +397,12 @@ class Puller(Widget):
             self.remark = _PREPARING
 
     def _drop_pending(self) -> None:
-        """Wait no longer."""
+        """Wait no longer, and give up the pull."""
         self._pending = None
+        self._stop_waiting()
+        self._stop_standing_in()
+
+    def _stop_waiting(self) -> None:
         if self._stop_polling is not None:
             self._stop_polling()
             self._stop_polling = None

@@ -44,6 +44,7 @@ Stop = Callable[[], None]
 _LONGEST = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 _SHARE_DRAWN = 0.1  # of the time, at most, while another thread is spared
+_LONGEST_PAUSE = 0.5  # seconds; the next picture may be a draft, and quick to draw
 _MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
 _KEY_MARK = vtkCommand.UserEvent + 411  # never invoked: marks renderers whose views observe keys
 
@@ -166,8 +167,9 @@ class View(Projection):
         """Leave most of the time to another thread, until stopped.
 
         Drawing holds Python's lock, and all processors in software.  Pictures requested by events
-        therefore take at most a tenth of the time: one that comes too soon is drawn by a later
-        event, so a timer must be running.  `render` and the camera still draw at once.
+        therefore take at most a tenth of the time, or one each half second: one that comes too soon
+        is drawn by a later event, so a timer must be running.  `render` and the camera still draw
+        at once.
         """
         self._n_spared += 1
 
@@ -350,7 +352,7 @@ class View(Projection):
 
     def _is_due(self) -> bool:
         """Return whether a picture may be drawn now; see `spare`."""
-        pause = self._drawing_time * (1.0 / _SHARE_DRAWN - 1.0)
+        pause = min(self._drawing_time * (1.0 / _SHARE_DRAWN - 1.0), _LONGEST_PAUSE)
         return not self._n_spared or time.perf_counter() >= self._drawn + pause
 
 

@@ -733,7 +733,7 @@ def test_a_file_is_prepared_for_pulls_without_a_change_and_closed_meanwhile_at_o
     assert len(drawn) <= 1
     go_on, waiting = threading.Event(), threading.Event()
 
-    def lacking(_):
+    def lacking(*_):
         def work(progress):
             waiting.set()
             assert go_on.wait(30.0)

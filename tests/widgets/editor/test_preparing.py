@@ -8,12 +8,14 @@ import time
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, plain_view
+from numpy.testing import assert_array_equal
 from scenes import sausage
 
-from vtk_segdeform import Regions, Session
+from vtk_segdeform import Regions, Session, sizes
 from vtk_segdeform.errors import CageError
+from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
-from vtk_segdeform.session import Preparation
+from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import actions
 
@@ -74,6 +76,10 @@ class Bench:
         return self.editor.session
 
     @property
+    def surface(self):
+        return self.editor.widgets.surface
+
+    @property
     def aside(self):
         return self.editor.controller.messages.fraction
 
@@ -101,6 +107,13 @@ def bench(prepared, monkeypatch):
     yield made
     made.gate.is_open.set()
     made.editor.remove()
+
+
+@pytest.fixture
+def standing_in(monkeypatch, request):
+    """Yield the same with a stand-in, although the mesh is small."""
+    monkeypatch.setattr(sizes, "STAND_IN_POINTS", 100)
+    return request.getfixturevalue("bench")
 
 
 def test_everything_works_meanwhile_and_the_result_is_no_step(bench):
@@ -144,6 +157,81 @@ def test_a_press_during_opening_becomes_a_pull(bench, tmp_path, monkeypatch):
     assert not session.can_undo
     assert session.is_bound
     assert bench.hand.failures == []
+
+
+def test_a_stand_in_follows_until_the_session_does(standing_in):
+    bench, hand, session = standing_in, standing_in.hand, standing_in.session
+    mesh, rest, start, surface = session.mesh, session.mesh.vertices, bench.place, bench.surface
+    hand.press(start)
+    bench.until(lambda: hand.move(start + [30.0, 0.0]) or np.abs(surface.points - rest).max() > 0.1)
+    assert not session.is_bound
+    volume = signed_volume(rest, mesh.faces)
+    assert abs(signed_volume(surface.points, mesh.faces) / volume - 1.0) < 1e-12
+    assert_array_equal(session.vertices, rest)
+    assert not session.can_undo
+    hand.key("Escape")
+    assert_array_equal(surface.points, rest)
+    hand.release()
+    hand.press(start)
+    hand.move(start + [30.0, 0.0])
+    hand.release()
+    bench.until(lambda: surface.instead is not None)
+    shown = np.array(surface.points)
+    assert np.abs(shown - rest).max() > 0.1
+    hand.tick(3)
+    assert_array_equal(surface.points, shown)  # it stays, and the pull follows
+    bench.gate.is_open.set()
+    bench.until(lambda: session.can_undo)
+    assert session.undo_label == "pull"
+    assert_array_equal(surface.points, session.vertices)
+    assert np.linalg.norm(session.vertices - shown, axis=1).mean() < 0.05 * mesh.diagonal
+    session.undo()
+    assert not session.can_undo  # the stand-in is no step
+    assert_array_equal(surface.points, rest)
+    assert hand.failures == []
+
+
+def test_a_drag_goes_on_with_the_session_as_soon_as_it_is_bound(standing_in):
+    bench, hand, session = standing_in, standing_in.hand, standing_in.session
+    start, to, surface = bench.place, bench.place + [0.0, 90.0], bench.surface
+    hand.press(start)
+    bench.until(lambda: hand.move(to) or surface.instead is not None)
+    hand.tick(20)
+    farthest = np.abs(surface.points - session.mesh.vertices).max()
+    shown = []
+    bench.gate.is_open.set()
+    bench.until(lambda: shown.append(np.array(surface.points)) or session.is_dragging)
+    shown.append(np.array(surface.points))
+    assert surface.instead is None
+    for x in shown:  # not back to rest on the way
+        assert np.abs(x - session.mesh.vertices).max() > 0.8 * farthest
+    hand.move(to)
+    hand.release()
+    assert session.undo_label == "pull"
+    assert hand.failures == []
+
+
+@pytest.mark.parametrize("change", ["pin", "failure"])
+def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
+    def fails(*_):
+        raise ZeroDivisionError("a strange mesh")
+
+    if change == "failure":
+        monkeypatch.setattr(StandIn, "of", fails)
+    bench = request.getfixturevalue("standing_in")
+    hand, session = bench.hand, bench.session
+    bench.until(bench.gate.has_begun.is_set)
+    if change == "pin":
+        session.pin(0)
+    hand.press(bench.place)
+    hand.move(bench.place + [30.0, 0.0])
+    hand.tick(5)
+    assert bench.surface.instead is None
+    bench.gate.is_open.set()
+    bench.until(lambda: session.is_dragging)
+    hand.release()
+    assert session.undo_label == "pull"
+    assert hand.failures == []
 
 
 def test_escape_cancels_until_the_next_press(bench):

@@ -36,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("bound_once")
 def _unprepared():
     """Do not prepare sessions for pulls in the background."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "lacking", lambda _: None)
+        patch.setattr(preparing, "lacking", lambda *_: None)
         yield
 
 
