@@ -46,16 +46,18 @@ def lacking(session: Session, made: Callable[[StandIn], object] | None = None) -
     is_new = not (own.cages or _is_posed(own)) and own.mesh.n_vertices > sizes.STAND_IN_POINTS
 
     def work(progress: Progress) -> Preparation:
+        begun = 0.0
         if made is not None and is_new:
+            begun = _STAND_IN
             try:
-                made(StandIn.of(own.mesh, own.options.lids, part(progress, 0.0, _STAND_IN)))
+                made(StandIn.of(own.mesh, own.options.lids, part(progress, 0.0, begun)))
             except Cancelled:
                 raise
             except (SegDeformError, ArithmeticError, ValueError, MemoryError) as fault:
                 _log.info("no stand-in", exc_info=fault)  # a pull waits for the session
         if own.mesh.n_vertices > sizes.COMPILED_PREPARATION:
             kernels.load()
-        return own.preparation(part(progress, _STAND_IN, 1.0))
+        return own.preparation(part(progress, begun, 1.0))
 
     return work
 

@@ -121,7 +121,7 @@ class StatusLine:
             self._lines[0], f"! {text}" if warning else text, size, room=room, most=most
         )
         foot = 0.35 * size if fraction is None else 0.8 * size  # room for the bar
-        high = foot + leading * len(lines) + 0.35 * size
+        high = foot + leading * max(len(lines), 1) + 0.35 * size
         for k, words in enumerate(self._lines):
             words.set_text(lines[k] if k < len(lines) else "", size)
             words.place(left, high - 0.35 * size - (k + 0.5) * leading)

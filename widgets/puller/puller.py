@@ -146,6 +146,11 @@ class Puller(Widget):
         return self._stop_polling is not None
 
     @property
+    def is_standing_in(self) -> bool:
+        """Whether the pose of a stand-in is shown."""
+        return self._standing_in is not None
+
+    @property
     def is_refining(self) -> bool:
         """Whether a timer refines the pose at present."""
         return self._live.is_refining
@@ -352,10 +357,11 @@ class Puller(Widget):
         is_first = self._standing_in is None
         self._standing_in = stand_in
         x = stand_in.pulled(vertex, to, radius=self.radius, locality=self.locality)
-        self._surface.instead = x
+        self._surface.draw(x)
         now = time.perf_counter()
         self._next_pose = now + _PAUSE * (now - began)
         if is_first:
+            self._invoke("ModifiedEvent")
             self.view.render()  # at once, as this is what the user has waited for
 
     def _stop_standing_in(self) -> None:
@@ -363,7 +369,8 @@ class Puller(Widget):
         if self._standing_in is not None:
             self._standing_in.release()
             self._standing_in = None
-            self._surface.instead = None
+            self._surface.update()
+            self._invoke("ModifiedEvent")
 
     def _poll(self) -> None:
         if not self._is_ready:
@@ -394,7 +401,7 @@ class Puller(Widget):
         else:
             self._pending = begin
             self._wait()
-            self.remark = _PREPARING
+            self.remark = "" if self.is_standing_in else _PREPARING
 
     def _drop_pending(self) -> None:
         """Wait no longer, and give up the pull."""

@@ -76,6 +76,10 @@ class Bench:
         return self.editor.session
 
     @property
+    def puller(self):
+        return self.editor.widgets.puller
+
+    @property
     def surface(self):
         return self.editor.widgets.surface
 
@@ -165,6 +169,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.press(start)
     bench.until(lambda: hand.move(start + [30.0, 0.0]) or np.abs(surface.points - rest).max() > 0.1)
     assert not session.is_bound
+    assert "Rough preview" in bench.editor.status
     volume = signed_volume(rest, mesh.faces)
     assert abs(signed_volume(surface.points, mesh.faces) / volume - 1.0) < 1e-12
     assert_array_equal(session.vertices, rest)
@@ -175,7 +180,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.press(start)
     hand.move(start + [30.0, 0.0])
     hand.release()
-    bench.until(lambda: surface.instead is not None)
+    bench.until(lambda: bench.puller.is_standing_in)
     shown = np.array(surface.points)
     assert np.abs(shown - rest).max() > 0.1
     hand.tick(3)
@@ -195,14 +200,14 @@ def test_a_drag_goes_on_with_the_session_as_soon_as_it_is_bound(standing_in):
     bench, hand, session = standing_in, standing_in.hand, standing_in.session
     start, to, surface = bench.place, bench.place + [0.0, 90.0], bench.surface
     hand.press(start)
-    bench.until(lambda: hand.move(to) or surface.instead is not None)
+    bench.until(lambda: hand.move(to) or bench.puller.is_standing_in)
     hand.tick(20)
     farthest = np.abs(surface.points - session.mesh.vertices).max()
     shown = []
     bench.gate.is_open.set()
     bench.until(lambda: shown.append(np.array(surface.points)) or session.is_dragging)
     shown.append(np.array(surface.points))
-    assert surface.instead is None
+    assert not bench.puller.is_standing_in
     for x in shown:  # not back to rest on the way
         assert np.abs(x - session.mesh.vertices).max() > 0.8 * farthest
     hand.move(to)
@@ -226,7 +231,8 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     hand.press(bench.place)
     hand.move(bench.place + [30.0, 0.0])
     hand.tick(5)
-    assert bench.surface.instead is None
+    assert not bench.puller.is_standing_in
+    assert_array_equal(bench.surface.points, session.vertices)
     bench.gate.is_open.set()
     bench.until(lambda: session.is_dragging)
     hand.release()

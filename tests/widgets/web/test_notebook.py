@@ -31,7 +31,7 @@ def cells(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kernel]:
         running.run("from vtk_segdeform.widgets.web import web_editor")
         running.run("web_editor._SAMPLES = 0")  # multisampling in software takes long
         running.run("from vtk_segdeform.widgets.editor import preparing")
-        running.run("prepare, preparing.lacking = preparing.lacking, lambda _: None")
+        running.run("prepare, preparing.lacking = preparing.lacking, lambda *_: None")
         running.run(f"mesh = {SMALL}")
         running.run("kept = sd.edit(mesh)")  # runs until the kernel ends
         running.wait("kept.web.server.running")
@@ -94,7 +94,7 @@ def test_a_pull_in_the_page_is_there_in_the_next_cell(cells: Kernel, browser: Ch
     assert abs(float(cells.value("pulled.session.volume_change"))) < 1e-12
     cells.wait("abs(pulled.mesh.vertices - mesh.vertices).max() > 0.02 * mesh.diagonal")
     assert cells.value("type(pulled.mesh) is sd.Mesh") == "True"
-    cells.run("pulled.close(); preparing.lacking = lambda _: None")
+    cells.run("pulled.close(); preparing.lacking = lambda *_: None")
 
 
 def test_only_the_address_with_the_secret_reaches_the_editor(cells: Kernel, kept: str) -> None:
