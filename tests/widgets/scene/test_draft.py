@@ -125,17 +125,17 @@ def test_a_spared_thread_has_most_of_the_time(shown, monkeypatch):
             view.request_render()
         return len(pictures)
 
-    view._drawn, view._drawing_time = time.perf_counter(), 0.04
+    view._drawn, view._drawing_time = time.perf_counter(), 0.05
     assert ask() == 0
-    view._drawn -= 0.33
+    view._drawn -= 0.3
     assert ask() == 0
-    view._drawn -= 0.04
+    view._drawn -= 0.2
     assert ask() == 1
     view._drawn, view._drawing_time = time.perf_counter(), 100.0
     assert ask() == 1
-    view._drawn -= 0.4
+    view._drawn -= 0.3
     assert ask() == 1
-    view._drawn -= 0.2  # half a second later at most, as the next one may be a draft
+    view._drawn -= 0.25  # half a second later at most, as the next one may be a draft
     assert ask() == 2
     view._drawn, view._drawing_time = time.perf_counter(), 100.0
     assert ask() == 2
