@@ -68,7 +68,7 @@ def _painting_hint(widgets: WidgetSet) -> str:
 def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
     if widgets.puller.is_standing_in:
-        return "Rough preview while the mesh is prepared · Esc to cancel"
+        return "Preview until the mesh is ready · Esc to cancel"
     if widgets.puller.is_waiting:
         return "Preparing: the pull starts in a moment · Esc to cancel"
     if session.is_dragging:

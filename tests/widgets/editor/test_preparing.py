@@ -169,7 +169,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.press(start)
     bench.until(lambda: hand.move(start + [30.0, 0.0]) or np.abs(surface.points - rest).max() > 0.1)
     assert not session.is_bound
-    assert "Rough preview" in bench.editor.status
+    assert "Preview until" in bench.editor.status
     volume = signed_volume(rest, mesh.faces)
     assert abs(signed_volume(surface.points, mesh.faces) / volume - 1.0) < 1e-12
     assert_array_equal(session.vertices, rest)
