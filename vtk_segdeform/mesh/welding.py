@@ -11,7 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..kernels import n_threads
 from .edges import repeats_vertex
 from .faults import Search, distinct_faces
 from .grouping import connected, first_equal_row, first_members
@@ -100,9 +102,11 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     is_border = np.zeros(len(points), dtype=bool)
     is_border[ends] = True
     border = np.flatnonzero(is_border)
-    faces = half_edges.faces[is_border[half_edges.faces].any(axis=1)]
-    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    length = np.linalg.norm(points[tail] - points[head], axis=1)
+    first, second, third = is_border[half_edges.faces.T]
+    faces = half_edges.faces[np.flatnonzero(first | second | third)]
+    tail, head = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    edges = points.take(tail, axis=0) - points.take(head, axis=0)
+    length = np.sqrt(np.einsum("ij,ij->i", edges, edges))
     shortest = np.full(len(points), np.inf)
     for end in (tail, head):
         np.minimum.at(shortest, end, np.where(length > same, length, np.inf))
@@ -110,7 +114,12 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     shortest = shortest[border]
     most = np.nextafter(_NEARLY * shortest.max(initial=0.0), np.inf)  # farther ones are not sought
     tree = cKDTree(points[border], compact_nodes=False, balanced_tree=False)  # sooner built
-    found = tree.query(points[border], min(_NEAREST + 1, len(border)), distance_upper_bound=most)
+    found = tree.query(
+        points[border],
+        min(_NEAREST + 1, len(border)),
+        distance_upper_bound=most,
+        workers=n_threads() if len(border) > sizes.PARALLEL_SEARCH else 1,
+    )
     away, other = (np.reshape(each, (len(border), -1)) for each in found)
     one, k = np.nonzero(np.isfinite(away))
     away, other = away[one, k], other[one, k]
@@ -118,8 +127,11 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     pairs: IntArray = border[np.stack([one, other], axis=1)[is_near]]
     if not len(pairs):
         return pairs
-    keys, n = np.sort(pairs, axis=1) @ [len(points), 1], len(points)
-    is_edge = np.isin(keys, np.minimum(tail, head) * n + np.maximum(tail, head))
+    is_end, n = np.zeros(len(points), dtype=bool), len(points)
+    is_end[pairs] = True
+    some = np.flatnonzero(is_end[tail] & is_end[head])
+    low, high = np.minimum(tail[some], head[some]), np.maximum(tail[some], head[some])
+    is_edge = np.isin(np.sort(pairs, axis=1) @ [n, 1], low * n + high)
     kept: IntArray = pairs[~is_edge | (away[is_near] <= same)]
     return kept
 
