@@ -42,7 +42,6 @@ from ..pictures import require_offscreen
 from ..progress import Progress, tell
 from ..session import Session
 from ..widgets import DeformEditor, Mode
-from ..widgets.picking import Picker
 from ..widgets.recording import OffScreen
 from ..widgets.scene import Phase, Pointer
 
@@ -198,12 +197,11 @@ class _Run:
 def _random_place(editor: DeformEditor, rng: np.random.Generator) -> tuple[int, FloatArray]:
     """Return a random visible vertex, and its pixel (2,)."""
     view, session = editor.view, editor.session
-    picker = Picker(editor.widgets.surface)
     while True:
         vertex = rng.integers(session.mesh.n_vertices)
         place = np.round(view.to_display(session.vertices[[vertex]])[0, :2])
-        hit = picker.hit(Pointer(Phase.PRESS, *place))
-        if hit is not None and np.linalg.norm(hit.point - session.vertices[vertex]) < _NEAR:
+        point = editor.widgets.point_at(Pointer(Phase.PRESS, *place))
+        if point is not None and np.linalg.norm(point - session.vertices[vertex]) < _NEAR:
             return int(vertex), np.asarray(place)
 
 

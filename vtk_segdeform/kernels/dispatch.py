@@ -2,7 +2,7 @@
 
     kernels = compiled_kernels()        the module `compiled`, or None
     kernels = compiled_checks(size)     the same for short checks, which are not worth an import
-    load()                              import them now
+    load_for(n_vertices)                import them now, if they pay for such a mesh
     load_early()                        import them before they are needed
     load_late()                         do without them for small arrays until then
 
@@ -60,14 +60,10 @@ def compiled_checks(size: int) -> Any:
     return _kernels()
 
 
-def load() -> None:
-    """Load the compiled kernels, and set up the compiler; in any thread."""
-    try:
-        kernels = _kernels()
-        if kernels is not None:
-            kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
-    finally:
-        _is_late[0] = False
+def load_for(n_vertices: int) -> None:
+    """Load the compiled kernels now if preparing a mesh of so many vertices would use them."""
+    if n_vertices > sizes.COMPILED_PREPARATION:
+        _load()
 
 
 def load_early() -> None:
@@ -76,7 +72,7 @@ def load_early() -> None:
     Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.
     """
     if not _kernels.cache_info().currsize:
-        Thread(target=load, name="segdeform kernels").start()
+        Thread(target=_load, name="segdeform kernels").start()
 
 
 def load_late() -> None:
@@ -146,6 +142,15 @@ def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]
     ends = np.cumsum(sizes)
     room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
     return np.split(room[: ends[-1]], ends[:-1])
+
+
+def _load() -> None:
+    try:
+        kernels = _kernels()
+        if kernels is not None:
+            kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
+    finally:
+        _is_late[0] = False
 
 
 @functools.cache

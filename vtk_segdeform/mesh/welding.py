@@ -11,9 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import n_threads
 from .edges import repeats_vertex
 from .faults import Search, distinct_faces
 from .grouping import connected, first_equal_row, first_members
@@ -114,12 +112,7 @@ def _near_on_borders(points: FloatArray, half_edges: HalfEdges, same: float) -> 
     shortest = shortest[border]
     most = np.nextafter(_NEARLY * shortest.max(initial=0.0), np.inf)  # farther ones are not sought
     tree = cKDTree(points[border], compact_nodes=False, balanced_tree=False)  # sooner built
-    found = tree.query(
-        points[border],
-        min(_NEAREST + 1, len(border)),
-        distance_upper_bound=most,
-        workers=n_threads() if len(border) > sizes.PARALLEL_SEARCH else 1,
-    )
+    found = tree.query(points[border], min(_NEAREST + 1, len(border)), distance_upper_bound=most)
     away, other = (np.reshape(each, (len(border), -1)) for each in found)
     one, k = np.nonzero(np.isfinite(away))
     away, other = away[one, k], other[one, k]

@@ -55,9 +55,16 @@ class StandIn:
     volume: VolumeConstraint
 
     @classmethod
-    def of(cls, mesh: Mesh, lids: bool | None = None, progress: Progress | None = None) -> StandIn:
-        """Return the stand-in for *mesh*, whose volume is that under *lids*; in any thread."""
+    def of(
+        cls, mesh: Mesh, lids: bool | None = None, progress: Progress | None = None
+    ) -> StandIn | None:
+        """Return the stand-in for *mesh*, whose volume is that under *lids*; in any thread.
+
+        None if the mesh is so small that a session is prepared as soon.
+        """
         require_mesh(mesh)
+        if mesh.n_vertices <= sizes.STAND_IN_POINTS:
+            return None
         whole = Regions.single(mesh)
         cages = fit_cages(mesh, whole, _CAGE_VERTICES, progress=part(progress, 0.0, _FITTED))
         mapped = part(progress, _FITTED, _MAPPED)

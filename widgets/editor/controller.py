@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice, is_first_run, load_early, load_late
 from vtk_segdeform.progress import Progress, part
@@ -286,7 +285,7 @@ class Controller:
     def _listen(self) -> None:
         session = self.session
         self._stop_listening = session.on_change(self._session_changed)
-        self.widgets.puller.stand_in = lambda: self._preparing.stand_in(session)
+        self.widgets.puller.preview.stand_in = lambda: self._preparing.stand_in(session)
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
@@ -352,8 +351,6 @@ class Controller:
                 self.messages.note(outcome)
             self._apply_mode()
 
-        if self.session.mesh.n_vertices > sizes.COMPILED_PREPARATION:
-            load_early()
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
             self.settling.flush()
@@ -426,7 +423,7 @@ class Controller:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
-        is_used |= widgets.puller.is_waiting
+        is_used |= widgets.puller.preview.is_waiting
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
 

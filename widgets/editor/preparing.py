@@ -18,8 +18,8 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from vtk_segdeform import kernels, sizes
 from vtk_segdeform.errors import Cancelled, SegDeformError, SessionError
+from vtk_segdeform.kernels import load_for
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Preparation, Session, StandIn
 
@@ -43,23 +43,29 @@ def lacking(session: Session, made: Callable[[StandIn], object] | None = None) -
     if session.is_bound:
         return None
     own = copy.copy(session)
-    is_new = not (own.cages or _is_posed(own)) and own.mesh.n_vertices > sizes.STAND_IN_POINTS
 
     def work(progress: Progress) -> Preparation:
         begun = 0.0
-        if made is not None and is_new:
-            begun = _STAND_IN
-            try:
-                made(StandIn.of(own.mesh, own.options.lids, part(progress, 0.0, begun)))
-            except Cancelled:
-                raise
-            except (SegDeformError, ArithmeticError, ValueError, MemoryError) as fault:
-                _log.info("no stand-in", exc_info=fault)  # a pull waits for the session
-        if own.mesh.n_vertices > sizes.COMPILED_PREPARATION:
-            kernels.load()
+        if made is not None and not (own.cages or _is_posed(own)):
+            stand_in = _stand_in(own, part(progress, 0.0, _STAND_IN))
+            if stand_in is not None:
+                made(stand_in)
+                begun = _STAND_IN
+        load_for(own.mesh.n_vertices)
         return own.preparation(part(progress, begun, 1.0))
 
     return work
+
+
+def _stand_in(session: Session, progress: Progress | None) -> StandIn | None:
+    """Return a stand-in for *session*; None if it is of no use, or fails."""
+    try:
+        return StandIn.of(session.mesh, session.options.lids, progress)
+    except Cancelled:
+        raise
+    except (SegDeformError, ArithmeticError, ValueError, MemoryError) as fault:
+        _log.info("no stand-in", exc_info=fault)  # a pull waits for the session
+        return None
 
 
 def _is_posed(session: Session) -> bool:

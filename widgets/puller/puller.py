@@ -18,7 +18,6 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -30,16 +29,17 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session, StandIn, automatic_locality
+from vtk_segdeform.session import Change, Session, automatic_locality
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
-from ..scene import Gesture, Phase, Pointer, Stop, SurfaceDisplay, Widget
+from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .caption import Caption
 from .guide import Guide
 from .markers import Markers, marked_vertices
+from .preview import Preview
 from .pull_motion import PullMotion
 
 _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
@@ -47,8 +47,6 @@ _SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
 GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
-_POLL = 40  # milliseconds
-_PAUSE = 3.0  # between two poses of a stand-in, in times that one takes
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
 _PREPARING = "Preparing: the pull starts in a moment"
@@ -71,8 +69,8 @@ class Puller(Widget):
     binds : bool
         Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
         done elsewhere.
-    stand_in : callable
-        Returns what is pulled instead of a session that is not ready, or None.
+    preview : Preview
+        The stand-in that is pulled until the session is ready.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -80,9 +78,9 @@ class Puller(Widget):
         if surface is not None:
             require(surface, SurfaceDisplay, "surface")
         self.binds = True
-        self.stand_in: Callable[[], StandIn | None] = lambda: None
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
+        self.preview = Preview(self._surface, self._poll, lambda: self._invoke("ModifiedEvent"))
         self._picker = Picker(self._surface)
         self._ring = BrushRing(self._surface)
         self._markers = Markers(self._surface, self._picker)
@@ -93,10 +91,6 @@ class Puller(Widget):
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
         self._pending: Callable[[], None] | None = None  # a released pull that could not start yet
-        self._standing_in: StandIn | None = None  # whose pose is shown
-        self._wanted: tuple[int, FloatArray] | None = None  # a pull that is not shown yet
-        self._next_pose = -math.inf
-        self._stop_polling: Stop | None = None
         self._live = LiveSolve(self.view, session, self.cancel)
         self._stop_listening = session.on_change(self._changed)
 
@@ -139,16 +133,6 @@ class Puller(Widget):
     def effective_locality(self) -> float:
         """`locality`, or the value that the pins and fixed vertices lead to."""
         return automatic_locality(self.session.state) if self._locality is None else self._locality
-
-    @property
-    def is_waiting(self) -> bool:
-        """Whether a pull waits for the session to be ready."""
-        return self._stop_polling is not None
-
-    @property
-    def is_standing_in(self) -> bool:
-        """Whether the pose of a stand-in is shown."""
-        return self._standing_in is not None
 
     @property
     def is_refining(self) -> bool:
@@ -288,9 +272,8 @@ class Puller(Widget):
                     self._solve(partial(pull, to))
                 else:
                     self._live.begin()
-                    self._wait()
-                    self._wanted = vertex, to
-                    self._pose_stand_in()
+                    self.preview.wait()
+                    self.preview.pull(vertex, to, self.radius, self.locality)
             if pointer.phase is Phase.RELEASE:
                 if to is not None and not has_moved:
                     self._pull_later(partial(pull, to))
@@ -328,10 +311,10 @@ class Puller(Widget):
             self.remark += f". Local is now {100.0 * self.effective_locality:.0f} %"
 
     def _solve(self, pull: Callable[..., Solution]) -> None:
-        if self._standing_in is not None:
+        if self.preview.is_shown:
             pull()  # to the end, because a pose on the way would look like a way back
         self._live.solve(pull)
-        self._stop_standing_in()
+        self.preview.hide()
 
     # Pulls that wait for the session.
 
@@ -339,45 +322,12 @@ class Puller(Widget):
     def _is_ready(self) -> bool:
         return bool(self.session.cages) and (self.binds or self.session.is_bound)
 
-    def _wait(self) -> None:
-        if self._stop_polling is None:
-            self._stop_polling = self.view.every(_POLL, self._poll)
-            self._invoke("ModifiedEvent")
-
-    def _pose_stand_in(self) -> None:
-        """Show the pose of the stand-in for the wanted pull, if there is one already.
-
-        It leaves most of the time to the thread that prepares the session: a pull that is wanted
-        too soon is shown by a later poll.
-        """
-        stand_in, began = self.stand_in(), time.perf_counter()
-        if self._wanted is None or stand_in is None or began < self._next_pose:
-            return
-        (vertex, to), self._wanted = self._wanted, None
-        is_first = self._standing_in is None
-        self._standing_in = stand_in
-        x = stand_in.pulled(vertex, to, radius=self.radius, locality=self.locality)
-        self._surface.draw(x)
-        now = time.perf_counter()
-        self._next_pose = now + _PAUSE * (now - began)
-        if is_first:
-            self._invoke("ModifiedEvent")
-            self.view.render()  # at once, as this is what the user has waited for
-
-    def _stop_standing_in(self) -> None:
-        self._wanted = None
-        if self._standing_in is not None:
-            self._standing_in.release()
-            self._standing_in = None
-            self._surface.update()
-            self._invoke("ModifiedEvent")
-
-    def _poll(self) -> None:
+    def _poll(self) -> bool:
+        """Begin the pull that waits if the session is ready, and return whether it is."""
         if not self._is_ready:
-            self._pose_stand_in()
-            return
+            return False
         pending, self._pending = self._pending, None
-        self._stop_waiting()
+        self.preview.stop_waiting()
         if self.is_grabbing:
             self._send(Phase.MOVE, "InteractionEvent")
         elif pending is not None:
@@ -385,8 +335,9 @@ class Puller(Widget):
             try:
                 pending()
             finally:
-                self._stop_standing_in()
+                self.preview.hide()
             self._invoke("EndInteractionEvent")
+        return True
 
     def _pull_later(self, pull: Callable[..., Solution]) -> None:
         """Pull once the session is ready, unless another press or change comes first."""
@@ -400,20 +351,14 @@ class Puller(Widget):
             begin()
         else:
             self._pending = begin
-            self._wait()
-            self.remark = "" if self.is_standing_in else _PREPARING
+            self.preview.wait()
+            self.remark = "" if self.preview.is_shown else _PREPARING
 
     def _drop_pending(self) -> None:
         """Wait no longer, and give up the pull."""
         self._pending = None
-        self._stop_waiting()
-        self._stop_standing_in()
-
-    def _stop_waiting(self) -> None:
-        if self._stop_polling is not None:
-            self._stop_polling()
-            self._stop_polling = None
-            self._invoke("ModifiedEvent")
+        self.preview.stop_waiting()
+        self.preview.hide()
 
     # Display.
 

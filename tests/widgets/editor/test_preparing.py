@@ -180,7 +180,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.press(start)
     hand.move(start + [30.0, 0.0])
     hand.release()
-    bench.until(lambda: bench.puller.is_standing_in)
+    bench.until(lambda: bench.puller.preview.is_shown)
     shown = np.array(surface.points)
     assert np.abs(shown - rest).max() > 0.1
     hand.tick(3)
@@ -200,14 +200,14 @@ def test_a_drag_goes_on_with_the_session_as_soon_as_it_is_bound(standing_in):
     bench, hand, session = standing_in, standing_in.hand, standing_in.session
     start, to, surface = bench.place, bench.place + [0.0, 90.0], bench.surface
     hand.press(start)
-    bench.until(lambda: hand.move(to) or bench.puller.is_standing_in)
+    bench.until(lambda: hand.move(to) or bench.puller.preview.is_shown)
     hand.tick(20)
     farthest = np.abs(surface.points - session.mesh.vertices).max()
     shown = []
     bench.gate.is_open.set()
     bench.until(lambda: shown.append(np.array(surface.points)) or session.is_dragging)
     shown.append(np.array(surface.points))
-    assert not bench.puller.is_standing_in
+    assert not bench.puller.preview.is_shown
     for x in shown:  # not back to rest on the way
         assert np.abs(x - session.mesh.vertices).max() > 0.8 * farthest
     hand.move(to)
@@ -231,7 +231,7 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     hand.press(bench.place)
     hand.move(bench.place + [30.0, 0.0])
     hand.tick(5)
-    assert not bench.puller.is_standing_in
+    assert not bench.puller.preview.is_shown
     assert_array_equal(bench.surface.points, session.vertices)
     bench.gate.is_open.set()
     bench.until(lambda: session.is_dragging)
