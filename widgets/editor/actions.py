@@ -60,6 +60,10 @@ def painting(target: Paint) -> Action:
 
 def undo(controller: Controller) -> None:
     """Undo the last step."""
+    puller = controller.widgets.puller
+    if puller.waiting.has_pull and puller.cancel():
+        controller.say("Undo: pull")
+        return
     label, earlier = controller.undo_label, controller.earlier
     if not controller.session.undo() and earlier is not None:
         earlier[1]()

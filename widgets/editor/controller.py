@@ -133,11 +133,14 @@ class Controller:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         self.widgets.finish()
+        is_lost = mode is not Mode.PULL and self.widgets.puller.cancel()
         if self._mode is Mode.HANDLES and self.widgets.selector.handle in self.session.handles:
             self.widgets.dragger.handle = self.widgets.selector.handle
         self._mode = mode
         self.list_keys()
         self.messages.clear()
+        if is_lost:
+            self.messages.note("Pull cancelled: the mesh was not ready yet")
         self._prepare_pulls(again=True)
         self._apply_mode()
 
@@ -285,7 +288,7 @@ class Controller:
     def _listen(self) -> None:
         session = self.session
         self._stop_listening = session.on_change(self._session_changed)
-        self.widgets.puller.preview.stand_in = lambda: self._preparing.stand_in(session)
+        self.widgets.puller.waiting.stand_in = lambda: self._preparing.stand_in(session)
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
@@ -370,7 +373,7 @@ class Controller:
             self._worker.cancel()
             self.refresh()
         elif self.widgets.cancel():
-            pass
+            self.refresh()
         elif self.help.is_shown:
             self.help.hide()
         elif self.settling.is_active:
@@ -410,7 +413,7 @@ class Controller:
         """
         if self._is_on and not self.is_busy:
             self._preparing.update(self.session, start=self._mode is Mode.PULL, again=again)
-            if self._preparing.fraction is not None:
+            if self._mode is Mode.PULL and self._preparing.fraction is not None:
                 Draft.of(self.view).begin(if_slow=True)
 
     def _may_accept(self) -> bool:
@@ -423,7 +426,7 @@ class Controller:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
-        is_used |= widgets.puller.preview.is_waiting
+        is_used |= widgets.puller.waiting.is_active
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
 

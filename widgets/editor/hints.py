@@ -67,9 +67,9 @@ def _painting_hint(widgets: WidgetSet) -> str:
 
 def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
-    if widgets.puller.preview.is_shown:
+    if widgets.puller.waiting.is_shown:
         return "Preview until the mesh is ready · Esc to cancel"
-    if widgets.puller.preview.is_waiting:
+    if widgets.puller.waiting.is_active:
         return "Preparing: the pull starts in a moment · Esc to cancel"
     if session.is_dragging:
         return _drag_hint(session, "X Y Z: axis. R: turn. ")

@@ -70,7 +70,7 @@ def _is_active(controller: Controller) -> bool:
         not controller.is_on
         or controller.is_busy
         or controller.session.is_dragging
-        or widgets.puller.preview.is_waiting
+        or widgets.puller.waiting.is_active
         or any(widget.is_grabbing for widget in widgets.interactive)
         or any(widget.is_refining for widget in live)
     )

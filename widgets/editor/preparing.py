@@ -183,7 +183,7 @@ class Preparing:
         self._ended()
 
     def _fail(self, error: BaseException) -> None:
-        self._declined = self._inputs
+        self._declined, self._stand_in = self._inputs, None
         if isinstance(error, SegDeformError):
             raise SessionError(
                 f"Cannot prepare this mesh for pulling: {error_text(error)}. Press 1 to paint "

@@ -3,7 +3,7 @@
 The files, in reading order:
 
     puller         `Puller`
-    preview        a stand-in that follows until the session can be pulled
+    waiting        a pull that waits for its session, and the stand-in that follows
     pull_motion    from pointer positions to the motion of the grabbed point
     markers        pins and pulled points as dots
     guide          the line of an axis

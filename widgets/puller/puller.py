@@ -39,8 +39,8 @@ from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .caption import Caption
 from .guide import Guide
 from .markers import Markers, marked_vertices
-from .preview import Preview
 from .pull_motion import PullMotion
+from .waiting import Pull, Waiting
 
 _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
 _SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
@@ -49,6 +49,7 @@ _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
+_NOT_YET = "The last pull is not computed yet. Wait a moment, or press Esc to cancel it"
 _PREPARING = "Preparing: the pull starts in a moment"
 
 
@@ -69,8 +70,8 @@ class Puller(Widget):
     binds : bool
         Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
         done elsewhere.
-    preview : Preview
-        The stand-in that is pulled until the session is ready.
+    waiting : Waiting
+        The pull that waits until the session is ready.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -80,7 +81,8 @@ class Puller(Widget):
         self.binds = True
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
-        self.preview = Preview(self._surface, self._poll, lambda: self._invoke("ModifiedEvent"))
+        changed = partial(self._invoke, "ModifiedEvent")
+        self.waiting = Waiting(self._surface, self._is_ready, self._go_on, changed)
         self._picker = Picker(self._surface)
         self._ring = BrushRing(self._surface)
         self._markers = Markers(self._surface, self._picker)
@@ -90,7 +92,6 @@ class Puller(Widget):
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
-        self._pending: Callable[[], None] | None = None  # a released pull that could not start yet
         self._live = LiveSolve(self.view, session, self.cancel)
         self._stop_listening = session.on_change(self._changed)
 
@@ -165,7 +166,7 @@ class Puller(Widget):
         try:
             super().Off()
         finally:
-            self._drop_pending()
+            self.waiting.drop()
             self._live.pause()
             self._ring.hide()
             self._markers.show(False)
@@ -194,13 +195,14 @@ class Puller(Widget):
 
     def on_press(self, press: Pointer) -> Gesture | None:
         """Pull the marker or the surface under the pointer; beside it, pass on the press."""
-        self._drop_pending()
         self.remark = ""
         marker = self._markers.at(press)
+        hit = self._picker.hit(press) if marker is None else None
+        if self.waiting.has_pull and (marker is not None or hit is not None):
+            return self._refuse(_NOT_YET)
         if marker is not None:
             vertex = self._markers.vertex(marker)
             return self._pull(vertex, np.array(self._surface.points[vertex]), press)
-        hit = self._picker.hit(press)
         if hit is None:
             return None
         if np.isin(hit.vertex, self.session.fixed):
@@ -267,13 +269,13 @@ class Puller(Widget):
                 if not (wants and moves):
                     continue
                 to = motion.of(start)
-                if self._is_ready:
+                if self._is_ready():
                     has_moved = True
                     self._solve(partial(pull, to))
                 else:
                     self._live.begin()
-                    self.preview.wait()
-                    self.preview.pull(vertex, to, self.radius, self.locality)
+                    self.waiting.begin()
+                    self.waiting.follow(vertex, to, self.radius, self.locality)
             if pointer.phase is Phase.RELEASE:
                 if to is not None and not has_moved:
                     self._pull_later(partial(pull, to))
@@ -286,8 +288,8 @@ class Puller(Widget):
         finally:
             self._motion = None
             self._show(None)
-            if self._pending is None:
-                self._drop_pending()
+            if not self.waiting.has_pull:
+                self.waiting.drop()
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
             self._live.resume()
@@ -311,54 +313,47 @@ class Puller(Widget):
             self.remark += f". Local is now {100.0 * self.effective_locality:.0f} %"
 
     def _solve(self, pull: Callable[..., Solution]) -> None:
-        if self.preview.is_shown:
+        if self.waiting.is_shown:
             pull()  # to the end, because a pose on the way would look like a way back
         self._live.solve(pull)
-        self.preview.hide()
+        self.waiting.hide()
 
     # Pulls that wait for the session.
 
-    @property
+    def cancel(self) -> bool:
+        """Cancel a running gesture or else a pull that waits; False if there was none."""
+        if super().cancel():
+            return True
+        had_pull = self.waiting.has_pull
+        if had_pull:
+            self.waiting.drop()
+        return had_pull
+
     def _is_ready(self) -> bool:
         return bool(self.session.cages) and (self.binds or self.session.is_bound)
 
-    def _poll(self) -> bool:
-        """Begin the pull that waits if the session is ready, and return whether it is."""
-        if not self._is_ready:
-            return False
-        pending, self._pending = self._pending, None
-        self.preview.stop_waiting()
-        if self.is_grabbing:
+    def _go_on(self, pull: Pull | None) -> None:
+        """Begin the pull that was released, or else continue the gesture."""
+        if pull is None:
             self._send(Phase.MOVE, "InteractionEvent")
-        elif pending is not None:
+        else:
             self.remark = ""
-            try:
-                pending()
-            finally:
-                self.preview.hide()
+            pull()
             self._invoke("EndInteractionEvent")
-        return True
 
     def _pull_later(self, pull: Callable[..., Solution]) -> None:
-        """Pull once the session is ready, unless another press or change comes first."""
+        """Pull once the session is ready, unless another change comes first."""
 
         def begin() -> None:
             self._solve(pull)
             self.session.commit("pull")
             self._live.resume()
 
-        if self._is_ready:
+        if self._is_ready():
             begin()
         else:
-            self._pending = begin
-            self.preview.wait()
-            self.remark = "" if self.preview.is_shown else _PREPARING
-
-    def _drop_pending(self) -> None:
-        """Wait no longer, and give up the pull."""
-        self._pending = None
-        self.preview.stop_waiting()
-        self.preview.hide()
+            self.waiting.begin(begin)
+            self.remark = "" if self.waiting.is_shown else _PREPARING
 
     # Display.
 
@@ -395,5 +390,5 @@ class Puller(Widget):
             self._markers.show(True)
         if change & Change.POSE:
             self._ring.hide()  # the surface has moved away from it
-            if self._pending is not None:
-                self._drop_pending()
+            if self.waiting.has_pull:
+                self.waiting.drop()

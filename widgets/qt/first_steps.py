@@ -121,7 +121,7 @@ class FirstSteps(QtWidgets.QWidget):
 
     def _follow(self) -> None:
         """Dismiss the cards at a pull; hide them while the keys are listed."""
-        if self._editor.session.is_dragging or self._editor.widgets.puller.preview.is_waiting:
+        if self._editor.session.is_dragging or self._editor.widgets.puller.waiting.is_active:
             self.dismiss()
         elif self._editor.controller.help.is_shown != self._makes_room:
             self._makes_room = not self._makes_room

@@ -180,7 +180,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.press(start)
     hand.move(start + [30.0, 0.0])
     hand.release()
-    bench.until(lambda: bench.puller.preview.is_shown)
+    bench.until(lambda: bench.puller.waiting.is_shown)
     shown = np.array(surface.points)
     assert np.abs(shown - rest).max() > 0.1
     hand.tick(3)
@@ -200,20 +200,81 @@ def test_a_drag_goes_on_with_the_session_as_soon_as_it_is_bound(standing_in):
     bench, hand, session = standing_in, standing_in.hand, standing_in.session
     start, to, surface = bench.place, bench.place + [0.0, 90.0], bench.surface
     hand.press(start)
-    bench.until(lambda: hand.move(to) or bench.puller.preview.is_shown)
+    bench.until(lambda: hand.move(to) or bench.puller.waiting.is_shown)
     hand.tick(20)
     farthest = np.abs(surface.points - session.mesh.vertices).max()
     shown = []
     bench.gate.is_open.set()
     bench.until(lambda: shown.append(np.array(surface.points)) or session.is_dragging)
     shown.append(np.array(surface.points))
-    assert not bench.puller.preview.is_shown
+    assert not bench.puller.waiting.is_shown
     for x in shown:  # not back to rest on the way
         assert np.abs(x - session.mesh.vertices).max() > 0.8 * farthest
     hand.move(to)
     hand.release()
     assert session.undo_label == "pull"
     assert hand.failures == []
+
+
+def release_early(bench):
+    """Pull and release while the stand-in is shown; return its pose."""
+    bench.hand.press(bench.place)
+    bench.until(lambda: bench.hand.move(bench.place + [30.0, 0.0]) or bench.puller.waiting.is_shown)
+    bench.hand.release()
+    return np.array(bench.surface.points)
+
+
+@pytest.mark.parametrize("way", ["escape", "undo", "mode"])
+def test_a_released_pull_can_be_given_up_while_it_waits(standing_in, way):
+    bench, editor, rest = standing_in, standing_in.editor, standing_in.session.mesh.vertices
+    assert np.abs(release_early(bench) - rest).max() > 0.1
+    if way == "escape":
+        bench.hand.types("escape")
+    elif way == "undo":
+        editor.do(actions.undo)
+        assert "Undo: pull" in editor.status
+    else:
+        editor.mode = Mode.REGIONS
+        assert "Pull cancelled" in editor.status
+        editor.mode = Mode.PULL
+    assert_array_equal(bench.surface.points, rest)
+    assert not bench.puller.waiting.is_active
+    assert "Preview" not in editor.status
+    assert editor.is_preparing  # a second Escape would cancel that
+    bench.finish()
+    bench.hand.tick(5)
+    assert not bench.session.can_undo
+    bench.hand.drag([bench.place, bench.place + [30.0, 0.0]])
+    assert bench.session.undo_label == "pull"
+    assert bench.hand.failures == []
+
+
+def test_turning_the_camera_keeps_a_pull_that_waits_and_another_press_is_refused(standing_in):
+    bench, hand = standing_in, standing_in.hand
+    shown = release_early(bench)
+    before = bench.view.camera.GetPosition()
+    hand.drag([(5, 5), (40, 30)])  # beside the mesh
+    assert bench.view.camera.GetPosition() != before
+    assert_array_equal(bench.surface.points, shown)
+    hand.drag([bench.place, bench.place + [0.0, 20.0]])
+    assert "not computed yet" in bench.editor.status
+    assert_array_equal(bench.surface.points, shown)
+    bench.finish()
+    bench.until(lambda: bench.session.can_undo)
+    assert bench.session.undo_label == "pull"
+    assert bench.session.undo() == "pull"
+    assert not bench.session.can_undo
+    assert hand.failures == []
+
+
+def test_the_stand_in_is_hidden_if_the_preparation_fails(standing_in):
+    bench = standing_in
+    release_early(bench)
+    bench.gate.error = CageError("no cage fits")
+    bench.finish()
+    bench.hand.tick(5)
+    assert_array_equal(bench.surface.points, bench.session.mesh.vertices)
+    assert len(bench.hand.failures) == 1
 
 
 @pytest.mark.parametrize("change", ["pin", "failure"])
@@ -231,7 +292,7 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     hand.press(bench.place)
     hand.move(bench.place + [30.0, 0.0])
     hand.tick(5)
-    assert not bench.puller.preview.is_shown
+    assert not bench.puller.waiting.is_shown
     assert_array_equal(bench.surface.points, session.vertices)
     bench.gate.is_open.set()
     bench.until(lambda: session.is_dragging)

@@ -235,10 +235,10 @@ def test_a_pull_before_the_cages_are_there_begins_as_soon_as_they_are(released):
         bench.hand.release()
         assert "Preparing" in bench.puller.remark
     bench.hand.tick()
-    assert bench.puller.preview.is_waiting
+    assert bench.puller.waiting.is_active
     bench.prepare()
     bench.hand.tick()
-    assert not bench.puller.preview.is_waiting
+    assert not bench.puller.waiting.is_active
     assert (bench.target - SCENE.mesh.vertices[vertex])[2] > 0.2
     bench.hand.release()
     assert bench.session.undo_label == "pull"
