@@ -78,8 +78,8 @@ def load_early() -> None:
 def load_late() -> None:
     """Process arrays of less than `sizes.COMPILED_LATE` in numpy until the kernels are loaded.
 
-    An editor calls this if its first mesh is small, and `load_early` once that has been dragged:
-    the import would take a third of the time until then.
+    An editor calls this for its first mesh, `load_for` before work that takes longer than the
+    import, and `load_early` after the first drag.
     """
     _is_late[0] = not _kernels.cache_info().currsize
 

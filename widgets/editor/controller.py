@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.kernels import advice, is_first_run, load_early, load_late
+from vtk_segdeform.kernels import advice, is_first_run, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
@@ -82,7 +82,8 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
-        self.messages.note(advice() or (_FIRST_RUN if is_first_run() else ""))
+        self._compiles = is_first_run()
+        self.messages.note(advice() or (_FIRST_RUN if self._compiles else ""))
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
         self.recordings = Recordings(view)
@@ -310,6 +311,8 @@ class Controller:
         self.settling.flush()
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
+        if self._compiles and self.is_preparing:
+            self.messages.note(_FIRST_RUN)  # again, as the pull waits for it
         if self._mode is Mode.PULL:
             self._prepare_pulls(again=True)
         self.refresh()
@@ -354,12 +357,18 @@ class Controller:
                 self.messages.note(outcome)
             self._apply_mode()
 
+        n_vertices = self.session.mesh.n_vertices
+
+        def with_kernels(progress: Progress) -> T:
+            load_for(n_vertices)
+            return work(progress)
+
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
             self.settling.flush()
             self._preparing.interrupt()
             self.finishing.interrupt()
-            self._worker.start(name, work, deliver)
+            self._worker.start(name, with_kernels, deliver)
             self.widgets.switch_off()
             self.refresh()
 

@@ -17,7 +17,7 @@ from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import actions
+from vtk_segdeform.widgets.editor import actions, controller
 
 pytestmark = pytest.mark.usefixtures("vtk_in_process")
 
@@ -299,6 +299,31 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     hand.release()
     assert session.undo_label == "pull"
     assert hand.failures == []
+
+
+def test_a_pull_that_waits_for_the_compiler_says_so(monkeypatch, request):
+    monkeypatch.setattr(controller, "is_first_run", lambda: True)
+    bench = request.getfixturevalue("bench")
+    bench.until(bench.gate.has_begun.is_set)
+    bench.editor.controller.messages.clear()
+    bench.hand.press(bench.place)
+    bench.hand.move(bench.place + [30.0, 0.0])
+    assert "First run" in bench.editor.status
+    bench.finish()
+    bench.until(lambda: bench.session.is_dragging)
+    bench.hand.release()
+    bench.hand.press(bench.place)
+    bench.hand.move(bench.place + [30.0, 0.0])
+    assert "First run" not in bench.editor.status
+    bench.hand.release()
+
+
+def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):
+    asked = []
+    monkeypatch.setattr(controller, "load_for", asked.append)
+    bench.editor.controller.start("counting", lambda _: asked.append("work"), lambda _: None)
+    bench.until(lambda: not bench.editor.is_busy)
+    assert asked == [bench.session.mesh.n_vertices, "work"]
 
 
 def test_escape_cancels_until_the_next_press(bench):
