@@ -31,6 +31,7 @@ def in_parallel(
     *,
     progress: Progress | None = None,
     message: str = "",
+    blas: bool = True,
 ) -> None:
     """Call *work* with (start, stop) for all rows of 0..n, *size* at a time and in any order.
 
@@ -45,6 +46,9 @@ def in_parallel(
         are cancelled.
     message : str
         Text passed to *progress*.
+    blas : bool
+        Whether *work* multiplies matrices.  If not, BLAS is not looked for: the first time in a
+        process takes as long as opening a mesh of 10,000 vertices.
     """
     tasks = [(start, min(start + size, n)) for start in range(0, n, size)]
     if len(tasks) <= 1 or n_threads() == 1:
@@ -53,7 +57,7 @@ def in_parallel(
             if progress is not None:
                 progress(stop / n, message)
         return
-    with one_blas_thread():
+    with one_blas_thread() if blas else contextlib.nullcontext():
         pool = _pool(threading.current_thread() is threading.main_thread())
         futures = [pool.submit(work, *task) for task in tasks]
         try:

@@ -353,7 +353,9 @@ def flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
 
     if kernels := compiled_checks(len(faces)):
         given = inputs(points, faces)
-        in_parallel(partial(kernels.flat_faces, flat, *given, _FLAT), len(faces), _LARGE_PIECE)
+        in_parallel(
+            partial(kernels.flat_faces, flat, *given, _FLAT), len(faces), _LARGE_PIECE, blas=False
+        )
         return np.flatnonzero(flat)
 
     def work(start: int, stop: int) -> None:
@@ -363,7 +365,7 @@ def flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
             longest = np.max([(e * e).sum(axis=0) for e in (b - a, c - b, a - c)], axis=0)
             flat[start:stop] = area <= _FLAT * longest
 
-    in_parallel(work, len(faces), _PIECE)
+    in_parallel(work, len(faces), _PIECE, blas=False)
     return np.flatnonzero(flat)
 
 

@@ -70,7 +70,7 @@ def winding_number(
         half_omega = np.where(np.abs(volume) <= flat, 0.0, np.arctan2(volume, below))
         number[start:stop] = half_omega.sum(axis=0) / (2.0 * np.pi)
 
-    in_parallel(work, len(x), max(1, _BLOCK // (9 * len(faces))))
+    in_parallel(work, len(x), max(1, _BLOCK // (9 * len(faces))), blas=False)
     return number
 
 
@@ -143,7 +143,7 @@ def inside_points(points: FloatArray, vertices: FloatArray, faces: IntArray) -> 
             winding += np.bincount(at[met[below]], sign[below], minlength=len(band))
         inside[band] = winding > 0.5
 
-    in_parallel(work, len(points), _BAND)
+    in_parallel(work, len(points), _BAND, blas=False)
     return inside
 
 

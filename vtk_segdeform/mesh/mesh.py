@@ -199,9 +199,11 @@ class Mesh(Frozen):
 
         if kernels := compiled_checks(self.n_faces):
             given = inputs(self.vertices, self.faces)
-            in_parallel(partial(kernels.face_areas, areas, *given), self.n_faces, _LARGE_PIECE)
+            in_parallel(
+                partial(kernels.face_areas, areas, *given), self.n_faces, _LARGE_PIECE, blas=False
+            )
         else:
-            in_parallel(work, self.n_faces, _PIECE)
+            in_parallel(work, self.n_faces, _PIECE, blas=False)
         frozen(areas)
         return areas
 

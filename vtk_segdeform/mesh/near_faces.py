@@ -66,7 +66,7 @@ def _near_in_tree(kernels: Any, points: FloatArray, faces: IntArray, asked: Bool
         kernels.may_meet(chosen := np.empty(count, dtype=bool), pairs, planes, *mesh)
         found[start] = order[pairs[chosen]]
 
-    in_parallel(work, leaves, _PIECE)
+    in_parallel(work, leaves, _PIECE, blas=False)
     pairs = np.concatenate([found[start] for start in sorted(found)])
     return np.where(asked[pairs[:, :1]], pairs, pairs[:, ::-1])
 

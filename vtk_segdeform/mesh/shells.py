@@ -120,7 +120,7 @@ def shell_volumes(vertices: FloatArray, faces: IntArray, shells: IntArray) -> Sh
         areas[start:stop] = norm(cross(b - a, c - a))
         radii[start:stop] = norm(a)
 
-    in_parallel(work, len(faces), _PIECE)
+    in_parallel(work, len(faces), _PIECE, blas=False)
     size = np.zeros(len(origins))
     np.maximum.at(size, shells, radii)
     return np.bincount(shells, volumes) / 6.0, np.bincount(shells, areas) / 2.0, size
@@ -178,7 +178,7 @@ def _are_around(
         cones, ends = _cones(half_edges, flip)
         given = inputs(near, vertices, faces, starts, stops, cones, *ends)
         work = partial(kernels.shells_around, found, *inputs(pairs, extremes), _INSIDE, *given)
-        in_parallel(work, len(pairs), _FEW_PAIRS)
+        in_parallel(work, len(pairs), _FEW_PAIRS, blas=False)
         return found
     for at in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(pairs[:, 0])) + 1):
         one = pairs[at[0], 0]

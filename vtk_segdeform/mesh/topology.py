@@ -103,7 +103,7 @@ class HalfEdges:
                     found[1] = kernels.link_corners(tree, faces)
 
         has_shells = "shells" in self.__dict__
-        in_parallel(work, 1 if has_shells else 2, 1 if m >= _LARGE else 2)
+        in_parallel(work, 1 if has_shells else 2, 1 if m >= _LARGE else 2, blas=False)
         count, n_trees = found
         if count < 0:
             return None
