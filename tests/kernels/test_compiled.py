@@ -621,10 +621,13 @@ def test_numbers_are_rounded_correctly_or_left(twin, kind):
     [("1 -2.50\n\t+3e2 .5 5. 1e-5 -0 -0.0e0", float), ("1 2 3", int), ("", int), ("0x10 1", float),
      ("1 2 . 3", float), ("1 2e 3", float), ("1 -", float), ("1 2x", float), ("1 nan inf", float),
      ("1\0 2", float), ("1 2.0", int), ("9007199254740993 4", int), ("1e400 1e-400 1", float),
-     ("12345678901234567890123 1", float), ("1_0 2", int), ("1,2", float)],
+     ("12345678901234567890123 1", float), ("1_0 2", int), ("1,2", float),
+     ("12 3\n4\n\n5 6.5 7\n\n8", float), ("12 3\n4 x\n5 6 7\n8\n", float)],
 )  # fmt: skip
-def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype):
+@pytest.mark.parametrize("piece", [1 << 19, 3])
+def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype, piece):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    monkeypatch.setattr("vtk_segdeform.io.number_lines._PIECE", piece)
     for count in (None, len(text.split()), 3):
         quick, slow = twin(lambda count=count: numbers_of(text.encode(), dtype, count))
         assert (quick is None) == (slow is None)
@@ -780,8 +783,10 @@ def test_neighbours_are_equal(twin, monkeypatch, name):
      ("v 1 2 3\nv 1 2\n", False), ("v 1 x\n", False), ("v 1 2 # 3\n", False), ("f 1 2 3\n", False),
      ("v 1\n 2\n", True)],
 )  # fmt: skip
-def test_tables_of_lines_are_read_alike(twin, monkeypatch, text, is_plain):
+@pytest.mark.parametrize("piece", [1 << 14, 1])
+def test_tables_of_lines_are_read_alike(twin, monkeypatch, text, is_plain, piece):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
+    monkeypatch.setattr("vtk_segdeform.io.number_lines._PIECE_LINES", piece)
     quick, slow = twin(lambda: Lines(text.encode(), ("v", "f")).table("v"))
     assert (quick is None, slow is None) == (not is_plain, not is_plain)
     if is_plain:

@@ -1,8 +1,8 @@
 """Lines of numbers in text, parsed many at once.
 
 Python takes a microsecond for each word, which for a file of a million vertices is many seconds.
-Here numpy finds the lines and words, and numpy or a compiled kernel parses all numbers in one call.
-What is not plain numbers is left to the caller: the functions return None for it.
+Here numpy finds the lines and words, and numpy parses all numbers in one call, or a compiled kernel
+does so in several threads.  What is not plain numbers is left to the caller: the functions return None for it.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import compiled_checks, inputs
+from ..kernels import compiled_checks, in_parallel, inputs
 from .array_names import decoded
 
 _LINE_FEED, _SPACE, _TAB, _SLASH = b"\n \t/"
 _LONGEST = 2  # letters of a word that lines are grouped by
 _MOST = 10**17  # an index
+_PIECE, _PIECE_LINES = 1 << 19, 1 << 14  # bytes, or lines, that a thread parses at a time
 
 
 class Lines:
@@ -74,8 +75,14 @@ class Lines:
             return _table_of(self.of(word), word)
         values = np.empty((len(at), len(self._line(at[0]).split()) - 1))
         text, starts, rows = inputs(self._letters, self._starts, at)
-        is_plain = kernels.numbers_of_lines(text, starts, rows, len(word), values)
-        return values if is_plain else None
+        is_plain = np.zeros(len(at), dtype=bool)
+
+        def parse(first: int, end: int) -> None:
+            given = text, starts, rows[first:end], len(word)
+            is_plain[first:end] = kernels.numbers_of_lines(*given, values[first:end])
+
+        in_parallel(parse, len(at), _PIECE_LINES, blas=False)
+        return values if is_plain.all() else None
 
     def corners(self, word: str) -> tuple[IntArray, IntArray] | None:
         """Return the corners of faces, the lines of *word*, as `_corners_of` does.
@@ -108,10 +115,9 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     most = len(text) // 2 + 1 if count is None else count
     kernels = compiled_checks(most)
     if kernels is not None:
-        (characters,), values = inputs(np.frombuffer(text, dtype=np.uint8)), np.empty(most)
-        found = kernels.plain_numbers(characters, np.dtype(dtype).kind == "i", values)
-        if found in (range(most + 1) if count is None else (count,)):
-            return values[:found].astype(dtype, copy=False)
+        numbers = _plain_numbers(kernels, text, np.dtype(dtype).kind == "i")
+        if numbers is not None and count in (None, len(numbers)):
+            return numbers.astype(dtype, copy=False)
     if count is None:
         count = len(words_per_line(text)[0])
     try:
@@ -119,6 +125,26 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
         return None
     return numbers if len(numbers) == count else None
+
+
+def _plain_numbers(kernels: Any, text: bytes, whole: bool) -> FloatArray | None:
+    """Return the numbers (k,) of *text*; None if one is not plain, or not *whole* if it must be."""
+    (characters,) = inputs(np.frombuffer(text, dtype=np.uint8))
+    starts = [0]
+    while starts[-1] < len(text):  # at ends of lines
+        starts.append(text.find(b"\n", starts[-1] + _PIECE) + 1 or len(text))
+    parts: list[FloatArray | None] = [None] * (len(starts) - 1)
+
+    def parse(first: int, end: int) -> None:
+        for k in range(first, end):
+            piece = characters[starts[k] : starts[k + 1]]
+            values = np.empty(len(piece) // 2 + 1)
+            found = kernels.plain_numbers(piece, whole, values)
+            parts[k] = values[:found].copy() if found >= 0 else None
+
+    in_parallel(parse, len(parts), 1, blas=False)
+    plain = [part for part in parts if part is not None]
+    return np.concatenate([np.empty(0), *plain]) if len(plain) == len(parts) else None
 
 
 def _table_of(lines: bytes, word: str) -> FloatArray | None:

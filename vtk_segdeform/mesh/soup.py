@@ -220,7 +220,8 @@ def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
     nearest = np.zeros(len(points), dtype=np.int64)
     finite = (np.abs(points) < 1e100).all(axis=1)
     if finite.any():
-        nearest[finite] = cKDTree(vertices).query(points[finite])[1]
+        tree = cKDTree(vertices, compact_nodes=False, balanced_tree=False)  # sooner built
+        nearest[finite] = tree.query(points[finite])[1]
     return nearest
 
 
