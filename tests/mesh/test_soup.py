@@ -190,11 +190,28 @@ def test_degenerate_faces_and_points_in_no_face_are_ignored():
         "ignored 3 duplicate faces", "ignored 2 degenerate faces", "3 points are in no face",
     ]  # fmt: skip
     assert_array_equal(found.mesh.faces, faces)
-    nearest = np.linalg.norm(vertices - 9.0, axis=1).argmin()
-    assert found.vertex_of[66] == nearest
+    away = np.linalg.norm(vertices - 9.0, axis=1)
+    assert away[found.vertex_of[66]] == pytest.approx(away.min())
     moved = found.moved(found.mesh.vertices + [1.0, 0.0, 0.0])
     assert_array_equal(moved[:66], vertices + [1.0, 0.0, 0.0])
     assert_array_equal(moved[66:], more[66:] + [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e-30, 1e-100])
+def test_a_component_as_small_as_a_rounding_error_is_ignored(size):
+    vertices, faces = SPHERE
+    points = np.concatenate([vertices + [2.0, 0.0, 0.0], size * vertices])
+    found = mesh_of(points, np.concatenate([faces, faces + len(vertices)]))
+    assert texts(found) == [f"ignored {len(faces)} faces without area"]
+    assert_array_equal(found.mesh.faces, faces)
+    assert_array_equal(found.moved(found.mesh.vertices), points)
+
+
+def test_components_that_are_small_beside_their_distance_are_kept():
+    vertices, faces = SPHERE
+    points = np.concatenate([1e-14 * vertices, 1e-14 * vertices + [0.0, 0.0, 1.0]])
+    found = mesh_of(points, np.concatenate([faces, faces + len(vertices)]))
+    assert found.mesh.n_vertices == 2 * len(vertices)
 
 
 def test_a_component_without_area_follows_the_nearest_vertices():
@@ -262,6 +279,11 @@ def test_a_moebius_strip_is_left_as_it_is():
         (np.where(CUBE[0] == CUBE[0][3], np.nan, CUBE[0]), CUBE[1], "NaN or infinite coordinates"),
         (CUBE[0] * 1e80, CUBE[1], "too far from the origin"),
         (CUBE[0] * 1e-80, CUBE[1], "too small to compute volumes"),
+        (
+            np.append(CUBE[0][:-1], [[0, 0, 1e16]], axis=0),
+            CUBE[1],
+            "others are one point beside it",
+        ),
         (CUBE[0], [[0, 0, 1], [2, 3, 3]], "all faces are flat"),
         (CUBE[0] * [1.0, 0.0, 0.0], CUBE[1], "all faces are flat"),
     ],

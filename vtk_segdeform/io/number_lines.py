@@ -2,7 +2,8 @@
 
 Python takes a microsecond for each word, which for a file of a million vertices is many seconds.
 Here numpy finds the lines and words, and numpy parses all numbers in one call, or a compiled kernel
-does so in several threads.  What is not plain numbers is left to the caller: the functions return None for it.
+does so in several threads.  What is not plain numbers is left to the caller: the functions return
+None for it.
 """
 
 from __future__ import annotations

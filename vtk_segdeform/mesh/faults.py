@@ -26,12 +26,16 @@ from .shells import ShellSums, closed_shells, shell_depths, shell_faults, shell_
 from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
-UNREPAIRABLE = (Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.FLAT)
+UNREPAIRABLE = (
+    Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.OUTLYING, Kind.FLAT,
+)  # fmt: skip
 _EXAMPLES = 4
 _FEW = 100  # faces or points that usually answer a question about all
 _PIECE = 10_000  # faces per task; their data fit into the cache
 _LARGE_PIECE = 200_000  # faces per task of compiled kernels, which take a millisecond for so many
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
+_OUTLYING = 1e13  # half widths of most of the mesh: its vertices differ by rounding errors only
+_SOME = 1000  # vertices whose median is close to that of all
 _FLAT = 1e-12  # height over longest edge; a flatter face counts as one without area
 
 
@@ -136,6 +140,13 @@ class Search:
     def n_repeating(self) -> int | None:
         """Number of faces that contain a vertex twice; None if an index is out of range."""
         return self._corners[1]
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest side of the box around the points in faces, which are finite."""
+        points = self.points if self.used.all() else self.points[self.used]
+        with np.errstate(over="ignore"):
+            return float(np.ptp(points, axis=0).max(initial=0.0))
 
     @cached_property
     def number_faults(self) -> tuple[Fault, ...]:
@@ -311,6 +322,8 @@ def _number_faults(search: Search) -> Iterator[Fault]:
     yield from _some(Kind.TOO_LARGE, np.flatnonzero(far))
     if finite.any() and not far.any() and _too_small(points if finite.all() else points[finite]):
         yield Fault(Kind.TOO_SMALL, 1)
+    if finite.all() and not far.any():
+        yield from _some(Kind.OUTLYING, _outlying(points, search.used))
     yield from _some(Kind.UNREFERENCED, np.flatnonzero(~search.used))
 
 
@@ -319,6 +332,19 @@ def _too_small(points: FloatArray) -> bool:
     if (np.abs(few - few[0]) >= _SMALLEST).any():
         return False
     return bool(0.0 < max(np.ptp(column) for column in points.T) < _SMALLEST)
+
+
+def _outlying(points: FloatArray, used: BoolArray) -> IntArray:
+    """Return the points (k,) in faces that are too far from most of the others."""
+    ids = np.flatnonzero(used)
+    some = points[ids[:: len(ids) // _SOME + 1]]
+    centre = np.median(some, axis=0) if len(some) else np.zeros(3)
+    reach = _OUTLYING * float(np.median(np.abs(some - centre).max(axis=1))) if len(some) else 0.0
+    low, high = centre - reach, centre + reach
+    if reach == 0.0 or ((low <= points.min(axis=0)).all() and (points.max(axis=0) <= high).all()):
+        return np.empty(0, dtype=np.int64)
+    outside = ((points < low) | (points > high)).any(axis=1)
+    return np.flatnonzero(outside & used)
 
 
 def _finite(points: FloatArray) -> BoolArray:

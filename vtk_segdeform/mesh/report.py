@@ -43,6 +43,12 @@ class Kind(enum.Enum):
         "",
         "scale the mesh up; its extent must be at least 1e-70",
     )
+    OUTLYING = (
+        "vertex so far away that the others are one point beside it",
+        "vertices so far away that the others are one point beside them",
+        "vertex ",
+        "move or delete it; most vertices must not be that close together",
+    )
     FLAT = (
         "all faces are flat",
         "",

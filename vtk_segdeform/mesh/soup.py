@@ -1,7 +1,7 @@
 """A `Mesh` from any triangles, and the map between both: what is given and what is deformed.
 
     drop       faces without three different vertices, repeated faces, points in no face, and
-               components without area
+               components without area, or as small as a rounding error
     weld       points of borders at the same position, and open sheets that coincide; see `welding`
     orient     neighbouring faces alike, closed surfaces and nearly closed ones outward
 
@@ -34,6 +34,7 @@ from .report import Fault, Kind, counted
 from .topology import HalfEdges
 from .welding import rounding, sewn, welded
 
+_POINT = 1e-13  # of the largest component: no cage resolves so small a one
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _REFUSED = (*UNREPAIRABLE, Kind.NON_FINITE)
 
@@ -155,7 +156,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     target = np.arange(len(points))
     if (result := sewn(found)) is not None:
         target, found = result
-    elif found.half_edges.all_twins and found.is_closed:
+    elif found.half_edges.all_twins and found.is_closed and not _may_have_points(found):
         return Soup(points, Mesh.of(found), target)
     valid = found.points
     joined, kept, half_edges, near = welded(valid, found)
@@ -200,19 +201,42 @@ def _require_usable(found: Search) -> None:
 
 
 def _without_area(found: Search, kept: BoolArray, half_edges: HalfEdges) -> BoolArray:
-    """Return which faces *kept* are in a component of flat faces only, connected at any vertex."""
-    few = half_edges.faces[first_members(half_edges.shells)]  # usually enough
-    if not len(flat_faces(found.points, few)):
-        return np.zeros(len(half_edges.faces), dtype=bool)
+    """Return which faces *kept* are in a component of flat faces only, connected at any vertex.
+
+    So are those of a component that is a point beside the largest one with area.
+    """
+    faces, few = half_edges.faces, half_edges.faces[first_members(half_edges.shells)]
+    may_be_points = _are_points(found, few).any()
+    if not (may_be_points or len(flat_faces(found.points, few))):  # usually enough
+        return np.zeros(len(faces), dtype=bool)
     is_flat = np.zeros(len(found.triangles), dtype=bool)
     is_flat[found.flat] = True
     is_flat = is_flat[kept]
-    if not is_flat.any():
+    if not (may_be_points or is_flat.any()):
         return is_flat
-    of_vertex = components(half_edges.n_vertices, half_edges.faces)
+    of_vertex = components(half_edges.n_vertices, faces)
     has_area = np.zeros(len(of_vertex), dtype=bool)
-    has_area[of_vertex[half_edges.faces[~is_flat, 0]]] = True
-    return np.asarray(~has_area[of_vertex[half_edges.faces[:, 0]]])
+    has_area[of_vertex[faces[~is_flat, 0]]] = True
+    if may_be_points:
+        low = np.full((len(of_vertex), 3), np.inf)
+        high = -low
+        np.minimum.at(low, of_vertex[faces], found.points[faces])
+        np.maximum.at(high, of_vertex[faces], found.points[faces])
+        extent = np.where(has_area, (high - low).max(axis=1), 0.0)
+        has_area &= extent > _POINT * extent.max()
+    return np.asarray(~has_area[of_vertex[faces[:, 0]]])
+
+
+def _are_points(found: Search, faces: IntArray) -> BoolArray:
+    """Return which *faces* (k, 3) are points beside the whole surface."""
+    with np.errstate(over="ignore"):
+        return np.asarray(np.ptp(found.points[faces], axis=1).max(axis=1) <= _POINT * found.extent)
+
+
+def _may_have_points(found: Search) -> bool:
+    """Return whether a shell may be a point beside the whole surface."""
+    first = first_members(found.half_edges.shells)
+    return len(first) > 1 and bool(_are_points(found, found.triangles[first]).any())
 
 
 def _nearest(points: FloatArray, vertices: FloatArray) -> IntArray:
