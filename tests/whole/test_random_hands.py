@@ -8,6 +8,8 @@ import pytest
 from monkey import Monkey
 from soaking import resident
 
+from vtk_segdeform.kernels import compiled_kernels
+
 
 @pytest.mark.parametrize(
     ("seed", "count"),
@@ -20,6 +22,7 @@ from soaking import resident
     ],
 )
 def test_random_events_preserve_the_volume(seed, count, tmp_path):
+    compiled_kernels()  # numba takes 100 MB, which are no leak
     monkey = Monkey(seed, tmp_path)
     half = 0
     for k in range(count):

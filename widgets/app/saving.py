@@ -83,7 +83,7 @@ def _saved_now(window: Any) -> bool:
 def _settle(window: Any) -> None:
     """Wait until the pose has settled and has been saved; the window is drawn meanwhile."""
     events, settling = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller.settling
-    while settling.is_active:
+    while settling.is_pending:
         QtWidgets.QApplication.processEvents(
             events.ExcludeUserInputEvents | events.WaitForMoreEvents
         )

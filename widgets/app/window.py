@@ -137,7 +137,7 @@ class Window(QtWidgets.QMainWindow):
         """Whether the document has unsaved changes."""
         if not self.has_mesh:
             return False
-        return self._is_new or self.editor.controller.file.is_modified(self.session)
+        return self._is_new or self.editor.controller.is_modified
 
     def set_document(self, document: Document) -> None:
         """Change the files of the open document; the session is unchanged."""

@@ -115,8 +115,7 @@ def open_file(controller: Controller) -> None:
     """Open the editor's file; unsaved changes are discarded only if confirmed."""
     path = controller.place
     question = f"Unsaved changes will be lost. Open again to continue with {path}"
-    is_modified = controller.file.is_modified(controller.session)
-    if not is_modified or controller.messages.confirms(question):
+    if not controller.is_modified or controller.messages.confirms(question):
         controller.open(path)
 
 

@@ -289,7 +289,9 @@ class Controller:
     def _listen(self) -> None:
         session = self.session
         self._stop_listening = session.on_change(self._session_changed)
-        self.widgets.puller.waiting.stand_in = lambda: self._preparing.stand_in(session)
+        waiting = self.widgets.puller.waiting
+        waiting.stand_in = lambda: self._preparing.stand_in(session)
+        waiting.is_coming = lambda: self._preparing.is_running
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
@@ -375,6 +377,11 @@ class Controller:
     def wait(self) -> None:
         """Block until no job is running; for scripts."""
         self._worker.wait()
+
+    @property
+    def is_modified(self) -> bool:
+        """Whether there are unsaved changes, or a released pull that will be one."""
+        return self.file.is_modified(self.session) or self.widgets.puller.waiting.has_pull
 
     def cancel(self) -> None:
         """Cancel the job, or else the ongoing drag or stroke, or the preparation; or close help."""

@@ -112,6 +112,11 @@ class Preparing:
         """Completed fraction of the running stage, 0..1, coarsely; None if none is running."""
         return self._fraction
 
+    @property
+    def is_running(self) -> bool:
+        """Whether a stage is running, or ending."""
+        return self._job is not None
+
     def stand_in(self, session: Session) -> StandIn | None:
         """Return what can be pulled instead of *session*; None if there is nothing yet."""
         made = self._stand_in

@@ -2,8 +2,9 @@
 
 A far drag converges for seconds after its release, above all one that avoids contact; see
 `LiveSolve`.  The status line shows how far it is.  Saving waits until then, so that a file contains
-the settled pose.  What would change the pose meanwhile, a press or another action, lets the file be
-written first, and so does Escape, at which the pose remains as it is.
+the settled pose, and so it does for a pull that was released before its session was ready.  What
+would change the pose meanwhile, a press or another action, lets the file be written first, and so
+does Escape, at which the pose remains as it is.
 """
 
 from __future__ import annotations
@@ -53,6 +54,11 @@ class Settling:
         return is_refined and not widgets.session.is_dragging and is_unsettled(widgets.session)
 
     @property
+    def is_pending(self) -> bool:
+        """Whether a released pose is converging, or a released pull waits for its session."""
+        return self.is_active or self._widgets().puller.waiting.has_pull
+
+    @property
     def fraction(self) -> float | None:
         """Completed fraction, 0..1, coarsely; None if nothing settles, or has only just begun."""
         if self._stop_checking is None or not self.is_active:
@@ -74,14 +80,14 @@ class Settling:
 
     def follow(self) -> None:
         """Notice that it has begun."""
-        if self._stop_checking is None and self.is_active:
+        if self._stop_checking is None and self.is_pending:
             self._since, self._distance = time.monotonic(), _distance(self._widgets().session)
             self._stop_checking = self._view.every(_PERIOD, self._check)
 
     def then(self, act: Callable[[], object]) -> bool:
         """Call *act* once the pose has settled; False if that is now, and it was called."""
         self.follow()
-        if self.is_active:
+        if self.is_pending:
             self._waiting.append(act)
             return True
         act()
@@ -116,7 +122,7 @@ class Settling:
             self._stop_checking = None
 
     def _check(self) -> None:
-        if not self.is_active:
+        if not self.is_pending:
             self.remove()
             self.flush()
             self._changed()

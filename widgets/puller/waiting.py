@@ -39,6 +39,8 @@ class Waiting:
     ----------
     stand_in : callable
         Returns what is pulled, or None if there is nothing yet.
+    is_coming : callable
+        Returns whether the session is being prepared; if not, a released pull is given up.
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class Waiting:
         changed: Callable[[], object],
     ) -> None:
         self.stand_in: Callable[[], StandIn | None] = lambda: None
+        self.is_coming: Callable[[], bool] = lambda: True
         self._surface, self._is_ready, self._go_on = surface, is_ready, go_on
         self._changed = changed
         self._pull: Pull | None = None  # that was released
@@ -103,7 +106,10 @@ class Waiting:
 
     def _tick(self) -> None:
         if not self._is_ready():
-            self._update()
+            if self.has_pull and not self.is_coming():
+                self.drop()
+            else:
+                self._update()
             return
         pull, self._pull = self._pull, None
         self._end()

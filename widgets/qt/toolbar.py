@@ -173,8 +173,7 @@ class Toolbar(QtWidgets.QWidget):
 
     def may_discard(self) -> bool:
         """Return whether the session may be closed; ask if it has unsaved changes."""
-        controller = self._editor.controller
-        if not controller.file.is_modified(controller.session):
+        if not self._editor.controller.is_modified:
             return True
         buttons = QtWidgets.QMessageBox.StandardButton
         answer = QtWidgets.QMessageBox.question(

@@ -82,7 +82,7 @@ class PageModel:
         self._show("toolbar", panel.toolbar(editor))
         self._show("sections", panel.sections(editor))
         self._show("history", panel.history(editor))
-        is_modified = editor.controller.file.is_modified(editor.session)
+        is_modified = editor.controller.is_modified
         stem = name.rpartition(".")[0] or name
         self._set("document", {"name": name, "stem": stem, "modified": is_modified})
         self._set("trame__title", f"{name} · segdeform")

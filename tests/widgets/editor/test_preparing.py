@@ -11,13 +11,13 @@ from hands import Hand, draw_seldom, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
-from vtk_segdeform import Regions, Session, sizes
+from vtk_segdeform import Regions, Session, load_session, sizes
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import actions, controller
+from vtk_segdeform.widgets.editor import actions, controller, saving
 
 pytestmark = pytest.mark.usefixtures("vtk_in_process")
 
@@ -275,6 +275,24 @@ def test_the_stand_in_is_hidden_if_the_preparation_fails(standing_in):
     bench.hand.tick(5)
     assert_array_equal(bench.surface.points, bench.session.mesh.vertices)
     assert len(bench.hand.failures) == 1
+    bench.until(lambda: not bench.puller.waiting.is_active)
+    assert not bench.editor.controller.is_modified
+    bench.gate.error = None
+    bench.hand.drag([bench.place, bench.place + [30.0, 0.0]])  # retries
+    bench.until(lambda: bench.session.can_undo)
+
+
+def test_a_pull_that_waits_is_an_unsaved_change_and_is_saved(standing_in, tmp_path):
+    bench, controller = standing_in, standing_in.editor.controller
+    release_early(bench)
+    assert controller.is_modified
+    bench.editor.do(saving(tmp_path / "pulled.segdeform"))
+    assert not (tmp_path / "pulled.segdeform").exists()
+    bench.finish()
+    bench.until((tmp_path / "pulled.segdeform").exists)
+    assert_array_equal(load_session(tmp_path / "pulled.segdeform").vertices, bench.session.vertices)
+    assert bench.session.can_undo
+    assert not controller.is_modified
 
 
 @pytest.mark.parametrize("change", ["pin", "failure"])
