@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from vtk_segdeform import models, sizes
 from vtk_segdeform.geometry import voronoi_cells
 from vtk_segdeform.regions.coarse import coarsen
-from vtk_segdeform.solver.coarse_volume import CoarseVolume, _coarse, _matrix
+from vtk_segdeform.solver.coarse_volume import CoarseVolume, _matrix, _over_cells
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
@@ -180,6 +180,6 @@ def test_the_coarse_surface_of_an_open_mesh_is_closed_by_coarse_lids(per_region)
     _, cells = voronoi_cells(mesh, 500, np.random.default_rng(0))
     means = _matrix(cells, 1.0 / np.bincount(cells)[cells]) @ mesh.vertices
     for fine in held:
-        rough = replace(_coarse(fine, cells), target=0.0)
+        rough = replace(_over_cells([fine], cells)[0], target=0.0)
         assert rough.violation(means) == pytest.approx(fine.target, rel=0.1)
         assert_allclose(rough.violation(means + [3, -2, 5]), rough.violation(means), rtol=1e-12)

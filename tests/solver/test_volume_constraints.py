@@ -1,10 +1,11 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import bottle, open_box, sheet, together, tube, with_holes
 from scenes import sausage
 from solids import rotation
@@ -16,8 +17,10 @@ from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver.exact_volume import steps_to_volume
 from vtk_segdeform.solver.volume_constraints import (
     _labels_of_faces,
+    gradients,
     region_volumes,
     total_volume,
+    violations,
 )
 
 SCENE = sausage(3)
@@ -241,3 +244,17 @@ def test_the_faces_of_a_lid_belong_to_the_regions_at_its_border():
         beside = (np.isin(mesh.faces, corners[:2]).sum(axis=1) == 2).nonzero()[0]
         assert label == of_faces[beside[0]]
     assert one + other == pytest.approx(abs(signed_volume(lids.extension @ mesh.vertices, faces)))
+
+
+def test_constraints_that_share_their_points_are_evaluated_together():
+    constraints, x = region_volumes(MESH, SCENE.regions.labels), MESH.vertices + wobble()
+    mixed = (*constraints, total_volume(MESH), *constraints)  # which has other points
+    assert violations(mixed, x).tolist() == [each.violation(x) for each in mixed]
+    for one, each in zip(gradients(mixed, x), mixed, strict=True):
+        assert_array_equal(one, each.gradient(x))
+    weights = np.arange(2.0, 2.0 + len(constraints))
+    of_face = np.repeat(weights, [len(each.faces) for each in constraints])
+    faces = np.concatenate([each.faces for each in constraints])
+    whole = replace(constraints[0], faces=faces).hessian_halves(x, of_face)
+    apart = sum(w * each.hessian_halves(x) for w, each in zip(weights, constraints, strict=True))
+    assert_allclose(whole.toarray(), apart.toarray(), atol=1e-15)

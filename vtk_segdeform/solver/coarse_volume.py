@@ -91,7 +91,7 @@ class CoarseVolume:
         """
         points = rest
         if self.cells is not None and self.shares is not None:
-            constraints = [_coarse(each, self.cells) for each in constraints]
+            constraints = _over_cells(constraints, self.cells)
             points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
         preserved = tuple(replace(each, target=each.violation(points)) for each in free)
@@ -109,18 +109,18 @@ class _VolumeHessian:
 
     def __call__(self, p: FloatArray, multipliers: FloatArray) -> FloatArray:
         """Return G (3, m, m) at *p* (m, 3)."""
-        weights, constraints = self._over_few_points
+        weights, whole, constraint_of = self._over_few_points
         x = weights @ p
-        each = zip(multipliers, constraints, strict=True)
-        halves = sum(multiplier * constraint.hessian_halves(x) for multiplier, constraint in each)
+        halves = whole.hessian_halves(x, multipliers[constraint_of])
         half = (halves.astype(np.float32) @ weights).reshape(3, len(x), -1)
         reduced = weights.T @ half
         return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
 
     @cached_property
-    def _over_few_points(self) -> tuple[NDArray[np.float32], tuple[VolumeConstraint, ...]]:
-        """W~ (k, m) of few points, in single precision, and the constraints over them.
+    def _over_few_points(self) -> tuple[NDArray[np.float32], VolumeConstraint, IntArray]:
+        """W~ (k, m) of few points, in single precision, and the faces of all constraints over them.
 
+        Also the constraint of each of these faces.
         Neighbours that face the same way are merged, so that thin parts keep both their sides.
         """
         n = len(self.points)
@@ -132,21 +132,29 @@ class _VolumeHessian:
             cells = cluster_positions(places, sizes.VOLUME_HESSIAN_POINTS, rounds=3, seeded=False)
             shares = areas / np.bincount(cells, areas)[cells]
         weights = self.surface.premultiplied(_matrix(cells, shares)).astype(np.float32)
-        return weights, tuple(_coarse(each, cells) for each in self.constraints)
+        few = _over_cells(self.constraints, cells)
+        number = np.repeat(np.arange(len(few)), [len(each.faces) for each in few])
+        whole = replace(few[0], faces=np.concatenate([each.faces for each in few]))
+        return weights, whole, number
 
 
-def _coarse(constraint: VolumeConstraint, cells: IntArray) -> VolumeConstraint:
-    """Return *constraint* over the cells."""
-    n, count, extension = len(cells), int(cells.max()) + 1, constraint.extension
-    added = 0 if extension is None else extension.shape[0] - n
-    places = np.concatenate([cells, count + np.arange(added)])
-    if extension is not None:
+def _over_cells(
+    constraints: Sequence[VolumeConstraint], cells: IntArray
+) -> tuple[VolumeConstraint, ...]:
+    """Return *constraints*, which share their points, over the cells; they share them again."""
+    n, count, extension = len(cells), int(cells.max()) + 1, None
+    if not constraints:
+        return ()
+    assert all(each.shares_points(constraints[0]) for each in constraints)
+    if (given := constraints[0].extension) is not None:
         member = sparse.csr_array((np.ones(n), cells, np.arange(n + 1)), (n, count))
-        extension = sparse.csr_array(
-            sparse.vstack([sparse.eye_array(count), extension[n:] @ member])
-        )
-    faces = faces_between(places, constraint.faces)
-    return VolumeConstraint(faces, constraint.target, extension)
+        extension = sparse.csr_array(sparse.vstack([sparse.eye_array(count), given[n:] @ member]))
+    added = 0 if given is None else given.shape[0] - n
+    places = np.concatenate([cells, count + np.arange(added)])
+    return tuple(
+        VolumeConstraint(faces_between(places, each.faces), each.target, extension)
+        for each in constraints
+    )
 
 
 def _matrix(cells: IntArray, shares: FloatArray) -> sparse.csr_array:

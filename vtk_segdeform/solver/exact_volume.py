@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..kernels import in_parallel
 from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
-from .volume_constraints import VolumeConstraint
+from .volume_constraints import VolumeConstraint, gradients, violations
 
 _log = logging.getLogger(__name__)
 _NEWTON_STEPS = 8
@@ -44,13 +44,13 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     unit = sum(abs(c.target) for c in constraints)
     here, before, jacobian = paths[:, :3], np.inf, None
     for _ in range(_NEWTON_STEPS):
-        g = np.array([c.violation(here) for c in constraints])
+        g = violations(constraints, here)
         error = float(np.abs(g).max())
         if error <= _EXACT * unit or (error <= _SMALL * unit and error > 0.5 * before):
             break
         if jacobian is None or error > _SMALL * unit:
-            gradients = [c.gradient(here) for c in constraints]
-            jacobian = np.array([[np.vdot(j, d) for d in directions] for j in gradients])
+            rows = np.reshape(gradients(constraints, here), (len(constraints), -1))
+            jacobian = rows @ np.stack([d.ravel() for d in directions], axis=1)
         # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
         scale = np.sqrt(np.abs(np.diag(jacobian)))
         scale[scale == 0.0] = 1.0
@@ -63,7 +63,7 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
 def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
     """Return whether the vertices *x* (n, 3) meet all constraints, up to a few roundings."""
     unit = sum(abs(constraint.target) for constraint in constraints)
-    return all(abs(each.violation(x)) <= _MET * unit for each in constraints)
+    return bool((np.abs(violations(constraints, x)) <= _MET * unit).all())
 
 
 def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
@@ -107,7 +107,8 @@ def scale_bodies(
     constraints: Sequence[VolumeConstraint], x: FloatArray, body: IntArray, centres: FloatArray
 ) -> FloatArray:
     """Do the same for each *body* (n,) of *x* about its own of *centres* (c, 3); return (c,)."""
-    ratios = np.array([constraint.relative(x) for constraint in constraints])
+    targets = np.array([constraint.target for constraint in constraints])
+    ratios = violations(constraints, x) / np.where(targets != 0.0, targets, np.inf)
     scales = np.cbrt(1.0 / (1.0 + np.where(ratios > -1.0, ratios, 0.0)))
     shifts = (1.0 - scales)[:, None] * centres
 

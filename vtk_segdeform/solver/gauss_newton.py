@@ -69,7 +69,7 @@ from .extrapolation import End, Way
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
 from .terms import NO_SURFACE, Term, hessian_of, share_of_step, with_terms
-from .volume_constraints import Volumes
+from .volume_constraints import Volumes, gradients, violations
 
 _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
@@ -448,7 +448,7 @@ class GaussNewton:
         h, *z = factor.solve_all([-here.slope, *here.rows])  # -H^-1 d, and Z
         if not self.volumes.constraints:
             return h, np.zeros(0), []
-        g = np.array([constraint.violation(here.x) for constraint in self.volumes.constraints])
+        g = violations(self.volumes.constraints, here.x)
         gh = np.array([np.vdot(row, h) for row in here.rows])  # -G H^-1 d
         gz = np.array([[np.vdot(row, direction) for direction in z] for row in here.rows])
         multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
@@ -517,11 +517,11 @@ class GaussNewton:
     def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
         """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
         load = self.energy.rotation_load(p, x)
-        gradients = [constraint.gradient(x) for constraint in self.volumes.constraints]
+        slopes = gradients(self.volumes.constraints, x)
         if self.energy.has_vertex_rotations:  # the load is on the surface, too: one pass over W~
-            load, *rows = self.volumes.surface.adjoints([load, *gradients])
+            load, *rows = self.volumes.surface.adjoints([load, *slopes])
         else:
-            rows = self.volumes.surface.adjoints(gradients)
+            rows = self.volumes.surface.adjoints(slopes)
         energy, slope = self.energy.value_and_slope(p, load)
         value, slope = with_terms(self._begun, p, x, value=energy, slope=slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)

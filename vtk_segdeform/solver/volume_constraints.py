@@ -17,7 +17,7 @@ run over the lids too.  Parts of the mesh that enclose nothing, such as sheets, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -73,16 +73,16 @@ class VolumeConstraint:
         gradient = volume_gradient(self.extended(x), self.faces)
         return gradient if self.extension is None else self.extension.T @ gradient
 
-    def hessian_halves(self, x: FloatArray) -> sparse.csr_array:
+    def hessian_halves(self, x: FloatArray, weights: FloatArray | None = None) -> sparse.csr_array:
         """Return U_c for each axis c, (3n, n) one below the other, at *x* (n, 3).
 
         The Hessian is d^2 g / dx_ia dx_jb = sum_c eps_abc (U_c - U_c^T)_ij; U_c of
-        det(x_i, x_j, x_k) / 6 is the axis c of x_k / 6.
+        det(x_i, x_j, x_k) / 6 is the axis c of x_k / 6.  *weights* (m,) multiply it for each face.
         """
         i, j, k = (np.concatenate(np.roll(self.faces.T, -turn, axis=0)) for turn in range(3))
-        points = self.extended(x) / 6.0
+        points, weight = self.extended(x) / 6.0, 1.0 if weights is None else np.tile(weights, 3)
         halves = [
-            sparse.coo_array((axis[k], (i, j)), (len(points), len(points))).tocsr()
+            sparse.coo_array((weight * axis[k], (i, j)), (len(points), len(points))).tocsr()
             for axis in points.T
         ]
         if self.extension is not None:
@@ -100,11 +100,36 @@ class VolumeConstraint:
         x = x - x[0]
         return np.concatenate([x, self._means @ x])
 
+    def shares_points(self, other: VolumeConstraint) -> bool:
+        """Return whether `extended` is the same for both."""
+        return self.extension is other.extension
+
     @cached_property
     def _means(self) -> sparse.csr_array:
         """The points that were added, from the others: `extension` below the identity."""
         assert self.extension is not None
         return self.extension[self.extension.shape[1] :]
+
+
+def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
+    """Return g(x) of all *constraints*, (c,), in units of volume."""
+    points, g = None, np.empty(len(constraints))
+    for k, each in enumerate(constraints):
+        if points is None or not each.shares_points(constraints[k - 1]):
+            points = each.extended(x)
+        g[k] = signed_volume(points, each.faces) - each.target
+    return g
+
+
+def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
+    """Return J_g of all *constraints*, (n, 3) each; see `VolumeConstraint.gradient`."""
+    points, found = None, []
+    for k, each in enumerate(constraints):
+        if points is None or not each.shares_points(constraints[k - 1]):
+            points = each.extended(x)
+        gradient = volume_gradient(points, each.faces)
+        found.append(gradient if each.extension is None else each.extension.T @ gradient)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
