@@ -304,6 +304,41 @@ def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, 
     assert_array_equal(load_session(arm_file).vertices, session.vertices)
 
 
+def test_closing_asks_about_a_pull_that_waits_and_saves_it(
+    start, ball_file, tmp_path, monkeypatch, boxes
+):
+    go_on = threading.Event()
+
+    def gated(session, made=None):
+        work = PREPARED(session, made)
+
+        def wait(progress):
+            assert go_on.wait(30.0)
+            return work(progress)
+
+        return work and wait
+
+    monkeypatch.setattr(preparing, "lacking", gated)
+    hand = start(ball_file)
+    session, puller = hand.window.session, hand.window.editor.widgets.puller
+    vertex = int(session.vertices[:, 0].argmax())
+
+    def pull():
+        session.pull(vertex, session.vertices[vertex] + [0.2, 0.0, 0.0])
+        session.commit("pull")
+
+    puller.waiting.begin(pull)
+    boxes.answers.append("Cancel")
+    assert not hand.window.close()
+    assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
+    choose_file(monkeypatch, tmp_path / "ball.segdeform")
+    boxes.answers.append("Save")
+    threading.Timer(0.2, go_on.set).start()
+    assert hand.window.close()
+    assert session.undo_label == "pull"
+    assert_array_equal(load_session(tmp_path / "ball.segdeform").vertices, session.vertices)
+
+
 @BLANK
 def test_opening_another_file_asks_first_and_an_unreadable_file_loses_nothing(
     start, ball_file, arm_file, tmp_path, boxes
