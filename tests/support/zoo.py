@@ -249,7 +249,7 @@ FAULTY = [
     Creature("both sides of a triangle", lambda: (np.eye(3), np.array([[0, 1, 2], [0, 2, 1]])), "1 duplicate face"),
     Creature("all vertices in one place", lambda: moved(body(), 0.0), "flat", False, given="all faces are flat"),
     Creature("so far away that faces collapse, 1e18", lambda: moved(body(), 1.0, 1e18), "flat", False, given="all faces are flat"),
-    Creature("one vertex 1e16 away", lambda: with_value(1e16), "vertex so far away", False, given="vertex so far away"),
+    Creature("one vertex 1e16 away", lambda: with_value(1e16), "too far from all others", False, given="too far from all others"),
     Creature("so large that volumes overflow", lambda: moved(body(), 1e150), "too large|too far", False, given="too large|too far"),
     Creature("so small that volumes underflow", lambda: moved(body(), 1e-150), "too small", False, given="too small"),
     Creature("points with two coordinates", lambda: (body()[0][:, :2], body()[1]), r"vertices must have shape \(n, 3\)", False, False),

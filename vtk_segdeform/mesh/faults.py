@@ -337,14 +337,15 @@ def _too_small(points: FloatArray) -> bool:
 def _outlying(points: FloatArray, used: BoolArray) -> IntArray:
     """Return the points (k,) in faces that are too far from most of the others."""
     ids = np.flatnonzero(used)
+    if not len(ids):
+        return ids
     some = points[ids[:: len(ids) // _SOME + 1]]
-    centre = np.median(some, axis=0) if len(some) else np.zeros(3)
-    reach = _OUTLYING * float(np.median(np.abs(some - centre).max(axis=1))) if len(some) else 0.0
+    centre = np.median(some, axis=0)
+    reach = _OUTLYING * float(np.median(np.abs(some - centre).max(axis=1)))
     low, high = centre - reach, centre + reach
     if reach == 0.0 or ((low <= points.min(axis=0)).all() and (points.max(axis=0) <= high).all()):
-        return np.empty(0, dtype=np.int64)
-    outside = ((points < low) | (points > high)).any(axis=1)
-    return np.flatnonzero(outside & used)
+        return ids[:0]
+    return np.flatnonzero(((points < low) | (points > high)).any(axis=1) & used)
 
 
 def _finite(points: FloatArray) -> BoolArray:

@@ -44,10 +44,10 @@ class Kind(enum.Enum):
         "scale the mesh up; its extent must be at least 1e-70",
     )
     OUTLYING = (
-        "vertex so far away that the others are one point beside it",
-        "vertices so far away that the others are one point beside them",
+        "vertex too far from all others",
+        "vertices too far from all others",
         "vertex ",
-        "move or delete it; most vertices must not be that close together",
+        "move or delete it; such a distance leaves no digits for the rest of the mesh",
     )
     FLAT = (
         "all faces are flat",

@@ -17,7 +17,7 @@ run over the lids too.  Parts of the mesh that enclose nothing, such as sheets, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -57,7 +57,7 @@ class VolumeConstraint:
 
     def violation(self, x: FloatArray) -> float:
         """Return g(x), in units of volume."""
-        return signed_volume(self.extended(x), self.faces) - self.target
+        return float(violations((self,), x)[0])
 
     def relative(self, x: FloatArray) -> float:
         """Return g(x) / target; 0 if nothing is enclosed."""
@@ -70,8 +70,7 @@ class VolumeConstraint:
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return J_g, (n, 3): the derivative of g by each vertex."""
-        gradient = volume_gradient(self.extended(x), self.faces)
-        return gradient if self.extension is None else self.extension.T @ gradient
+        return gradients((self,), x)[0]
 
     def hessian_halves(self, x: FloatArray, weights: FloatArray | None = None) -> sparse.csr_array:
         """Return U_c for each axis c, (3n, n) one below the other, at *x* (n, 3).
@@ -113,23 +112,29 @@ class VolumeConstraint:
 
 def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
     """Return g(x) of all *constraints*, (c,), in units of volume."""
-    points, g = None, np.empty(len(constraints))
-    for k, each in enumerate(constraints):
-        if points is None or not each.shares_points(constraints[k - 1]):
-            points = each.extended(x)
-        g[k] = signed_volume(points, each.faces) - each.target
-    return g
+    each = _with_points(constraints, x)
+    return np.array([signed_volume(points, one.faces) - one.target for one, points in each])
 
 
 def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
-    """Return J_g of all *constraints*, (n, 3) each; see `VolumeConstraint.gradient`."""
-    points, found = None, []
-    for k, each in enumerate(constraints):
-        if points is None or not each.shares_points(constraints[k - 1]):
-            points = each.extended(x)
-        gradient = volume_gradient(points, each.faces)
-        found.append(gradient if each.extension is None else each.extension.T @ gradient)
+    """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
+    found = []
+    for one, points in _with_points(constraints, x):
+        gradient = volume_gradient(points, one.faces)
+        found.append(gradient if one.extension is None else one.extension.T @ gradient)
     return found
+
+
+def _with_points(
+    constraints: Sequence[VolumeConstraint], x: FloatArray
+) -> Iterator[tuple[VolumeConstraint, FloatArray]]:
+    """Yield each constraint with its points, which are computed once if all share them."""
+    last, points = None, x
+    for each in constraints:
+        if last is None or not each.shares_points(last):
+            points = each.extended(x)
+        last = each
+        yield each, points
 
 
 @dataclass(frozen=True, eq=False)
