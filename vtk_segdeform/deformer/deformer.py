@@ -135,6 +135,7 @@ class _PulledPoints:
     places: IntArray = field(default_factory=lambda: _NONE)  # (q,), among the places of all sets
     targets: IntArray = field(default_factory=lambda: _NONE)  # (q,), their targets
     vertices: IntArray = field(default_factory=lambda: _NONE)  # (q,)
+    rows: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, m), of W~
     offsets: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from target to x~
     spread: float = 0.0  # within which they pull, in the mesh's unit
     error: float = np.inf  # the largest, before the last correction
@@ -452,6 +453,7 @@ class Deformer:
         places = self._constraints.places(self._targets)
         pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
         pulled.vertices = self.handle[pulled.targets]
+        pulled.rows = self.subspace.at(pulled.vertices)
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
         volumes = self._constraints.volumes
         solver = replace(before, energy=energy, positions=positions, volumes=volumes)
@@ -870,29 +872,37 @@ class Deformer:
         self, reached: SolverResult, options: SolverOptions
     ) -> tuple[SolverResult, FloatArray, int]:
         """Correct the pose *reached* while pulled points are off their targets; also return x."""
-        steps, pulled = 0, self._constraints.pulled
-        x, _ = self._with_exact_volume(reached)
-        off = self._off(self._targets, x)
+        steps, pulled, within = 0, self._constraints.pulled, options.within or 0.0
+        is_reached, error = True, _largest(self._off_at(reached.p))
         for _ in range(_LIVE_CORRECTIONS):
-            error = _largest(off)
-            if error <= (options.within or 0.0):
+            if error <= within:
                 break
             before = pulled.offsets
-            pulled.correct(_LIVE * off, np.inf)
+            pulled.correct(_LIVE * self._off_at(reached.p), np.inf)
             places = pulled.moved(self._constraints.places(self._targets))
             result = self._continuation.follow(places, replace(options, max_steps=_FEW_STEPS))
             steps += result.steps
-            if result.remaining > (options.within or 0.0):
+            if result.remaining > within:
                 pulled.offsets = before
                 self._continuation.restart()
                 break
-            reached = result
-            x, _ = self._with_exact_volume(reached)
-            off = self._off(self._targets, x)
-            if _largest(off) > _GAIN * error:  # out of reach: to aim beyond only distorts
-                return reached, x, steps
-        pulled.correct(_LIVE * off, np.inf)
+            reached, last = result, error
+            error = _largest(self._off_at(reached.p))
+            is_reached = error <= _GAIN * last
+            if not is_reached:  # out of reach: to aim beyond only distorts
+                break
+        x, _ = self._with_exact_volume(reached)
+        if is_reached:
+            pulled.correct(_LIVE * self._off(self._targets, x), np.inf)
         return reached, x, steps
+
+    def _off_at(self, p: FloatArray) -> FloatArray:
+        """Return how far the pulled vertices are off their targets with cages at *p*, (q, 3).
+
+        The same as `_off`, but for the exact volume, which needs the whole mesh.
+        """
+        pulled = self._constraints.pulled
+        return self._targets[pulled.targets] - pulled.rows @ p if len(pulled.rows) else _NO_POINTS
 
     def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
         """Return how far the pulled vertices of *x* (n, 3) are off their *targets*, (q, 3)."""

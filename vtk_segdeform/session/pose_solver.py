@@ -93,6 +93,7 @@ class PoseSolver:
         self._current: Pose | None = None  # pose of the deformer in use; None if unknown
         self._aim: _Aim | None = None  # of the current pose, if that has reached its targets
         self._used: Deformer | None = None
+        self._is_passing = False  # whether the vertices of the pose evaluated last are
         self._evaluated: tuple[Pose, bool | None, FloatArray, Callable[[], float]] | None = None
         self._mapped: tuple[tuple[FloatArray, ...], FloatArray] = (), _NO_TARGETS
         self._turned: tuple[tuple[tuple[FloatArray, ...], FloatArray], ...] = ()
@@ -146,6 +147,11 @@ class PoseSolver:
             self._constrain(state)
         tell(progress, 1.0, "ready")
 
+    def settle(self) -> None:
+        """Make the vertices of a passing pose those of its cages, W~ p bit for bit."""
+        if self._is_passing:
+            self._evaluated, self._is_passing = None, False
+
     def forget(self) -> None:
         """Make the next `solve` start from its pose alone, as after loading."""
         self._current = None
@@ -178,11 +184,14 @@ class PoseSolver:
         max_steps: int | None,
         within: float | None = None,
         *,
+        is_passing: bool = False,
         progress: Progress | None = None,
     ) -> tuple[Pose, Solution]:
         """Solve for *targets* (k, 3) of every handle, starting from the pose of *state*.
 
         The pose has these targets, even if its cages are still on the way; see `Deformer.solve`.
+        Until `settle` the vertices of a passing pose, one in a drag, of a large mesh are those of
+        the solution, so that each frame maps the mesh once.  They differ from W~ p by rounding.
 
         Raises
         ------
@@ -223,6 +232,11 @@ class PoseSolver:
         self._current = pose
         if solution.targets is None:
             self._aim = aim
+        is_passing = is_passing and self._mesh.n_vertices > sizes.SCALED_VOLUME
+        if is_passing and finished is None and cages is solution.cage_vertices:
+            frozen(solution.vertices)
+            self._evaluated = pose, state.options.lids, solution.vertices, cache(solution.volume)
+            self._is_passing = True
         x, change = self._evaluate(state, pose)
         solution = replace(solution, vertices=x, volume=change)
         if aim is None:
@@ -250,7 +264,8 @@ class PoseSolver:
         x = self._surface(state, pose.cage_vertices)
         if state.locality is not None:
             x = self.vertices(state, pose)
-            deformer = localised(deformer, state.locality)
+            at_press = self._known_surface(state, state.locality)
+            deformer = localised(deformer, state.locality, at_press)
         return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
 
     def accept(self, before: Pose, after: Pose) -> None:
@@ -372,6 +387,14 @@ class PoseSolver:
             self._mapped = cage_vertices, self.bind(state).surface(cage_vertices)
         return self._mapped[1]
 
+    def _known_surface(self, state: State, locality: Locality) -> FloatArray:
+        """Return W~ p at the press of a pull, (n, 3), which is usually the pose that is shown."""
+        known = self._evaluated
+        if known is not None and known[0].cage_vertices is locality.cage_vertices:
+            if known[0].finished is None:
+                return known[2]
+        return self._surface(state, locality.cage_vertices)
+
     def _localise(self, state: State, constrained: Deformer) -> Deformer:
         """Return a deformer that keeps what the last pull of *state* does not reach, if any."""
         locality = state.locality
@@ -379,7 +402,7 @@ class PoseSolver:
             return constrained
         if self._local is not None and self._local[:2] == (constrained, locality):
             return self._local[2]
-        deformer = localised(constrained, locality)
+        deformer = localised(constrained, locality, self._known_surface(state, locality))
         self._local = constrained, locality, deformer
         self._current = None
         return deformer
@@ -412,6 +435,7 @@ class PoseSolver:
             frozen(x)
             _, volume = self._enclosed(state)
             before = self._evaluated = pose, lids, x, cache(partial(volume.relative, x))
+            self._is_passing = False
         return before[2:]
 
 

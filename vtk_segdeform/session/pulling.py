@@ -169,10 +169,12 @@ def as_it_is(grasp: Grasp, rotation: FloatArray, now: FloatArray) -> Grasp:
     return replace(grasp, state=replace(grasp.state, pose=pose))
 
 
-def localised(constrained: Deformer, locality: Locality) -> Deformer:
-    """Return a copy of a *constrained* deformer for a pull: local, in the pose at its press."""
+def localised(constrained: Deformer, locality: Locality, x: FloatArray) -> Deformer:
+    """Return a copy of a *constrained* deformer for a pull: local, in the pose at its press.
+
+    *x* (n, 3) is the mesh with its cages in that pose.
+    """
     other = constrained.copy()
-    x = other.surface(locality.cage_vertices)
     other.resume(locality.cage_vertices, x[other.handle])
     return other.local(locality.vertex, locality.reach, locality.spread, follows=locality.follows)
 

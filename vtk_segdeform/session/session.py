@@ -479,6 +479,7 @@ class Session(Timeline):
             cages = self._cages_around(regions, part(progress, _SEGMENTED, _FITTED))
         state = State(regions, cages, options=options)
         deformer = PoseSolver(self.mesh).bind(state, part(progress, _FITTED, 1.0))
+        _ = self.mesh.adjacency, self._pose_solver.lids(state)  # the first frame needs them
         return Preparation(regions, cages, deformer)
 
     def accept(self, preparation: Preparation) -> bool:
@@ -820,7 +821,10 @@ class Session(Timeline):
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
-        pose, solution = self._solve(self._state, self.targets, (max_steps, within), progress)
+        limits, is_passing = (max_steps, within), self.is_dragging
+        pose, solution = self._solve(
+            self._state, self.targets, limits, is_passing=is_passing, progress=progress
+        )
         here = self._state.pose
         # Converged already: keep the same pose object.  But even without a step, the final pose can
         # have other weights of handles than the one before.
@@ -927,7 +931,7 @@ class Session(Timeline):
         limits: tuple[int | None, float | None],
     ) -> Solution:
         """Solve from *state* for *targets*, as part of a drag of the handles *moved*."""
-        pose, solution = self._solve(state, targets, limits)
+        pose, solution = self._solve(state, targets, limits, is_passing=True)
         self._solution = pose, solution
         self._move(replace(state, pose=pose), *moved)
         return solution
@@ -937,14 +941,22 @@ class Session(Timeline):
         state: State,
         targets: Mapping[str, FloatArray],
         limits: tuple[int | None, float | None],
+        *,
+        is_passing: bool = False,
         progress: Progress | None = None,
     ) -> tuple[Pose, Solution]:
         began = time.perf_counter()
         wanted = MappingProxyType({**targets})
-        pose, solution = self._pose_solver.solve(state, wanted, *limits, progress=progress)
+        pose, solution = self._pose_solver.solve(
+            state, wanted, *limits, is_passing=is_passing, progress=progress
+        )
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)
         return pose, solution
+
+    def _end_drag(self, label: str | None) -> str | None:
+        self._pose_solver.settle()
+        return super()._end_drag(label)
 
     def _is_same_place(self, a: Pose, b: Pose) -> bool:
         """Tell whether the cages of two poses differ by rounding only."""

@@ -12,6 +12,7 @@ The files, in reading order:
     job              background work, with progress and cancellation
     preparing        the preparation for pulls, while the editor remains usable
     settling         a pose that converges after its release, and saving after that
+    rest             what waits until the hand has rested
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to
     recordings       recordings of input and video

@@ -33,11 +33,13 @@ from .mode import Mode
 from .notices import Notices
 from .preparing import Preparing
 from .recordings import Recordings
+from .rest import Rest
 from .session_file import SessionFile, is_mesh, read_session
 from .settling import Settling, is_unsettled
 from .widget_set import WidgetSet
 
 _FIRST_RUN = "First run: compiling takes about half a minute, once"
+_REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
 T = TypeVar("T")
 
 
@@ -99,6 +101,7 @@ class Controller:
             self._prepare_pulls,
             self.refresh,
         )
+        self._rest = Rest(view, _REST, self._is_at_rest, load_early)
         self.settling = Settling(view, lambda: self.widgets, self.refresh)
         self.finishing = Finishing(
             view,
@@ -198,6 +201,7 @@ class Controller:
         self._stop_listening()
         self._stop_failures()
         self.recordings.remove()
+        self._rest.stop()
         self.settling.remove()
         self.finishing.remove()
         self.camera.remove()
@@ -300,7 +304,7 @@ class Controller:
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
-        load_early()
+        self._rest.begin()
         is_pull = widget is self.widgets.puller  # smooth, while a finish may end in a step
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
@@ -446,11 +450,13 @@ class Controller:
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
 
+    def _is_at_rest(self) -> bool:
+        return self._is_free() and not self._preparing.is_running
+
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)
         session.accept(preparation)
-        if not any(widget.is_grabbing for widget in self.widgets.interactive):
-            load_early()
+        self._rest.begin()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
 

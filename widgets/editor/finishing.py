@@ -12,7 +12,6 @@ recording did.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from vtk_segdeform.checks import as_flag
@@ -20,13 +19,13 @@ from vtk_segdeform.session import Change, FinishedPose, Session
 from vtk_segdeform.solver import Status
 
 from ..recording import announce_finish, on_finish_request, recorded_keys
-from ..scene import Glide, Stop, SurfaceDisplay, View
+from ..scene import Glide, SurfaceDisplay, View
 from .job import Job, view_timer
+from .rest import Rest
 
 MOST_VERTICES = 20_000  # of a mesh that is finished without a request: it takes about a second
 
 _REST = 0.4  # seconds without a change before it begins
-_PERIOD = 100  # milliseconds between two checks
 _STEP = 0.2  # the fraction that is shown is a multiple of this: each change draws the view
 _KEPT = Change.NAMES | Change.PIVOTS  # changes that a finish does not depend on
 
@@ -60,8 +59,7 @@ class Finishing:
         self._is_free, self._changed = is_free, changed
         self._is_wanted = True
         self.glide = Glide(view)
-        self._stop_waiting: Stop | None = None
-        self._since = 0.0
+        self._rest = Rest(view, _REST, is_free, self._start)
         self._job: Job[FinishedPose] | None = None
         self._is_accepting = False
         self._fraction: float | None = None
@@ -90,7 +88,7 @@ class Finishing:
     @property
     def is_pending(self) -> bool:
         """Whether a pose is being finished, or will be in a moment."""
-        return self._stop_waiting is not None or self._job is not None
+        return self._rest.is_pending or self._job is not None
 
     def rest(self) -> None:
         """Finish the pose in a moment: a drag has just ended."""
@@ -98,15 +96,14 @@ class Finishing:
         is_replayed = recorded_keys(self._view.interactor) is not None
         is_small = self._session().mesh.n_vertices <= MOST_VERTICES
         if self._is_wanted and is_small and not is_replayed:
-            self._since = time.monotonic()
-            self._stop_waiting = self._view.every(_PERIOD, self._check)
+            self._rest.begin()
 
     def follow(self, change: Change) -> None:
         """Cancel the finish if it does not suit the session after *change*."""
         if self._is_accepting or not change & ~_KEPT:
             return
-        if change is Change.POSE and self._stop_waiting is not None:
-            self._since = time.monotonic()  # still converging
+        if change is Change.POSE and self._rest.is_pending:
+            self._rest.begin()  # still converging
         else:
             self.interrupt()
 
@@ -114,9 +111,7 @@ class Finishing:
         """Cancel, and end the glide; False if there was nothing to cancel."""
         is_running = self._job is not None
         self.glide.end()
-        if self._stop_waiting is not None:
-            self._stop_waiting()
-            self._stop_waiting = None
+        self._rest.stop()
         if self._job is not None:
             self._job.abandon()
             self._job = None
@@ -128,18 +123,15 @@ class Finishing:
         self.interrupt()
         self._stop_requests()
 
-    def _check(self) -> None:
-        if not self._is_free():
-            self._since = time.monotonic()
-        if time.monotonic() - self._since < _REST:
-            return
+    def _start(self) -> bool:
+        """Begin to finish the pose; True if it must converge first."""
         session = self._session()
         solution = session.solution  # None after undo
         if solution is not None and solution.status is Status.STEP_LIMIT:
-            return  # it will be refined
+            return True  # it will be refined
         self.interrupt()
         if solution is None or not session.can_finish:
-            return
+            return False
         self._job = Job(
             view_timer(self._view),
             session.finishing(),
@@ -148,6 +140,7 @@ class Finishing:
             is_due=self._is_free,
         )
         self._show(0.0)
+        return False
 
     def accept(self, result: FinishedPose) -> bool:
         """Use a finished pose, and glide to it; False if the pose has changed since."""

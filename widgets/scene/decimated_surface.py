@@ -22,7 +22,7 @@ from vtk_segdeform.geometry import VertexNormals, decimated
 from vtk_segdeform.io import polydata_of
 from vtk_segdeform.mesh import Mesh
 
-_PATIENCE = 0.02  # seconds until it is clear that the decimated mesh does not exist yet
+_PATIENCE = 0.01  # seconds until it is clear that the decimated mesh does not exist yet
 
 
 def decimated_triangles(mesh: Mesh, n_points: int) -> tuple[IntArray, IntArray]:
@@ -121,7 +121,7 @@ class Decimating:
         if self._thread is None:
             self._thread = Thread(target=self._work, daemon=True)
             self._thread.start()
-        self._thread.join(_PATIENCE)
+            self._thread.join(_PATIENCE)
         if self._thread.is_alive():
             return None
         if not self._shapes:

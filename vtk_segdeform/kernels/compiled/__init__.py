@@ -26,7 +26,7 @@ They release the GIL and start no threads; `threads.in_parallel` runs several at
 are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
-from .beams import beam_meets, beyond_sides
+from .beams import faces_in_beam
 from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
@@ -84,8 +84,6 @@ __all__ = [
     "add_interpolated_adjoint",
     "add_packed_adjoint",
     "add_product",
-    "beam_meets",
-    "beyond_sides",
     "border_half_edges",
     "cell_forces",
     "cell_sums",
@@ -98,6 +96,7 @@ __all__ = [
     "edge_rows",
     "face_areas",
     "face_sides",
+    "faces_in_beam",
     "facet_corners",
     "facing_pairs",
     "first_equal_points",

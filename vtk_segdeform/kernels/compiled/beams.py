@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .kernels import kernel
 
 _compile = kernel()
 
 
 @_compile
-def beyond_sides(sides, points, origin, axes, width, start, stop):
-    """Put into *sides* (n,) a bit for each side of a beam that a vertex start..stop is beyond."""
-    for i in range(start, stop):
+def faces_in_beam(met, points, faces, origin, axes, width):
+    """Put into *met* (m,) the faces of which no side of a beam has all corners beyond it.
+
+    Returns their number.
+    """
+    sides = np.empty(len(points), dtype=np.uint8)
+    for i in range(len(points)):
         x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
         u = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
         v = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
@@ -20,11 +26,9 @@ def beyond_sides(sides, points, origin, axes, width, start, stop):
             + (4 if v > width else 0)
             + (8 if v < -width else 0)
         )
-
-
-@_compile
-def beam_meets(is_met, faces, sides, start, stop):
-    """Put into *is_met* (m,) whether no side has all corners of a face start..stop beyond it."""
-    for f in range(start, stop):
-        beyond = sides[faces[f, 0]] & sides[faces[f, 1]] & sides[faces[f, 2]]
-        is_met[f] = beyond == 0
+    count = 0
+    for f in range(len(faces)):
+        if sides[faces[f, 0]] & sides[faces[f, 1]] & sides[faces[f, 2]] == 0:
+            met[count] = f
+            count += 1
+    return count
