@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import sizes
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError, SessionError
@@ -166,6 +167,25 @@ def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
     other = Session(SCENE.mesh, state=session.state)
     assert_array_equal(other.vertices, session.vertices)
     assert other.solution is None
+
+
+def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit(monkeypatch):
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", SCENE.mesh.n_vertices - 1)
+    session, mapped = ready(), []
+    session.bind()
+    surface = Deformer.surface
+    monkeypatch.setattr(Deformer, "surface", lambda *args: mapped.append(1) or surface(*args))
+    for degrees in (10, 30, 60):
+        solution = session.drag(SCENE.turned(degrees), max_steps=1)
+        assert session.vertices is solution.vertices
+        assert abs(session.volume_change) < 1e-14
+    assert not mapped
+    shown = session.vertices
+    session.commit()
+    assert_allclose(session.vertices, shown, atol=1e-13)
+    assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
+    assert session.refine(max_steps=2).steps == 2
+    assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
 
 
 def test_the_same_drag_from_the_same_state_has_the_same_end():

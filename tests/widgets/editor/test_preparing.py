@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import actions, controller, saving
+from vtk_segdeform.widgets.editor import actions, controller, rest, saving
 
 pytestmark = pytest.mark.usefixtures("vtk_in_process")
 
@@ -342,6 +343,46 @@ def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):
     bench.editor.controller.start("counting", lambda _: asked.append("work"), lambda _: None)
     bench.until(lambda: not bench.editor.is_busy)
     assert asked == [bench.session.mesh.n_vertices, "work"]
+
+
+@pytest.fixture
+def kernels(monkeypatch):
+    """Return a list of what has been loaded; the clock of a rest stands still."""
+    loaded = []
+    monkeypatch.setattr(controller, "load_early", lambda: loaded.append("kernels"))
+    monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    return loaded
+
+
+def test_kernels_are_loaded_once_the_hand_has_rested(kernels, bench, monkeypatch):
+    def wait(seconds):
+        monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: seconds))
+        bench.hand.tick(3)
+
+    bench.until(bench.gate.has_begun.is_set)
+    bench.hand.press(bench.place + [0.0, 10.0])
+    bench.hand.release()
+    wait(5.0)
+    assert not kernels  # the session is being prepared
+    bench.hand.drag([bench.place, bench.place + 30.0])  # released before the session is ready
+    wait(5.0)
+    assert not kernels
+    bench.finish()
+    bench.until(lambda: bench.session.can_undo and not bench.puller.is_refining)
+    wait(5.9)
+    assert not kernels
+    bench.hand.press(bench.place)
+    bench.hand.move(bench.place - 30.0)
+    wait(20.0)
+    assert not kernels  # it is being pulled
+    bench.hand.release()
+    bench.until(lambda: not bench.puller.is_refining)
+    wait(20.9)
+    assert not kernels
+    wait(21.1)
+    assert kernels == ["kernels"]
+    wait(30.0)
+    assert kernels == ["kernels"]
 
 
 def test_escape_cancels_until_the_next_press(bench):
