@@ -305,7 +305,7 @@ def test_only_rings_that_would_bend_resist():
 
 def test_a_ring_has_its_vertex_as_an_affine_mean_of_the_neighbours():
     mesh = coarse().mesh
-    ring = Ring.around(mesh, 5, 0.1)
+    ring = Ring.around(mesh, mesh.vertices, 5, 0.1)
     around = np.setdiff1d(mesh.adjacency[[5]].indices, [5])
     assert ring.vertices.tolist() == [5, *around]
     assert_allclose(ring.combinations.sum(axis=1), 0.0, atol=1e-12)
@@ -313,7 +313,7 @@ def test_a_ring_has_its_vertex_as_an_affine_mean_of_the_neighbours():
     normal = outward(mesh.vertices, 5, ring_around(mesh, 5))
     assert np.linalg.norm(np.cross(ring.offsets[0], normal)) < 0.02 * ring.edge
     assert ring.weights[0] > ring.weights[1:].sum()
-    assert Ring.around(mesh, 5, 20.0 * ring.edge) is None
+    assert Ring.around(mesh, mesh.vertices, 5, 20.0 * ring.edge) is None
 
 
 @pytest.mark.parametrize("size", every(2, [1e-7, 1.0]))

@@ -9,7 +9,7 @@ import threading
 
 import pytest
 
-from vtk_segdeform.kernels import threads
+from vtk_segdeform.kernels import quick_turns, threads
 
 # Set-up and a drag, alone and then in two threads at a time; in a separate process, since BLAS
 # has one thread in the tests.
@@ -135,3 +135,46 @@ def test_without_threadpoolctl_nothing_is_limited(monkeypatch):
     monkeypatch.setattr(threads, "_blas_limit", lambda: None)
     with threads.one_blas_thread():
         pass
+
+
+def test_threads_take_quick_turns_until_the_last_one_has_ended():
+    before = sys.getswitchinterval()
+    inside, first, second = [], threading.Event(), threading.Event()
+
+    def work(begun, ends):
+        with quick_turns():
+            inside.append(sys.getswitchinterval())
+            begun.set()
+            ends.wait(10.0)
+            inside.append(sys.getswitchinterval())
+
+    begun = [threading.Event(), threading.Event()]
+    threads = [
+        threading.Thread(target=work, args=each)
+        for each in zip(begun, (first, second), strict=True)
+    ]
+    try:
+        for thread, event in zip(threads, begun, strict=True):
+            thread.start()
+            event.wait(10.0)
+        first.set()
+        threads[0].join()
+        assert sys.getswitchinterval() < 0.5 * before
+    finally:
+        first.set()
+        second.set()
+        for thread in threads:
+            thread.join()
+    assert max(inside) < 0.5 * before
+    assert sys.getswitchinterval() == pytest.approx(before)
+
+
+def test_turns_shorter_than_quick_ones_stay():
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        with quick_turns():
+            assert sys.getswitchinterval() == pytest.approx(1e-5)
+        assert sys.getswitchinterval() == pytest.approx(1e-5)
+    finally:
+        sys.setswitchinterval(before)

@@ -497,7 +497,8 @@ class Deformer:
         energy, flat = self._binding.energy, dict[int, FloatArray]()
         handles, held = self._constraints.handles, np.concatenate([self.fixed, self.handle])
         single = [(k, int(self.handle[ids[0]])) for k, ids in enumerate(handles) if len(ids) == 1]
-        around = [(k, Ring.around(self._rest, vertex, spread)) for k, vertex in single]
+        x = self._rest.vertices
+        around = [(k, Ring.around(self.mesh, x, vertex, spread)) for k, vertex in single]
         rings = [
             (k, ring)
             for k, ring in around

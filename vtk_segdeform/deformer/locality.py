@@ -87,10 +87,13 @@ class Ring:
     edge: float  # mean length
 
     @classmethod
-    def around(cls, mesh: Mesh, vertex: int, spread: float) -> Ring | None:
-        """Return the ring of *vertex* of *mesh*, at rest; None if it is small against *spread*."""
+    def around(cls, mesh: Mesh, x: FloatArray, vertex: int, spread: float) -> Ring | None:
+        """Return the ring of *vertex* of *mesh*, at rest; None if it is small against *spread*.
+
+        *x* (n, 3) are the vertices in the unit of *spread*.
+        """
         ring = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
-        arms = mesh.vertices[ring] - mesh.vertices[vertex]
+        arms = x[ring] - x[vertex]
         edge = float(np.linalg.norm(arms, axis=1).mean()) if len(ring) else 0.0
         if len(ring) < _FEWEST - 1 or spread > _FINE * edge:
             return None
@@ -102,7 +105,7 @@ class Ring:
         others = np.vstack([-shares, -np.eye(len(ring))])
         combinations = np.hstack([np.ones((len(ring) + 1, 1)), others])
         vertices = np.concatenate([[vertex], ring])
-        offsets = combinations @ mesh.vertices[vertices]
+        offsets = combinations @ x[vertices]
         weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
         return cls(vertices, combinations, offsets, weights, edge)
 

@@ -19,7 +19,7 @@ from .dispatch import (
     scratch,
     writable,
 )
-from .threads import in_parallel, n_threads, one_blas_thread
+from .threads import in_parallel, n_threads, one_blas_thread, quick_turns
 
 __all__ = [
     "advice",
@@ -33,6 +33,7 @@ __all__ = [
     "load_late",
     "n_threads",
     "one_blas_thread",
+    "quick_turns",
     "scratch",
     "writable",
 ]

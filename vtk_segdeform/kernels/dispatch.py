@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sizes
+from .threads import quick_turns
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 24  # bytes; only the pages that are used take memory
@@ -72,7 +73,7 @@ def load_early() -> None:
     Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.
     """
     if not _kernels.cache_info().currsize:
-        Thread(target=_load, name="segdeform kernels").start()
+        Thread(target=quick_turns()(_load), name="segdeform kernels").start()
 
 
 def load_late() -> None:

@@ -18,6 +18,7 @@ from contextlib import ExitStack
 from typing import Any, Generic, TypeVar
 
 from vtk_segdeform.errors import Cancelled, SessionError
+from vtk_segdeform.kernels import quick_turns
 from vtk_segdeform.progress import Progress
 
 from ..scene import Stop, View
@@ -106,7 +107,7 @@ class Job(Generic[T]):
         self._reported_at = time.monotonic()
         self._ended = False
         thread = futures.ThreadPoolExecutor(1, "segdeform job")
-        self._future = thread.submit(work, self._shared.report)
+        self._future = thread.submit(quick_turns()(work), self._shared.report)
         thread.shutdown(wait=False)  # the thread ends with the work
         self._stop = timer(self)
 
