@@ -141,29 +141,27 @@ def test_threads_take_quick_turns_until_the_last_one_has_ended():
     before = sys.getswitchinterval()
     inside, first, second = [], threading.Event(), threading.Event()
 
-    def work(begun, ends):
+    def work(has_begun, may_end):
         with quick_turns():
             inside.append(sys.getswitchinterval())
-            begun.set()
-            ends.wait(10.0)
+            has_begun.set()
+            may_end.wait(10.0)
             inside.append(sys.getswitchinterval())
 
     begun = [threading.Event(), threading.Event()]
-    threads = [
-        threading.Thread(target=work, args=each)
-        for each in zip(begun, (first, second), strict=True)
-    ]
+    ends = first, second
+    running = [threading.Thread(target=work, args=each) for each in zip(begun, ends, strict=True)]
     try:
-        for thread, event in zip(threads, begun, strict=True):
+        for thread, event in zip(running, begun, strict=True):
             thread.start()
             event.wait(10.0)
         first.set()
-        threads[0].join()
+        running[0].join()
         assert sys.getswitchinterval() < 0.5 * before
     finally:
         first.set()
         second.set()
-        for thread in threads:
+        for thread in running:
             thread.join()
     assert max(inside) < 0.5 * before
     assert sys.getswitchinterval() == pytest.approx(before)

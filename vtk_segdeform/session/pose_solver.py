@@ -389,11 +389,10 @@ class PoseSolver:
 
     def _known_surface(self, state: State, locality: Locality) -> FloatArray:
         """Return W~ p at the press of a pull, (n, 3), which is usually the pose that is shown."""
-        known = self._evaluated
-        if known is not None and known[0].cage_vertices is locality.cage_vertices:
-            if known[0].finished is None:
-                return known[2]
-        return self._surface(state, locality.cage_vertices)
+        known, cages = self._evaluated, locality.cage_vertices
+        if known and known[0].cage_vertices is cages and known[0].finished is None:
+            return known[2]
+        return self._surface(state, cages)
 
     def _localise(self, state: State, constrained: Deformer) -> Deformer:
         """Return a deformer that keeps what the last pull of *state* does not reach, if any."""
