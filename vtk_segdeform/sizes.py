@@ -51,7 +51,7 @@ COARSE_VOLUME_POINTS = 2_000
 """Points of that coarse surface, about."""
 
 VOLUME_HESSIAN_POINTS = 700
-"""Points beyond which the second derivatives of the volumes are computed from so many.
+"""Points beyond which the second derivatives of one volume are computed from so many.
 
 The cost is quadratic in the cage vertices at every point: 73 ms instead of 124 for 2,000 points."""
 

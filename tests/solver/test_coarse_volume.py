@@ -92,8 +92,10 @@ def hessian_product(volumes, p, multipliers, dp):
     return (whole.reshape(3 * m, 3 * m) @ dp.T.ravel()).reshape(3, m).T
 
 
-@pytest.mark.parametrize(("few", "error"), [(10_000, 1e-4), (700, 0.05)])
-@pytest.mark.parametrize("constraints", [total_volume, region_volumes])
+@pytest.mark.parametrize(
+    ("constraints", "few", "error"),
+    [(total_volume, 10_000, 1e-4), (total_volume, 700, 0.05), (region_volumes, 700, 1e-4)],
+)
 def test_the_hessian_is_the_derivative_of_the_gradient(monkeypatch, constraints, few, error):
     monkeypatch.setattr(sizes, "VOLUME_HESSIAN_POINTS", few)
     mesh, rng = SCENE.mesh, np.random.default_rng(6)
@@ -103,6 +105,7 @@ def test_the_hessian_is_the_derivative_of_the_gradient(monkeypatch, constraints,
     volumes = CoarseVolume.of(mesh, SUBSPACE).volumes(held, mesh.vertices)
     p = P0 + 0.02 * rng.normal(size=P0.shape)
     dp, multipliers = rng.normal(size=P0.shape), rng.normal(size=len(held))
+    multipliers[0] *= 1e6  # as of a small body among large ones
 
     def pull(p):
         gradients = [c.gradient(volumes.surface.map(p)) for c in volumes.constraints]

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import bottle, open_box, sheet, together, tube, with_holes
 from scenes import sausage
-from solids import rotation
+from solids import icosphere, rotation
 
 from vtk_segdeform import models
 from vtk_segdeform.geometry.lids import lids_of
@@ -16,6 +16,7 @@ from vtk_segdeform.geometry.volume import signed_volume, volume_along_path
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver.exact_volume import steps_to_volume
 from vtk_segdeform.solver.volume_constraints import (
+    VolumeConstraint,
     _labels_of_faces,
     gradients,
     region_volumes,
@@ -107,6 +108,19 @@ def test_steps_to_volume_meet_every_constraint(held):
     assert max(abs(c.violation(x)) for c in constraints) < 1e-12
     (step,) = steps_to_volume([total_volume(MESH)], np.hstack([x, MESH.vertices]))
     assert abs(step) < 1e-12
+
+
+def test_a_volume_that_vanishes_takes_no_step():
+    corners, faces = icosphere(0)
+    n, size = MESH.n_vertices, 1e-10
+    points = np.vstack([MESH.vertices, size * corners])
+    whole = VolumeConstraint(MESH.faces, total_volume(MESH).target)
+    constraints = [whole, VolumeConstraint(n + faces, 0.0)]
+    directions = [each.gradient(points) for each in constraints]
+    x = points + np.vstack([wobble(2), np.zeros_like(corners)])
+    t = steps_to_volume(constraints, np.hstack([x, *directions]))
+    assert abs(t[1]) < 1e-3
+    assert abs(whole.violation(x + t[0] * directions[0])) < 1e-12
 
 
 OPEN = {

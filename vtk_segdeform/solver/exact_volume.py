@@ -26,6 +26,7 @@ _log = logging.getLogger(__name__)
 _NEWTON_STEPS = 8
 _EXACT = 1e-15  # error of a volume, as a share of all
 _MET = 1e-13  # the same, for telling whether the directions were good enough
+_ROUNDING = 1e-12  # response of a volume to its direction, relative to the largest
 _SMALL = 1e-6  # error below which the derivatives of the last step are near enough
 _CACHED = 1 << 14  # vertices moved together
 _SHARES = 4  # of a mesh that threads scale; smaller ones take less time than waking a thread
@@ -51,9 +52,10 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
         if jacobian is None or error > _SMALL * unit:
             rows = np.reshape(gradients(constraints, here), (len(constraints), -1))
             jacobian = rows @ np.stack([d.ravel() for d in directions], axis=1)
-        # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
+        # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.  One
+        # with a few coarse points may not respond at all but for rounding, and does not take part.
         scale = np.sqrt(np.abs(np.diag(jacobian)))
-        scale[scale == 0.0] = 1.0
+        scale[scale <= _ROUNDING * scale.max()] = scale.max() or 1.0
         scaled = jacobian / scale[:, None] / scale
         t += np.linalg.lstsq(scaled, -g / scale, rcond=1e-12)[0] / scale
         here, before = moved_along(paths, t), error
