@@ -1,5 +1,7 @@
 """Volume constraints of meshes with several bodies: each body keeps its own volume."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -111,3 +113,23 @@ def test_pulling_one_body_changes_the_volume_of_none():
     session.drag({"tip": targets + [0.0, 0.1, 0.0]}, max_steps=3)
     for x in (session.vertices[:n], session.vertices[n:]):
         assert abs(signed_volume(x, BAR.faces) / signed_volume(BAR.vertices, BAR.faces) - 1) < 1e-13
+
+
+def test_a_direction_that_is_only_rounding_moves_nothing(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 40)
+    mesh = joined((models.sphere(400), 0.0, 1.0, 1), (models.sphere(20), 1.3, 0.15, 1))
+    regions = Regions.single(mesh)
+    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 40))
+    low, high = int(mesh.vertices[:, 2].argmin()), int(mesh.vertices[:, 2].argmax())
+    deformer = deformer.hold(fixed=[low], handle=[high])
+    target = mesh.vertices[[high]] + [0.0, 0.0, 0.3]
+    expected = deformer.solve(target).vertices
+    places = deformer._constraints.places(deformer._frame.inward(target))
+    result = deformer._continuation.solve(places, deformer._options)
+    noise = 1e-20 * np.random.default_rng(1).normal(size=result.p.shape)  # of a vanishing volume
+    result = replace(result, directions=(result.directions[0], noise))
+    x = deformer._frame.in_scene(deformer._with_exact_volume(result)[0])
+    changes = [each.relative(x) for each in deformer.preserved_volumes]
+    assert_allclose(changes, [0.0, 0.0], atol=1e-12)
+    assert_allclose(x, expected, atol=1e-3)

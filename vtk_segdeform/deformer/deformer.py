@@ -105,6 +105,7 @@ _PULLED = 5e-5  # largest error of pulled points in a final pose
 _SPIKE, _FAR_PULL = 0.08, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
+_VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
 _LIVE, _LIVE_CORRECTIONS = 0.6, 2  # of the error of pulled points; and per live solve, at most
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
 _SEEN = 10_000  # vertices, of which this is checked
@@ -988,7 +989,11 @@ class Deformer:
         if self._constraints.scaled is not None:
             return self._scaled(self._constraints.scaled)
         preserved = self._constraints.preserved
-        x = self._moved_to_volume(preserved, directions)
+        lengths = np.array([np.abs(each).max() for each in directions])
+        if lengths.min() > _VANISHED * lengths.max():
+            x = self._moved_to_volume(preserved, directions)
+        else:
+            x = self._map(self._p * size)
         if len(preserved) > 1 and not are_met(preserved, x):
             # Of small bodies the coarse volumes, and so these directions, may vanish.
             gradients = self.subspace.adjoints([each.gradient(x) / size for each in preserved])
