@@ -105,6 +105,11 @@ def test_an_array_is_where_it_is_not_zero_or_where_it_equals(ball):
     assert_array_equal(
         parse_selection("is big", ball.vertices, point_arrays=arrays), np.flatnonzero(part == 2)
     )
+    unknown = np.where(part == 2, np.nan, part)  # no data is no selection
+    assert_array_equal(
+        parse_selection("some", ball.vertices, point_arrays={"some": unknown}),
+        np.flatnonzero(part == 1),
+    )
 
 
 @pytest.mark.parametrize(

@@ -192,7 +192,7 @@ def test_a_reset_discards_the_running_state():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertices are both fixed and"),
+        ({"fixed": np.array([3]), "handle": np.array([3, 4])}, "1 vertex is both fixed and"),
         ({"handle": np.array([1026])}, r"handle must index 0..257"),
         ({"fixed": np.array([5, 5])}, "fixed contains a vertex twice"),
     ],

@@ -160,7 +160,10 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
     wanted, arrays = options.regions, surface.given.point_data
     if wanted in arrays:
         labels = surface.at_vertices(np.asarray(arrays[wanted]))
-        return Regions.from_labels(surface.mesh, labels, overlap=options.overlap)
+        rings = {} if options.overlap is None else {"overlap": options.overlap}
+        return Regions.from_labels(surface.mesh, labels, **rings)
+    if options.overlap is not None:
+        raise ConstraintError("--overlap is for regions of a point array only; leave it out")
     if wanted == "1":
         return Regions.single(surface.mesh)
     if wanted != "auto" and not (wanted.isdecimal() and int(wanted) > 0):

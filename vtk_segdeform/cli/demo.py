@@ -17,7 +17,7 @@ from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages
 from ..deformer import Deformer, finished
-from ..errors import MissingDependencyError
+from ..errors import ConstraintError, MissingDependencyError
 from ..geometry import local_volume_change
 from ..mesh import Mesh
 from ..models import cactus
@@ -83,7 +83,11 @@ def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -
 
 def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     """Bend the cactus; write meshes and pictures.  Return whether the handle met its targets."""
-    folder, mesh = options.output, cactus(options.size)
+    folder = options.output
+    if folder.exists() and not folder.is_dir():
+        raise ConstraintError(f"{folder} is a file; give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    mesh = cactus(options.size)
     say(f"cactus          {mesh.n_vertices} vertices, {mesh.n_faces} triangles")
     start = time.perf_counter()
     regions = segment(mesh, n_regions=3, progress=part(progress, 0.0, 0.2))
@@ -113,7 +117,6 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
         f"at 99 % of the vertices within {usual} %"
     )
 
-    folder.mkdir(parents=True, exist_ok=True)
     after = mesh.with_vertices(solution.vertices)
     bent = coloured_regions(io.Surface(io.to_polydata(after)), regions)
     bent.point_data["local_volume_change"] = change

@@ -19,6 +19,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from ctypes.util import find_library
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     words = sys.argv[1:] if arguments is None else arguments
     try:
-        options = _parser().parse_args(_with_signed_vectors(words))
+        options, unknown = _parser().parse_known_args(_with_signed_vectors(words))
+        if unknown:
+            options.parser.error(_unknown_words(options.parser, unknown))
     except SystemExit as end:  # argparse has printed its usage, help or version
         return int(end.code or 0)
     _render_without_display()
@@ -219,10 +222,12 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     def add_command(name: str, text: str, epilog: str = "") -> argparse.ArgumentParser:
-        return subparsers.add_parser(
+        added = subparsers.add_parser(
             name, help=text, description=f"{text[0].upper()}{text[1:]}.", epilog=epilog,
             formatter_class=form, allow_abbrev=False,
         )  # fmt: skip
+        added.set_defaults(parser=added)
+        return added
 
     sub = add_command("demo", "bend the sample cactus; write meshes and pictures")
     _output_folder(sub, "demo-output")
@@ -328,6 +333,19 @@ def _input_output(
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=required, help=text)
 
 
+def _unknown_words(parser: argparse.ArgumentParser, words: Sequence[str]) -> str:
+    """Return the error about *words* that are no arguments of a command, with advice."""
+    text = f"unrecognized arguments: {' '.join(words)}"
+    options = re.findall(r"--[a-z][a-z-]*", parser.format_help())
+    for word in words:
+        near = get_close_matches(word.partition("=")[0], options, 1)
+        if word.startswith("--") and near:
+            return f"{text}; did you mean {near[0]}?"
+    if all(re.fullmatch(r"[-+.\d][\w.+-]*,?", word) for word in words):
+        return f"{text}; write points with commas and without blanks: 0,0,1"
+    return text
+
+
 def _output_folder(parser: argparse.ArgumentParser, name: str) -> None:
     text = f"output folder (default: {name})"
     parser.add_argument("-o", "--output", type=Path, default=name, metavar="FOLDER", help=text)
@@ -337,7 +355,7 @@ def _regions(parser: argparse.ArgumentParser) -> None:
     text = "number of regions, 'auto', or a point array of region numbers (default: auto)"
     parser.add_argument("--regions", default="auto", metavar="N", help=text)
     text = "overlap of regions from a point array, in edge rings (default: 4)"
-    parser.add_argument("--overlap", type=_count, default=4, metavar="RINGS", help=text)
+    parser.add_argument("--overlap", type=_count, metavar="RINGS", help=text)
 
 
 def _cages(parser: argparse.ArgumentParser) -> None:

@@ -129,7 +129,9 @@ def _array(name: str, values: ArrayLike, wanted: float | None, n: int) -> BoolAr
             f"point array {name!r} must have one number per point, shape ({n},); "
             f"got {array.shape} {array.dtype}"
         )
-    return np.asarray(array != 0 if wanted is None else array == wanted)
+    if wanted is None:
+        return np.asarray((array != 0) & (array == array))  # NaN, no data, selects nothing
+    return np.asarray(array == wanted)
 
 
 def _file(path: Path, wanted: float | None, n: int, role: Role | None) -> BoolArray:

@@ -12,7 +12,7 @@ from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whol
 from ..cages import Cage
 from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
-from ..mesh import Mesh
+from ..mesh import Mesh, counted
 
 _FARTHEST = 1e3  # sizes of the mesh
 _PULL_RADIUS = 0.15  # diagonals of the mesh
@@ -74,8 +74,9 @@ def checked_constraints(
         raise ConstraintError(str(fault)) from None
     both = np.intersect1d(fixed, handle)
     if len(both):
+        shared = counted(len(both), "vertex is", "vertices are")
         raise ConstraintError(
-            f"{len(both)} vertices are both {name} and handle (the first is {both[0]}); "
+            f"{shared} both {name} and handle (the first is {both[0]}); "
             "remove them from one of the two"
         )
     return fixed, handle

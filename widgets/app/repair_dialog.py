@@ -18,7 +18,7 @@ from vtk_segdeform.mesh_repair import Repair
 from vtk_segdeform.progress import Progress, part
 
 from ..editor import Job, error_text
-from ..qt import check_box
+from ..qt import check_box, shortcut
 from .qt_timer import qt_timer
 from .repair_preview import Preview
 
@@ -89,6 +89,7 @@ class RepairDialog(QtWidgets.QDialog):
         self.cancelling = buttons.addButton("Cancel", roles.RejectRole)
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
+        shortcut("Esc", self, self.reject)  # the preview keeps its keys
         self._lay_out(buttons)
         self._delay = QtCore.QTimer(self)
         self._delay.setSingleShot(True)

@@ -78,7 +78,8 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     if session.undo_label == "pull":
         return f"Drag the surface. Shift-click pins. {keys.cap('undo')}: undo"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
-    return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({radius:.3g} %)"
+    share = f"{radius:.1f}".removesuffix(".0")  # as in the panel
+    return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({share} %)"
 
 
 def _drag_hint(session: Session, own: str = "") -> str:

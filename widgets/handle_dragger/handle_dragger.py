@@ -330,7 +330,7 @@ class HandleDragger(Widget):
         known = {id(ids) for ids in last.values()}
         new = [name for name, ids in now.items() if name not in last and id(ids) not in known]
         self._locked, self._marks.hidden = (
-            frozenset(names.get(id(last.get(name)), name) for name in some)
+            frozenset(names.get(id(last.get(name)), name) for name in some) - set(new)
             for some in (self._locked, self.hidden)
         )
         self._last_handles = now

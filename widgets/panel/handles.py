@@ -43,7 +43,7 @@ def handles_section(editor: DeformEditor) -> Section:
                 _COLUMNS,
                 rows,
                 "The selected row is painted in mode 3, a handle is dragged in mode 4. F2: rename. "
-                "Hidden and locked handles keep their place and cannot be dragged",
+                "A locked handle cannot be grabbed, nor can a hidden one in mode 4",
                 acts={
                     "select": _choosing,
                     "rename": lambda key, name: renaming(_name(key), name.strip()),

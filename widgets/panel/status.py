@@ -64,7 +64,7 @@ def words_of(hint: str, keys: Keys, mode: Mode) -> tuple[Word, ...]:
     names = {key_cap(b.keys[0]): b.name for b in working}
     # A key after "Press", "or" or "Next:", or before ":" or "to", as hints name it.
     caps = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
-    pattern = rf"(?:(?:Press|or|Next:) |\(|· |, |\. )({caps})(?=[ :,.)]|$)"
+    pattern = rf"(?:(?:Press|or|Next:) |\(|· |, |\. )({caps})(?=[ :,)]|\.(?!\d)|$)"
     words, end = [], 0
     for found in re.finditer(pattern, hint):
         start, stop = found.span(1)

@@ -48,6 +48,7 @@ GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
+_LOCKED = "{} is locked. Clear Lock in the list of handles to move it"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
 _NOT_YET = "The last pull is not computed yet. Wait a moment, or press Esc to cancel it"
 _PREPARING = "Preparing: the pull starts in a moment"
@@ -70,6 +71,8 @@ class Puller(Widget):
     binds : bool
         Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
         done elsewhere.
+    is_locked : callable
+        ``is_locked(name)``: whether a pin or pulled point must not be grabbed; by default none.
     waiting : Waiting
         The pull that waits until the session is ready.
     """
@@ -79,6 +82,7 @@ class Puller(Widget):
         if surface is not None:
             require(surface, SurfaceDisplay, "surface")
         self.binds = True
+        self.is_locked: Callable[[str], bool] = lambda _: False
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         changed = partial(self._invoke, "ModifiedEvent")
@@ -200,6 +204,8 @@ class Puller(Widget):
         hit = self._picker.hit(press) if marker is None else None
         if self.waiting.has_pull and (marker is not None or hit is not None):
             return self._refuse(_NOT_YET)
+        if marker is not None and self.is_locked(marker):
+            return self._refuse(_LOCKED.format(marker))
         if marker is not None:
             vertex = self._markers.vertex(marker)
             return self._pull(vertex, np.array(self._surface.points[vertex]), press)

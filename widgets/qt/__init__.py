@@ -12,7 +12,7 @@ The files, in reading order:
     icons       the icons of the toolbar
 """
 
-from .controls import check_box
+from .controls import check_box, shortcut
 from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
@@ -22,4 +22,5 @@ __all__ = [
     "check_box",
     "deform_dock",
     "name_keys",
+    "shortcut",
 ]

@@ -10,6 +10,7 @@ panel subscribes to them and refreshes all its parts together, a moment later.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -29,6 +30,7 @@ from .toolbar import Toolbar
 Qt = QtCore.Qt
 _DELAY = 30  # milliseconds; longer than between two moves of a drag
 _WIDTH = 40  # letters
+_ENTER = Qt.Key.Key_Return, Qt.Key.Key_Enter
 _SHORTCUTS = ("undo", "redo", "cancel")  # work in the panel, too, with Ctrl or Alt, or as Escape
 
 
@@ -151,6 +153,32 @@ class DeformPanel(QtWidgets.QWidget):
         letters = _WIDTH * self.fontMetrics().averageCharWidth()
         self.setMinimumWidth(max(widest, letters))
         self._with_shortcuts = self.toolbar, area, self.status, self.history
+        self._focused: Any = None  # the last widget outside that had the focus
+        QtWidgets.QApplication.instance().focusChanged.connect(self._focus_changed)
+        for field in self._inside.findChildren(QtWidgets.QAbstractSpinBox):
+            field.installEventFilter(self)
+        for table in self._inside.findChildren(QtWidgets.QTreeWidget):
+            table.itemDelegate().closeEditor.connect(self._return_focus)
+
+    def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
+        """Return the focus after Enter in a field, so that keys act on the view again."""
+        if event.type() == QtCore.QEvent.Type.KeyPress and event.key() in _ENTER:
+            QtCore.QTimer.singleShot(0, self._return_focus)  # once the field has used the key
+        return bool(super().eventFilter(watched, event))
+
+    def _focus_changed(self, old: Any, new: Any) -> None:
+        if old is not None and self.isAncestorOf(new) and not self.isAncestorOf(old):
+            self._focused = old
+
+    def _return_focus(self, *_: object) -> None:
+        """Give the focus back to what had it before the panel, usually the view."""
+        with contextlib.suppress(RuntimeError):  # it was deleted meanwhile
+            if self._focused is not None and self.isAncestorOf(self.window().focusWidget()):
+                self._focused.setFocus()
+
+    def _escape(self, name: str) -> None:
+        self._return_focus()
+        self.editor.run(name)
 
     def _show_keys(self, keys: Keys) -> None:
         """Use some of the *keys* in the panel, too."""
@@ -158,8 +186,8 @@ class DeformPanel(QtWidgets.QWidget):
         while self._shortcuts:
             self._shortcuts.pop().deleteLater()
         for name in _SHORTCUTS:
-            do = partial(self.editor.run, name)
             for key in keys[name].keys:
+                do = partial(self._escape if key == "escape" else self.editor.run, name)
                 if key == "escape" or key.startswith(("ctrl+", "alt+")):
                     self._shortcuts += [
                         shortcut(key_cap(key), part, do) for part in self._with_shortcuts

@@ -384,3 +384,14 @@ def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(shared, monk
     assert shown == [("Filling 2 holes of 6 edges", 0.36)]
     until(stopped.is_set, "the end of the repair")
     assert shared.title == "bottle.ply - segdeform"
+
+
+def test_escape_closes_the_dialog_even_if_its_preview_has_the_keys(shared):
+    def escape(dialog):
+        dialog.activateWindow()
+        dialog.preview.plotter.setFocus()
+        until(dialog.preview.plotter.hasFocus, "the focus")
+        QtTest.QTest.keyClick(dialog.preview.plotter, Qt.Key_Escape)
+        until(lambda: not dialog.isVisible(), "the end of the dialog")
+
+    repair(shared, escape)

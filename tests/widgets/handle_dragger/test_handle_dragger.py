@@ -407,6 +407,11 @@ def test_a_hidden_or_locked_handle_cannot_be_dragged_and_keeps_its_place(bench, 
     getattr(bench.dragger, change)("hat", False)
     bench.dragger.handle = "hat"
     assert bench.gizmo.centre is not None
+    getattr(bench.dragger, change)("hat", True)
+    ids = bench.session.handles["hat"]
+    bench.session.remove_handle("hat")
+    bench.session.add_handle(ids, "hat")  # another one of the same name
+    assert not {*bench.dragger.hidden, *bench.dragger.locked}
 
 
 def test_axis_keys_are_passed_on_while_nothing_is_dragged(bench):

@@ -346,6 +346,9 @@ def test_words_of_the_hint_with_actions_are_keys(editor):
     words = words_of(hint, editor.keys, editor.mode)
     assert "".join(word.text for word in words) == hint
     assert [word.action for word in words if word.action] == ["segment", "regions"]
+    words = words_of("Shift+wheel: radius (4.8 %). Press 4.", editor.keys, editor.mode)
+    assert [word.text for word in words if word.action] == ["4"]
+    assert words[0].text.endswith("(4.8 %). Press ")
     assert status(editor).hint == editor.controller.hint
 
 

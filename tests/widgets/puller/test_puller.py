@@ -225,6 +225,18 @@ def test_fixed_points_are_refused_with_advice(bench):
     assert bench.view.camera.GetPosition() == camera
 
 
+def test_a_locked_point_stays_and_the_reason_is_said(bench):
+    place, _ = bench.on()
+    (name,) = [bench.session.pin(bench.on()[1])]
+    bench.puller.is_locked = lambda each: each == name
+    bench.hand.drag([place, place + [0, 30]])
+    assert bench.puller.remark == f"{name} is locked. Clear Lock in the list of handles to move it"
+    assert bench.session.state.pose is None
+    bench.puller.is_locked = lambda _: False
+    bench.hand.drag([place, place + [0, 30]])
+    assert bench.session.undo_label == "pull"
+
+
 @pytest.mark.parametrize("released", [False, True])
 def test_a_pull_before_the_cages_are_there_begins_as_soon_as_they_are(released):
     bench = Bench(has_cages=False)

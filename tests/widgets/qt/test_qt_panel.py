@@ -40,6 +40,12 @@ def settle(widget):
     until(lambda: widget.panel.is_up_to_date and not widget.editor.is_busy, "the panel")
 
 
+def focus(control):
+    control.window().activateWindow()
+    control.setFocus()
+    until(control.hasFocus, "the focus")
+
+
 def said(control):
     """Return what a control shows, as its user reads it."""
     if isinstance(control, QtWidgets.QAbstractButton):
@@ -195,3 +201,30 @@ def test_icons_are_drawn_once_for_each_palette(monkeypatch):
     assert looks("undo", dark) != first
     assert looks("redo", light) != first
     assert len(drawn) > count
+
+
+@pytest.mark.parametrize("key", ["Key_Return", "Key_Escape"])
+def test_keys_act_on_the_view_again_after_a_field(widget, key):
+    widget.editor.mode = Mode.PULL
+    settle(widget)
+    field = widget.panel.controls["pull.radius"]
+    focus(widget.plotter)
+    focus(field)
+    QtTest.QTest.keyClick(field.lineEdit(), getattr(Qt.Key, key))
+    until(widget.plotter.hasFocus, "the focus")
+
+
+def test_keys_act_on_the_view_again_after_renaming(widget):
+    widget.editor.mode = Mode.HANDLES
+    settle(widget)
+    table = widget.panel.controls["handles.list"]
+    focus(widget.plotter)
+    focus(table)
+    table.setCurrentItem(table.topLevelItem(1))
+    QtTest.QTest.keyClick(table, Qt.Key.Key_F2)
+    editor = table.findChild(QtWidgets.QLineEdit)
+    editor.setText("arm")
+    QtTest.QTest.keyClick(editor, Qt.Key.Key_Return)
+    until(widget.plotter.hasFocus, "the focus")
+    settle(widget)
+    assert "arm" in widget.editor.session.handles
