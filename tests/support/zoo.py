@@ -409,7 +409,7 @@ SELECTIONS = [  # (fixed, handle)
     Creature("neighbours", lambda: (body()[1][0, :1], body()[1][0, 1:2])),
     Creature("many scattered handle vertices", lambda: (LEFT, np.setdiff1d(np.arange(0, 258, 3), LEFT))),
     Creature("the same vertices twice", lambda: (RIGHT, RIGHT), "both fixed and handle"),
-    Creature("overlapping", lambda: (np.arange(9), np.arange(8, 20)), "1 vertices are both fixed"),
+    Creature("overlapping", lambda: (np.arange(9), np.arange(8, 20)), "1 vertex is both fixed"),
     Creature("an index too high", lambda: (LEFT, [258]), "must index 0..257"),
     Creature("a negative index", lambda: ([-1], RIGHT), "must index 0..257"),
     Creature("fractional indices", lambda: (LEFT, [1.5, 2.5]), "vertex numbers"),
