@@ -50,7 +50,7 @@ def test_the_command_line_reports_renamed_arrays(tmp_path, capsys):
     surface.point_data["x"] = np.zeros(surface.n_points)
     surface.point_data["way"] = np.zeros((surface.n_points, 3))
     write_mesh(tmp_path / "a.vtp", surface)
-    options = ["--regions", "1", "--overlap", "0"]
+    options = ["--regions", "1"]
     assert main(["regions", str(tmp_path / "a.vtp"), "-o", str(tmp_path / "b.ply"), *options]) == 0
     said = capsys.readouterr().err
     assert "segdeform regions: point array 'x' is written as 'x_1'" in said

@@ -201,7 +201,7 @@ class RepairDialog(QtWidgets.QDialog):
         self.steps.addItems([f"{step[:1].upper()}{step[1:]}" for step in done.steps])
         if not done.steps:
             self.steps.addItem("Nothing to repair with these settings")
-        elif done.open_holes:
+        if done.open_holes:
             self.steps.addItem(_remaining(done.open_holes))
         self.accepting.setEnabled(bool(done.steps))
         self.accepting.setDefault(bool(done.steps))

@@ -171,9 +171,9 @@ class DeformPanel(QtWidgets.QWidget):
             self._focused = old
 
     def _return_focus(self, *_: object) -> None:
-        """Give the focus back to what had it before the panel, usually the view."""
+        """Give the focus of a field back to what had it before the panel, usually the view."""
         with contextlib.suppress(RuntimeError):  # it was deleted meanwhile
-            if self._focused is not None and self.isAncestorOf(self.window().focusWidget()):
+            if self._focused is not None and self._inside.isAncestorOf(self.window().focusWidget()):
                 self._focused.setFocus()
 
     def _escape(self, name: str) -> None:
