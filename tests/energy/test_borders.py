@@ -13,6 +13,7 @@ from solids import icosphere, rotation
 from vtk_segdeform import sizes
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.energy.energy import shape_energy
 from vtk_segdeform.energy.operators import surface_operators
 from vtk_segdeform.geometry.differential import inner_vertices
@@ -20,6 +21,7 @@ from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
 from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.subspace.subspace import Subspace, cage_subspace
 
 BOTH = pytest.mark.parametrize("n_clusters", [None, 12], ids=["per vertex", "clusters"])
@@ -231,3 +233,20 @@ def test_narrow_strips_bend_smoothly(solid):
     a, b, c = solution.vertices[mesh.faces.T]
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     assert_allclose(area, mesh.face_areas, rtol=0.05)
+
+
+def test_a_strip_with_one_inner_vertex_can_be_pulled():
+    x, y = np.meshgrid(np.linspace(0.0, 4.0, 41), [0.0, 0.2], indexing="ij")
+    corners = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    a = 2 * np.arange(40)
+    halves = [a, a + 2, a + 1], [a + 1, a + 2, a + 3]
+    strip = np.concatenate([np.column_stack(half) for half in halves])
+    n = len(corners)  # at the end a fan around a vertex
+    more = [[4.1, 0.1, 0.0], [4.2, 0.0, 0.0], [4.2, 0.2, 0.0]]
+    fan = [[n, n - 2, n + 1], [n, n + 1, n + 2], [n, n + 2, n - 1], [n, n - 1, n - 2]]
+    mesh = Mesh(np.vstack([corners, more]), np.concatenate([strip, fan]))
+    assert inner_vertices(mesh).all()
+    at = int(np.argmin(np.abs(mesh.vertices[:, 0] - 1.0)))
+    solution = pull(mesh, at, mesh.vertices[at] + [0.0, 0.0, 0.3], refine=False)
+    assert solution.status is Status.CONVERGED
+    assert solution.handle_error < 1e-4

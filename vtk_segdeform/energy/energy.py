@@ -244,6 +244,8 @@ def shape_energy(
     )
     tell(progress, 0.9, "factoring")
     scale = _without_outliers(traces, areas)
+    if not scale > 0.0:  # of strips without inner vertices there is no detail
+        scale = float(np.trace(stretching))
     unit = scale / np.trace(stretching)
     load = shape.detail + (stretch * unit) * shape.fans
     covariance = load if stretch > 0.0 else shape.detail + unit * shape.fans
@@ -355,8 +357,10 @@ def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
     triangles among 100,000 of a koala multiplied it by 37, and with it the stretch: poses had up to
     4 % less distortion, but the change of their dihedral angles was 5 to 23 % larger.
     """
-    has_area = areas > 0.0
-    traces, areas = traces[has_area], areas[has_area]
+    has_detail = (areas > 0.0) & (traces > 0.0)  # not at borders
+    traces, areas = traces[has_detail], areas[has_detail]
+    if not len(areas):
+        return 0.0
     density = traces / areas
     order = np.argsort(density)
     covered = np.cumsum(areas[order])

@@ -36,6 +36,7 @@ from .intrinsic import IntrinsicTriangulation
 
 _PIECE = 50_000  # faces per task
 _LEAST_AREA = 0.05  # share of the mean area of a vertex's neighbours
+_STRIP = 0.1  # share of inner vertices below which a component is a strip
 
 
 def cotangent_laplacian(
@@ -85,8 +86,8 @@ def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
 def inner_vertices(mesh: Mesh) -> BoolArray:
     """Return which vertices have a detail (5), (n,) bool: those whose edges all have two faces.
 
-    In a component without any, such as a strip one face wide, every vertex has, from its one-sided
-    row: it would have no resistance to bending otherwise.
+    In a component with hardly any, such as a strip one face wide, every vertex has, from its
+    one-sided row: it would have no resistance to bending otherwise.
     """
     if mesh.is_two_manifold:
         return np.ones(mesh.n_vertices, dtype=bool)
@@ -95,7 +96,8 @@ def inner_vertices(mesh: Mesh) -> BoolArray:
     inner = np.ones(mesh.n_vertices, dtype=bool)
     inner[half_edges.tail[ends]] = inner[half_edges.head[ends]] = False
     count = np.bincount(mesh.components, inner)
-    return np.asarray(inner | (count == 0.0)[mesh.components])
+    is_strip = count < _STRIP * np.bincount(mesh.components)
+    return np.asarray(inner | is_strip[mesh.components])
 
 
 def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
