@@ -86,8 +86,8 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     folder = options.output
     if folder.exists() and not folder.is_dir():
         raise ConstraintError(f"{folder} is a file; give a folder")
-    folder.mkdir(parents=True, exist_ok=True)
     mesh = cactus(options.size)
+    folder.mkdir(parents=True, exist_ok=True)
     say(f"cactus          {mesh.n_vertices} vertices, {mesh.n_faces} triangles")
     start = time.perf_counter()
     regions = segment(mesh, n_regions=3, progress=part(progress, 0.0, 0.2))

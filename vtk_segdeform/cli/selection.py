@@ -130,7 +130,7 @@ def _array(name: str, values: ArrayLike, wanted: float | None, n: int) -> BoolAr
             f"got {array.shape} {array.dtype}"
         )
     if wanted is None:
-        return np.asarray((array != 0) & (array == array))  # NaN, no data, selects nothing
+        return np.asarray((array != 0) & ~np.isnan(array))  # NaN means no data
     return np.asarray(array == wanted)
 
 

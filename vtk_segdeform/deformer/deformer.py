@@ -875,12 +875,12 @@ class Deformer:
     ) -> tuple[SolverResult, FloatArray, int]:
         """Correct the pose *reached* while pulled points are off their targets; also return x."""
         steps, pulled, within = 0, self._constraints.pulled, options.within or 0.0
-        is_reached, error = True, _largest(self._off_at(reached.p))
+        is_reached, off = True, self._off_at(reached.p)
         for _ in range(_LIVE_CORRECTIONS):
-            if error <= within:
+            if (error := _largest(off)) <= within:
                 break
             before = pulled.offsets
-            pulled.correct(_LIVE * self._off_at(reached.p), np.inf)
+            pulled.correct(_LIVE * off, np.inf)
             places = pulled.moved(self._constraints.places(self._targets))
             result = self._continuation.follow(places, replace(options, max_steps=_FEW_STEPS))
             steps += result.steps
@@ -888,9 +888,8 @@ class Deformer:
                 pulled.offsets = before
                 self._continuation.restart()
                 break
-            reached, last = result, error
-            error = _largest(self._off_at(reached.p))
-            is_reached = error <= _GAIN * last
+            reached, off = result, self._off_at(result.p)
+            is_reached = _largest(off) <= _GAIN * error
             if not is_reached:  # out of reach: to aim beyond only distorts
                 break
         x, _ = self._with_exact_volume(reached)

@@ -244,8 +244,6 @@ def shape_energy(
     )
     tell(progress, 0.9, "factoring")
     scale = _without_outliers(traces, areas)
-    if not scale > 0.0:  # of strips without inner vertices there is no detail
-        scale = float(np.trace(stretching))
     unit = scale / np.trace(stretching)
     load = shape.detail + (stretch * unit) * shape.fans
     covariance = load if stretch > 0.0 else shape.detail + unit * shape.fans
@@ -359,8 +357,6 @@ def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
     """
     has_detail = (areas > 0.0) & (traces > 0.0)  # not at borders
     traces, areas = traces[has_detail], areas[has_detail]
-    if not len(areas):
-        return 0.0
     density = traces / areas
     order = np.argsort(density)
     covered = np.cumsum(areas[order])
