@@ -14,7 +14,7 @@ What lies beyond the reach may fall into several parts: who grabs an elbow divid
 body.  Parts that are small beside the largest one follow the grabbed point, too.
 
 Components that share a region, such as a coat and its buttons, move with the same cage.  So they
-are joined where they are nearest, and come along.  So do the two sides of a thin wall, which the
+are joined by lines, and come along.  So do the two sides of a thin wall, which the
 cages cannot move apart: with one of them held, a wall was torn out as a spike of 0.3 diagonals.
 
 The samples are the cells of the coarse volume, or the vertices of a small mesh, and distances are

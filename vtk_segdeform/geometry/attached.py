@@ -1,8 +1,9 @@
 """Components that belong together: a coat and its buttons, a jaw and its teeth.
 
-A component is *attached* to the nearest large one if it is smaller than the smallest limb that the
-segmentation looks for, and near: it has no region of its own.  The components of a *part*, those
-that share regions, are joined where they are nearest, so that distances along the surface go on.
+A component is *attached* to the nearest large one if it is near and smaller than the smallest limb
+that the segmentation looks for, or if it is set into a larger one, as an eye into its socket: all
+of it is near.  It has no region of its own.  The components of a *part*, those that share regions,
+are joined by lines, so that distances along the surface go on.
 """
 
 from __future__ import annotations
@@ -15,13 +16,12 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray
 
 SMALL_COMPONENT = 0.0125  # of the whole area
+_LARGEST_INSET = 0.1  # of the whole area; also the smallest component that another is set into
 _NEAR = 0.05  # gap, in diagonals of all points
 
 
-def attached(
-    points: FloatArray, areas: FloatArray, component: IntArray
-) -> tuple[IntArray, IntArray]:
-    """Return where small components are attached to large ones: the nearest pairs of points.
+def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> BoolArray:
+    """Return which components are attached to larger ones, (c,) bool.
 
     Parameters
     ----------
@@ -29,29 +29,45 @@ def attached(
         Areas in any unit.
     component : (n,) int
         From 0; every number occurs.
-
-    Returns
-    -------
-    one, other : (k,) int
-        A point of each attached component, and one of a large component.
     """
-    none = np.empty(0, dtype=np.int64)
-    if not component.any():
-        return none, none
     share = component_shares(areas, component)
+    is_attached = np.zeros(len(share), dtype=bool)
+    if len(share) == 1:
+        return is_attached
+    near = _NEAR * float(np.linalg.norm(np.ptp(points, axis=0)))
     large = share >= SMALL_COMPONENT
     large[share.argmax()] = True
-    one, other, gap = nearest_pairs(points, component, large)
-    near = gap <= _NEAR * float(np.linalg.norm(np.ptp(points, axis=0)))
-    return one[near], other[near]
+    one, _, gap = nearest_pairs(points, component, large)
+    is_attached[component[one[gap <= near]]] = True
+    return is_attached | _set_in(points, component, large & (share < _LARGEST_INSET), share, near)
+
+
+def _set_in(
+    points: FloatArray, component: IntArray, some: BoolArray, share: FloatArray, near: float
+) -> BoolArray:
+    """Return which of *some* components, (c,) bool, have all points *near* one larger component."""
+    found = np.zeros(len(share), dtype=bool)
+    if not some.any():
+        return found
+    own = {int(k): points[component == k] for k in np.flatnonzero(some)}
+    for host in np.flatnonzero(share >= _LARGEST_INSET):
+        there = points[component == host]
+        low, high = there.min(axis=0) - near, there.max(axis=0) + near
+        inside = [k for k, x in own.items() if ((low <= x) & (x <= high)).all() and not found[k]]
+        tree = cKDTree(there, compact_nodes=False, balanced_tree=False) if inside else None
+        for k in inside:
+            away, _ = tree.query(own[k], distance_upper_bound=near)
+            found[k] = bool(np.isfinite(away).all())
+    return found
 
 
 def joints(
     points: FloatArray, areas: FloatArray, component: IntArray, part: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Return the nearest pairs of points that join the components of each part.
+    """Return the pairs of points that join the components of each part.
 
-    A large component is joined to the nearest larger one, a small one to the nearest large one.
+    Each point of a large component is joined to the nearest point of the larger ones, each of a
+    small component to the nearest point of the large ones.
 
     Parameters
     ----------
@@ -63,7 +79,7 @@ def joints(
     Returns
     -------
     one, other : (k,) int
-        One pair less than a part has components.
+        One pair for each point, except those of the largest component of a part.
     """
     share = component_shares(areas, component)
     part_of, order = np.empty(len(share), dtype=np.int64), np.argsort(-share, kind="stable")
@@ -75,8 +91,7 @@ def joints(
             if larger < end:
                 some = np.flatnonzero(np.isin(component, own[:end]))
                 is_larger = np.isin(np.arange(len(share)), own[:larger])
-                one, other, _ = nearest_pairs(points[some], component[some], is_larger)
-                pairs.append(np.stack([some[one], some[other]]))
+                pairs.append(some[_nearest(points[some], is_larger[component[some]])[0]])
     one, other = np.concatenate(pairs, axis=1)
     return one, other
 
@@ -94,11 +109,16 @@ def nearest_pairs(
 
     Its own nearest point, that of the large one, and their distance, (k,) each.
     """
-    is_large = large[component]
-    there, here = np.flatnonzero(is_large), np.flatnonzero(~is_large)
-    tree = cKDTree(points[there], compact_nodes=False, balanced_tree=False)
-    away, nearest = (np.asarray(each) for each in tree.query(points[here]))
+    (here, there), away = _nearest(points, large[component])
     order = np.lexsort((away, component[here]))
     _, first = np.unique(component[here[order]], return_index=True)
     chosen = order[first]
-    return here[chosen], there[nearest[chosen]], away[chosen]
+    return here[chosen], there[chosen], away[chosen]
+
+
+def _nearest(points: FloatArray, chosen: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Return each point that is not *chosen* with the nearest one that is, (2, k), and how far."""
+    there, here = np.flatnonzero(chosen), np.flatnonzero(~chosen)
+    tree = cKDTree(points[there], compact_nodes=False, balanced_tree=False)
+    away, nearest = (np.asarray(each) for each in tree.query(points[here]))
+    return np.stack([here, there[nearest]]), away

@@ -6,8 +6,8 @@ separated; if more, the largest parts are cut into slices of about equal area (`
 is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh and
 hardly depends on the resolution of the mesh.
 
-Large components have regions of their own.  Buttons, teeth and screws belong to the part that they
-are nearest to; small components far from everything share a region.
+Large components have regions of their own.  Buttons, teeth and screws, and eyes in their sockets,
+belong to the part that they are nearest to; small components far from everything share a region.
 
 Finally the borders between parts are shortened and moved into creases on the mesh (`borders`), or,
 of a large mesh, on a decimated one.
@@ -65,7 +65,8 @@ def segment(
     n_regions : int, optional
         Number of regions, 1 to n.  None separates every limb and nothing else: one region for
         a sphere, three for a cactus with two arms, six for a man: head, arms, legs and trunk.
-        Small components near a large one, and all but the 16 largest, get no region of their own.
+        Components that are small and near a large one, or set into one, and all but the 16 largest
+        get no region of their own.
     overlap : int, optional
         Number of edge rings by which each region grows over its neighbours.  None means a tenth of
         the width of a region in edges, sqrt(n / regions) / 10, at least 2: the same width in space
@@ -199,9 +200,9 @@ def _main_components(mesh: Mesh, n_regions: int | None) -> tuple[BoolArray, Bool
     if n_regions is None:
         small = share < SMALL_COMPONENT
         small[share.argmax()] = False
-        main &= ~small
-        far = small.copy()
-        far[mesh.components[attached(mesh.vertices, mesh.vertex_areas, mesh.components)[0]]] = False
+        near = attached(mesh.vertices, mesh.vertex_areas, mesh.components)
+        main &= ~(small | near)
+        far = small & ~near
     return main, far
 
 

@@ -115,7 +115,7 @@ class Menus:
         is_free = session is not None and not window.editor.is_busy
         for action, verb, label in (
             (self._undo, "undo", session and window.editor.controller.undo_label),
-            (self._redo, "redo", session and session.redo_label),
+            (self._redo, "redo", session and window.editor.controller.redo_label),
         ):
             name = str(label or "").replace("&", "&&")
             name_keys([(action, f"&{verb.capitalize()} {name}".rstrip(), verb)], window.keys)

@@ -30,6 +30,8 @@ class Request:
     """Whether it has been made by the program, and is to be saved."""
     original: Request | None = None
     """How to return to the document of which it is a repaired copy."""
+    repaired: Request | None = None
+    """How to return to its repaired copy, if that was undone."""
 
 
 class WaitingPage(QtWidgets.QWidget):

@@ -1,7 +1,7 @@
 """Repair and open: a closed copy of the document's surface, as a new document.
 
 Also for a file that cannot be opened as it is.  Nothing on disk changes; undo returns to the
-original document.
+original document, redo to the copy.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanw
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -193,9 +194,17 @@ class Window(QtWidgets.QMainWindow):
         QtCore.QTimer.singleShot(0, self, self.repair)
 
     def _undo_repair(self, original: Request) -> None:
-        """Return from a repaired copy, which is discarded, to the original document."""
-        self._is_new = False
-        QtCore.QTimer.singleShot(0, self, lambda: self._open(original))
+        """Return from a repaired copy to the original document; the copy is kept for redo."""
+        opened = self.document, self.session
+        repaired = Request(
+            self.document.name, lambda _: opened, is_new=self._is_new, original=original
+        )
+        self._is_new = False  # nothing is lost
+        self._open_soon(replace(original, repaired=repaired))
+
+    def _open_soon(self, request: Request) -> None:
+        """Open another document once the current event has been handled."""
+        QtCore.QTimer.singleShot(0, self, lambda: self._open(request))
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
@@ -266,7 +275,10 @@ class Window(QtWidgets.QMainWindow):
         if request.original is not None:
             undo = partial(self._undo_repair, request.original)
             widget.editor.controller.earlier = "repair", undo
-            widget.editor.controller.refresh()  # and with it the history in the panel
+        if request.repaired is not None:
+            redo = partial(self._open_soon, request.repaired)
+            widget.editor.controller.later = "repair", session.state, redo
+        widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())
         self._autosave(request.slot)

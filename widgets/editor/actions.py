@@ -72,7 +72,11 @@ def undo(controller: Controller) -> None:
 
 def redo(controller: Controller) -> None:
     """Redo the last undone step."""
-    label = controller.session.redo()
+    label, following = controller.redo_label, controller.next_session
+    if following is not None:
+        following[1]()
+    else:
+        controller.session.redo()
     controller.say(f"Redo: {label}" if label else "Nothing to redo")
 
 

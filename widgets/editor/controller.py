@@ -18,7 +18,7 @@ from typing import TypeVar
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice, is_first_run, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Change, Preparation, Session, saved_view
+from vtk_segdeform.session import Change, Preparation, Session, State, saved_view
 
 from ..recording import confined_path
 from ..scene import Draft, View, Widget
@@ -69,6 +69,9 @@ class Controller:
         How the mesh differs from what was given, and where; above the status line.
     earlier : tuple of str and callable, or None
         A step before the first of the session: its label, and a function that undoes it.
+    later : tuple of str, State and callable, or None
+        A step that leads from the session to another one: its label, the state of the session from
+        which it leads, and a function that repeats it.
     recordings : Recordings
         The current recording of input and of video.
     camera : Camera
@@ -88,6 +91,7 @@ class Controller:
         self.messages.note(advice() or (_FIRST_RUN if self._compiles else ""))
         self.notices = Notices(view, lambda: self.messages.height)
         self.earlier: tuple[str, Callable[[], None]] | None = None
+        self.later: tuple[str, State, Callable[[], None]] | None = None
         self.recordings = Recordings(view)
         self._mode = Mode.PULL
         self._is_on = False
@@ -128,6 +132,17 @@ class Controller:
         if self.session.undo_label is None and self.earlier is not None:
             return self.earlier[0]
         return self.session.undo_label
+
+    @property
+    def redo_label(self) -> str | None:
+        """The step to redo: to the session that came from this state, or else of the session."""
+        return self.session.redo_label if self.next_session is None else self.next_session[0]
+
+    @property
+    def next_session(self) -> tuple[str, Callable[[], None]] | None:
+        """The step to another session, if it leads from the current state: label and function."""
+        later = self.later
+        return None if later is None or later[1] is not self.session.state else (later[0], later[2])
 
     @property
     def mode(self) -> Mode:

@@ -1,7 +1,7 @@
 """The history of an editor: its states by name, jumps to them and previews of them.
 
 The first state is the session as it was opened.  If it came from another one, as a repaired mesh
-does, that one is before it.
+does, that one is before it; a session that came from the current state follows it.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ def states_of(controller: Controller) -> tuple[str, ...]:
     if controller.earlier is not None:
         first = controller.earlier[0] if labels[0] == _OPENED.lower() else labels[0]
         labels = _OPENED, first, *labels[1:]
+    if controller.next_session is not None:
+        labels = *labels[: position_of(controller) + 1], controller.next_session[0]
     return tuple(label[:1].upper() + label[1:] for label in labels)
 
 
@@ -30,11 +32,19 @@ def jumping_to(position: int) -> Action:
     """Return the action that undoes or redoes as many steps as lead to the state at *position*."""
 
     def jump(controller: Controller) -> None:
-        session, earlier = controller.session, controller.earlier
-        session.jump(max(position - _offset(controller), 0))
-        if earlier is not None and position == 0:
-            earlier[1]()
-        controller.say(f"History: {states_of(controller)[position]}")
+        session, earlier, following = (
+            controller.session,
+            controller.earlier,
+            controller.next_session,
+        )
+        name = states_of(controller)[position]
+        if following is not None and position > position_of(controller):
+            following[1]()
+        else:
+            session.jump(max(position - _offset(controller), 0))
+            if earlier is not None and position == 0:
+                earlier[1]()
+        controller.say(f"History: {name}")
 
     return jump
 
@@ -49,7 +59,8 @@ def preview(controller: Controller, position: int | None) -> None:
         vertices = None
         if position is not None and not _is_active(controller):
             place = position - _offset(controller)
-            if place >= 0 and place != controller.session.position:
+            is_here = 0 <= place < len(controller.session.history)
+            if is_here and place != controller.session.position:
                 vertices = controller.session.vertices_at(place)
         if vertices is not None:
             assert position is not None

@@ -49,7 +49,7 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
             ),
         ),
         _step("undo", controller.undo_label, is_free=is_free),
-        _step("redo", editor.session.redo_label, is_free=is_free),
+        _step("redo", controller.redo_label, is_free=is_free),
     ]
     modes = [
         key_button(

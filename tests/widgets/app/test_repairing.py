@@ -151,7 +151,7 @@ def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
 
 @BLANK
 def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
-    """Undo returns to the original with its edits."""
+    """Undo returns to the original with its edits, redo to the copy with its own."""
     path = opened(hand, bottle(3, 3), tmp_path / "bottle.ply")
     content = path.read_bytes()
     original = hand.window.session
@@ -179,12 +179,28 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     rows = hand.window.editor_widget.panel.history.list
     until(lambda: rows.count() == 2, "the history")
     assert [rows.item(row).text() for row in range(2)] == ["Opened", "Repair"]
+    session.set_fixed([5, 6])
+    hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
     hand.settle()
     assert hand.title == "bottle.ply* - segdeform"
     assert original.undo_label == "set fixed vertices"
     assert len(original.mesh.borders) == 3
+    rows = hand.window.editor_widget.panel.history.list
+    until(lambda: rows.count() == 3, "the history")
+    assert [rows.item(row).text() for row in range(3)] == ["Opened", "Set fixed vertices", "Repair"]
+    boxes.answers.append("Discard")
+    hand.choose("Edit", "Redo repair")
+    until(lambda: hand.window.has_mesh and hand.window.session is session, "the copy")
+    hand.settle()
+    assert hand.title == "bottle (repaired)* - segdeform"
+    assert (session.undo_label, session.redo_label) == (None, "set fixed vertices")
+    hand.choose("Edit", "Undo repair")
+    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
+    hand.settle()
+    original.set_fixed([7])  # nothing is left to redo
+    assert hand.window.editor.controller.redo_label is None
     boxes.answers.append("Discard")
     hand.choose("File", "Open recent", "1  bottle.ply")
     hand.settle()
