@@ -33,14 +33,14 @@ def ask_file(parent: Any, folder: Path) -> Path | None:
     return Path(name) if name else None
 
 
-def ask_save(parent: Any, name: str, *, mesh_is_saved: bool) -> Answer:
-    """Ask whether to save the changes to the document *name*."""
+def ask_save(parent: Any, name: str, *, has_session: bool, mesh_is_saved: bool) -> Answer:
+    """Ask whether to save the changes to the document *name*, for which there may be a session."""
     warning = "Unsaved changes will be lost."
     if mesh_is_saved:
         warning = "The mesh is saved, but its regions, cages and handles are not."
     return _ask(
         parent,
-        f"Save changes to {name}?",
+        f"Save changes to {name}{'' if has_session else ' as a session'}?",
         warning,
         {Answer.SAVE: "Save", Answer.DISCARD: "Discard", Answer.CANCEL: "Cancel"},
     )

@@ -68,7 +68,13 @@ def may_discard(window: Any) -> bool:
     if not window.is_modified:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
-    answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
+    document = window.document
+    answer = ask_save(
+        window,
+        document.name,
+        has_session=document.session_path is not None,
+        mesh_is_saved=mesh_is_saved,
+    )
     return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD
 
 

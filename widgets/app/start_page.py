@@ -63,6 +63,7 @@ class StartPage(QtWidgets.QWidget):
         """List files with their names and folders; missing files are disabled."""
         for button in self.recent:
             self._list.removeWidget(button)
+            button.hide()  # it is deleted only after a dialog that is shown next
             button.deleteLater()
         self.recent = [self._recent_button(path) for path in paths[:_MOST]]
         for button in self.recent:

@@ -208,6 +208,25 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
     hand.choose("File", "Open recent", "Clear")
 
 
+@BLANK
+def test_recent_files_are_listed_once_behind_an_error(start, ball_file, tmp_path, monkeypatch):
+    start(ball_file).window.close()
+    hand, counts, program = start(), [], QtCore.QEventLoop()
+
+    def show_error(*_):
+        loop = QtCore.QEventLoop()  # as that of a dialog
+        QtCore.QTimer.singleShot(50, loop.quit)
+        loop.exec()
+        listed = hand.window.pages.start.findChildren(QtWidgets.QPushButton)
+        counts.append(sum(b.isVisible() and "ball" in b.text() for b in listed))
+        program.quit()
+
+    monkeypatch.setattr(window, "show_error", show_error)
+    hand.window.open(tmp_path / "missing.ply")
+    program.exec()
+    assert counts == [1]
+
+
 # Saving and its dialogs.
 
 
@@ -251,7 +270,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
         boxes.answers.append(answer)
         hand.choose("File", "Quit")
         assert hand.window.isVisible()
-        assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
+        assert boxes.seen[-1].startswith("Save changes to ball.vtp as a session?")
     choose_file(monkeypatch, None)
     boxes.answers.append("Save")  # but no file is chosen
     assert not hand.window.close()
@@ -330,7 +349,7 @@ def test_closing_asks_about_a_pull_that_waits_and_saves_it(
     puller.waiting.begin(pull)
     boxes.answers.append("Cancel")
     assert not hand.window.close()
-    assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
+    assert boxes.seen[-1].startswith("Save changes to ball.vtp as a session?")
     choose_file(monkeypatch, tmp_path / "ball.segdeform")
     boxes.answers.append("Save")
     threading.Timer(0.2, go_on.set).start()
