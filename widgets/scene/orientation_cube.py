@@ -11,8 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor
-from vtkmodules.vtkRenderingCore import vtkRenderer
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+from vtkmodules.vtkFiltersSources import vtkCubeSource
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
+from vtkmodules.vtkRenderingFreeType import vtkVectorText
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, rgb
@@ -22,6 +24,7 @@ from .gestures import Phase, Pointer
 from .navigation import Navigation
 from .projection import Projection
 from .view import Stop, View
+from .viewpoint import Viewpoint
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
 _SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
@@ -31,7 +34,8 @@ _REACH = 0.9  # half the height of its view; a corner of the cube is at 0.87
 _EDGE = 0.32  # from the centre of a face to where an edge begins; the edge itself is at 0.5
 _CLICK = 4.0  # pixels; a press that moves more is a drag
 _FACE, _LINE = "#E9E7E2", INK
-_AXES = np.eye(3)
+_NAMES = "front", "back", "right", "left", "top", "bottom"
+_LETTERS, _ABOVE_FACE = 0.13, 0.502  # size, and distance from the middle of the cube
 
 
 class OrientationCube:
@@ -52,7 +56,7 @@ class OrientationCube:
     ) -> None:
         self.view, self._navigation, self._is_covered = view, navigation, is_covered
         self._renderer: vtkRenderer | None = None
-        self._cube = _cube()
+        self._cube, self._labels = _cube(), [_Label(name) for name in _NAMES]
         self._labelled: tuple[float, ...] = ()  # the up axis
         self._press: Pointer | None = None
         self._stops: list[Stop] = []
@@ -71,7 +75,8 @@ class OrientationCube:
         camera = self._renderer.GetActiveCamera()
         camera.ParallelProjectionOn()
         camera.SetParallelScale(_REACH)
-        self._renderer.AddViewProp(self._cube)
+        for actor in (self._cube, *(label.actor for label in self._labels)):
+            self._renderer.AddActor(actor)
         layer_above(self.view.renderer, self._renderer)
         observe = self.view.observe
         self._stops = [
@@ -172,36 +177,54 @@ class OrientationCube:
         up = tuple(self._navigation.viewpoint.up)
         if up != self._labelled:
             self._labelled = up
-            _label(self._cube, self._navigation.viewpoint.axes)
+            for label in self._labels:
+                label.place(self._navigation.viewpoint)
 
 
-def _cube() -> vtkAnnotatedCubeActor:
-    cube = vtkAnnotatedCubeActor()
+class _Label:
+    """The name of a view on a face of the cube, upright in that view."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.actor = name, vtkActor()
+        text, mapper = vtkVectorText(), vtkPolyDataMapper()
+        text.SetText(name.upper())
+        text.Update()
+        left, right, low, high, _, _ = text.GetOutput().GetBounds()
+        self._middle = np.array([left + right, low + high, 0.0]) / 2.0
+        mapper.SetInputConnection(text.GetOutputPort())
+        self.actor.SetMapper(mapper)
+        self._matrix = vtkMatrix4x4()
+        self.actor.SetUserMatrix(self._matrix)
+        self.actor.PickableOff()
+        self.actor.GetProperty().SetColor(*(rgb(_LINE) / 255.0))
+        self.actor.GetProperty().LightingOff()
+
+    def place(self, viewpoint: Viewpoint) -> None:
+        """Put it on its face; the cube has the axes of the world that are nearest to the model's."""
+        away, up = viewpoint.directions(self.name)
+        away = _nearest_axis(away)
+        up = _nearest_axis(np.where(away == 0.0, up, 0.0))
+        axes = _LETTERS * np.stack([np.cross(up, away), up, away], axis=1)
+        affine = np.column_stack([axes, _ABOVE_FACE * away - axes @ self._middle])
+        self._matrix.DeepCopy([*affine.ravel(), 0.0, 0.0, 0.0, 1.0])
+
+
+def _nearest_axis(direction: FloatArray) -> FloatArray:
+    """Return the axis of the world, with its sign, that is nearest to *direction* (3,)."""
+    axis, k = np.zeros(3), int(np.abs(direction).argmax())
+    axis[k] = np.sign(direction[k])
+    return axis
+
+
+def _cube() -> vtkActor:
+    source, mapper, cube = vtkCubeSource(), vtkPolyDataMapper(), vtkActor()
+    mapper.SetInputConnection(source.GetOutputPort())
+    cube.SetMapper(mapper)
     cube.PickableOff()
-    cube.SetFaceTextScale(0.15)
-    cube.GetCubeProperty().SetColor(*(rgb(_FACE) / 255.0))
-    cube.GetCubeProperty().SetAmbient(0.7)
-    cube.GetCubeProperty().SetDiffuse(0.3)
-    cube.GetCubeProperty().SetEdgeVisibility(True)
-    cube.GetCubeProperty().SetEdgeColor(*(rgb(_LINE) / 255.0))
-    cube.SetTextEdgesVisibility(False)
-    for sign in ("Plus", "Minus"):
-        for axis in "XYZ":
-            style = getattr(cube, f"Get{axis}{sign}FaceProperty")()
-            style.SetColor(*(rgb(_LINE) / 255.0))
-            style.LightingOff()
+    style = cube.GetProperty()
+    style.SetColor(*(rgb(_FACE) / 255.0))
+    style.SetAmbient(0.7)
+    style.SetDiffuse(0.3)
+    style.SetEdgeVisibility(True)
+    style.SetEdgeColor(*(rgb(_LINE) / 255.0))
     return cube
-
-
-def _label(cube: vtkAnnotatedCubeActor, axes: FloatArray) -> None:
-    """Write the names of the views on the faces; *axes* (3, 3) are right, front and up."""
-    names = ("RIGHT", "LEFT"), ("FRONT", "BACK"), ("TOP", "BOTTOM")
-    for (plus, minus), axis in zip(names, axes, strict=True):
-        k = int(np.abs(axis).argmax())
-        first, second = (plus, minus) if axis[k] > 0.0 else (minus, plus)
-        getattr(cube, f"Set{'XYZ'[k]}PlusFaceText")(first)
-        getattr(cube, f"Set{'XYZ'[k]}MinusFaceText")(second)
-    # VTK draws the text of z faces for y up, of all others for z up.
-    is_y_up = abs(axes[2][1]) > 0.5
-    cube.SetXFaceTextRotation(270.0 if is_y_up else 360.0)  # VTK does not return to 0
-    cube.SetZFaceTextRotation(90.0 if is_y_up else 360.0)

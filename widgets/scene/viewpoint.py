@@ -102,11 +102,16 @@ class Viewpoint:
 
     # Views.
 
+    def directions(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return for one of `VIEWS` the direction to the camera, and that up on the screen."""
+        away, up = (np.array(each, dtype=float) @ self.axes for each in _VIEWS[name])
+        return away, up
+
     def look_from(self, name: str, *, animate: bool = True) -> None:
         """Show all of the model from one of `VIEWS`."""
         if name not in _VIEWS:
             raise ArgumentError(f"view must be one of {', '.join(VIEWS)}; got {shown(name)}")
-        away, up = (np.array(each, dtype=float) @ self.axes for each in _VIEWS[name])
+        away, up = self.directions(name)
         self._aim(away, up, self._points(), animate=animate)
 
     def look_along(self, away: ArrayLike) -> None:
@@ -129,7 +134,7 @@ class Viewpoint:
         ):  # other actors of the host
             low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
             points = np.stack([low, high])[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
-        away, up = (np.array(each, dtype=float) @ self.axes for each in _VIEWS["home"])
+        away, up = self.directions("home")
         self._aim(away, up, points, animate=False)
 
     def frame(self, points: FloatArray | None = None, *, animate: bool = True) -> None:

@@ -169,6 +169,29 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     assert bench.view.window.GetRenderers().GetNumberOfItems() < count
 
 
+@pytest.mark.parametrize("axis", [1, 2])
+def test_each_face_of_the_cube_is_named_upright_in_its_view(axis):
+    bench = Bench()
+    bench.editor.show_cube = True
+    camera = bench.editor.controller.camera
+    camera.viewpoint.up = np.eye(3)[axis]
+    View.render(bench.view)
+    for label in camera.cube._labels:
+        camera.viewpoint.look_from(label.name, animate=False)
+        to_camera = -bench.view.view_direction
+        up = np.array(bench.view.camera.GetViewUp())
+        matrix = label.actor.GetUserMatrix()
+        across, along, out, at = (
+            np.array([matrix.GetElement(i, j) for i in range(3)]) for j in range(4)
+        )
+        size = np.linalg.norm(along)
+        for direction, wanted in ((across, np.cross(up, to_camera)), (along, up), (out, to_camera)):
+            np.testing.assert_allclose(direction, size * wanted, atol=1e-12)
+        low, high = np.reshape(label.actor.GetBounds(), (3, 2)).T
+        assert at @ to_camera > 0.5  # above its face, and within it
+        assert (np.sort(high - low)[1:] < 0.95).all()
+
+
 def test_a_session_file_keeps_the_view_and_ignores_a_damaged_one(tmp_path):
     bench, path = Bench(), tmp_path / "work.segdeform"
     bench.hand.key("KP_3")
