@@ -328,7 +328,7 @@ class GaussNewton:
                 state.drop_factor()
                 continue
             if options.within is not None:
-                before, length = length, self._farthest(step)
+                before, length = length, self.farthest(step)
                 remaining = _left(length, before if state.age else math.inf)
                 if (
                     newton
@@ -575,7 +575,7 @@ class GaussNewton:
         """Return the difference of merits that counts as rounding."""
         return _RISE * (self.energy.constant + abs(here.merit))
 
-    def _farthest(self, step: FloatArray) -> float:
+    def farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
         moves = self.volumes.surface.map(step)
         return math.sqrt(float(np.einsum("ij,ij->i", moves, moves).max(initial=0.0)))

@@ -30,9 +30,12 @@ _HIGHEST = 1e4  # times the initial weight
 # A higher weight is accepted if it multiplies the errors by at most _GAIN and the energy by at most
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
-_FEWEST, _MOST = 0.5, 1.1  # of the tolerance: errors at which a drag keeps its weights
+_FEWEST = 0.5  # of the tolerance: errors from which on a drag keeps its weights
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
+_LIVE_AIM = 0.8  # in a drag, whose targets go on
 _TRIES = 3
+_JUMP = 5e-3  # mesh size 1; a drag does not end with a jump so long if it can be avoided
+_STEEP = 1.5  # power of the error by which the weights of a drag are raised at its end
 _ALL = 0.98  # share of the higher weights beyond which these are used
 _LOOSE = 1e-5  # tolerance of poses that only show whether their weights suffice
 _SAME = 1e-6  # relative difference of weights that are equal but for rounding
@@ -159,15 +162,16 @@ class _Run:
         self.used: list[_Weighted] = []
         self.tries: list[_Weighted] = []  # those with weights between two of the first pass
         self.steps = 0
+        self.allowed = np.zeros(0)  # (s,), errors up to which weights are not raised
         self.is_live = options.within is not None
-        self._options = options
+        self.options = options
 
     def solve(self, weighted: _Weighted, options: SolverOptions | None = None) -> SolverResult:
         """Solve with *weighted* to the tolerance of *options*, or to `_LOOSE`; count its steps."""
         self.used.append(weighted)
         if options is None:
-            tolerance = max(self._options.tolerance, _LOOSE)
-            options = replace(self._options, tolerance=tolerance)
+            tolerance = max(self.options.tolerance, _LOOSE)
+            options = replace(self.options, tolerance=tolerance)
         known = weighted.known_at(self.places, options)
         if known is not None:
             return known
@@ -177,7 +181,7 @@ class _Run:
 
     def finish(self, weighted: _Weighted, result: SolverResult) -> SolverResult:
         """Return the *result* of *weighted*, continued to the tolerance of the options."""
-        finished = self.solve(weighted, self._options)
+        finished = self.solve(weighted, self.options)
         further = () if finished.p is result.p else finished.merits[1:]
         return replace(finished, merits=(*result.merits, *further))
 
@@ -202,6 +206,9 @@ class WeightContinuation:
         self._current = self._initial  # the solver of the last pose
         self._tries: list[_Weighted] = []  # `_Run.tries` of the last pose with any
         self._only_current = False  # whether only that solver has followed the last targets
+        # Of the last successful `follow`: its places, and errors (s,) that more weight cannot reduce.
+        self._followed: FloatArray | None = None
+        self._allowed = np.full(len(solver.positions.strength), tolerance)
         self._tolerance = tolerance
 
     def copy(self) -> WeightContinuation:
@@ -214,7 +221,8 @@ class WeightContinuation:
         other._initial, other._current = copies[initial], copies[self._current]
         other._raised = [copies[each] for each in self._raised]
         other._tries = [copies[each] for each in self._tries]
-        other._only_current = self._only_current
+        other._only_current, other._allowed = self._only_current, self._allowed
+        other._followed = self._followed
         return other
 
     @property
@@ -269,6 +277,7 @@ class WeightContinuation:
             return replace(result, steps=run.steps, remaining=np.inf)
         self._current, self._raised = found, list(dict.fromkeys(run.used[1:]))
         self._tries = run.tries or self._tries
+        self._allowed, self._followed = run.allowed, places
         for weighted in (self._initial, *self._raised):
             weighted.settled = weighted.p
         return replace(result, steps=run.steps, status=Status.STEP_LIMIT)
@@ -280,6 +289,9 @@ class WeightContinuation:
             self._raised = [self._current]
             self._only_current = False
         run = _Run(places, options)
+        is_followed = self._has_followed(places)
+        if is_followed and self._current.p is not self._current.settled:
+            self.restart()  # a later `follow` has been given up
         found, result = self._raise(run)
         if result.status is not Status.STEP_LIMIT:
             result = run.finish(found, result)
@@ -288,9 +300,36 @@ class WeightContinuation:
             result = replace(run.solve(self._current, options), status=Status.STEP_LIMIT)
             self._raised = list(dict.fromkeys([*run.used[1:], *self._raised]))
         else:
+            if is_followed and self._current.solver.farthest(result.p - self._current.p) > _JUMP:
+                found, result = self._kept(run) or (found, result)
             self._current, self._raised = found, list(dict.fromkeys(run.used[1:]))
             self._tries = run.tries or self._tries
+        if is_followed:
+            self._followed, self._current.settled = places, self._current.p
         return replace(result, steps=run.steps)
+
+    def _has_followed(self, places: FloatArray) -> bool:
+        """Return whether the last pose is one of a drag to *places*, or almost."""
+        return self._followed is not None and bool(np.abs(places - self._followed).max() <= _JUMP)
+
+    def _kept(self, run: _Run) -> tuple[_Weighted, SolverResult] | None:
+        """Converge from the last pose; None if its weights do not suffice.
+
+        Weights that are a little too low are raised.
+        """
+        here = self._current
+        for _ in range(_TRIES):
+            result = run.solve(here, run.options)
+            errors, is_raised = _Errors.of(here, run.places).both, here.strength > 1.0 + _SAME
+            if (errors[is_raised] < _FEWEST * self._tolerance).any():
+                break
+            if result.status is Status.STEP_LIMIT or (errors <= self._allowed).all():
+                return here, result
+            factor = np.maximum((errors / (_AIM * self._allowed)) ** _STEEP, 1.0)
+            if (factor > _FACTOR).any():
+                break
+            here = self._at(factor * here.strength, near=here, start=here.p)
+        return None
 
     def _raise(self, run: _Run) -> tuple[_Weighted, SolverResult]:
         """Raise the weights from the initial ones as needed; return the solver and its pose."""
@@ -320,7 +359,7 @@ class WeightContinuation:
         self, run: _Run, here: _Weighted, result: SolverResult, bracket: _Bracket
     ) -> tuple[_Weighted, SolverResult]:
         """Return a solver with less weight and no larger errors, and its pose; or *here*."""
-        allowed = np.maximum(self._tolerance, bracket.high_errors)
+        run.allowed = allowed = np.maximum(self._tolerance, bracket.high_errors)
         last = self._current
         if run.is_live and result.status is not Status.STEP_LIMIT and bracket.contains(last):
             attempt = run.solve(last)
@@ -328,13 +367,13 @@ class WeightContinuation:
                 return last, attempt
             errors = _Errors.of(last, run.places).both
             inside = bracket.high > bracket.low
-            if (errors <= _MOST * allowed).all() and (
+            if (errors <= allowed).all() and (
                 errors[inside] >= _FEWEST * self._tolerance
             ).all():
                 return last, attempt
-        start = here.p
+        start, aim = here.p, _LIVE_AIM if run.is_live else _AIM
         for k in range(_TRIES):
-            strength = bracket.at(_AIM * self._tolerance)
+            strength = bracket.at(aim * self._tolerance)
             if strength is None or result.status is Status.STEP_LIMIT:
                 break
             near = self._tries[k] if k < len(self._tries) else self._current
