@@ -6,6 +6,7 @@ import numpy as np
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
+from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.cli.live_pulls import converged
 from vtk_segdeform.session import Session
 
@@ -27,6 +28,25 @@ def test_every_pose_shown_is_within_a_hundredth_of_the_one_it_converges_to():
     print(f"{worst / mesh.diagonal:.1%} away, {behind / mesh.diagonal:.1%} behind the hand")
     assert worst < 0.01 * mesh.diagonal
     assert behind < 0.3 * mesh.diagonal
+
+
+def test_a_drag_ends_without_a_jump_while_the_body_buckles():
+    """The search for weights finds another minimum, 6 % of the diagonal away."""
+    mesh = models.bar()
+    regions, height = sd.segment(mesh), mesh.vertices[:, 2]  # 0 to 1
+    cages = sd.fit_cages(mesh, regions, suggested_size(regions))
+    deformer = sd.Deformer(mesh, regions, cages, fixed=height < 0.08, handle=height > 0.93)
+    rest, worst = mesh.vertices[deformer.handle], 0.0
+    for press in 0.3 * mesh.diagonal * np.arange(1, 35) / 40:
+        targets = rest + [0.0, 0.0, -press]
+        pose = deformer.solve(targets, max_steps=8, within=0.0008)
+        if press > 0.22 * mesh.diagonal:
+            at = targets if pose.targets is None else pose.targets
+            final = deformer.copy().solve(at)
+            moved = np.linalg.norm(final.vertices - pose.vertices, axis=1).max()
+            worst = max(worst, float(moved))
+    print(f"{worst / mesh.diagonal:.2%} away")
+    assert worst < 0.01 * mesh.diagonal
 
 
 def test_a_fast_pull_shows_no_pose_that_a_step_with_an_old_matrix_took_for_converged():

@@ -13,6 +13,9 @@ A pose is final when the continuation began with the initial weights, so that th
 them the pose, depend on the targets and not on the poses before.  The solver of each combination
 of weights starts from its own last pose.  During a drag the weights stay the same until the targets
 rest; `WeightContinuation.follow` instead finds them in every frame, by poses near the minima.
+
+Where a body buckles there are several minima, and the continuation may lead to another one than the
+last pose shown.  A drag does not end with such a jump if its own weights suffice.
 """
 
 from __future__ import annotations
@@ -162,7 +165,7 @@ class _Run:
         self.used: list[_Weighted] = []
         self.tries: list[_Weighted] = []  # those with weights between two of the first pass
         self.steps = 0
-        self.allowed = np.zeros(0)  # (s,), errors up to which weights are not raised
+        self.allowed = np.zeros(0)  # (s,), errors up to which weights suffice
         self.is_live = options.within is not None
         self.options = options
 
@@ -206,7 +209,7 @@ class WeightContinuation:
         self._current = self._initial  # the solver of the last pose
         self._tries: list[_Weighted] = []  # `_Run.tries` of the last pose with any
         self._only_current = False  # whether only that solver has followed the last targets
-        # Of the last successful `follow`: its places, and errors (s,) that more weight cannot reduce.
+        # Of the last successful `follow`: its places, and the errors (s,) that were allowed.
         self._followed: FloatArray | None = None
         self._allowed = np.full(len(solver.positions.strength), tolerance)
         self._tolerance = tolerance
