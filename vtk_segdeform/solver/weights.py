@@ -370,9 +370,7 @@ class WeightContinuation:
                 return last, attempt
             errors = _Errors.of(last, run.places).both
             inside = bracket.high > bracket.low
-            if (errors <= allowed).all() and (
-                errors[inside] >= _FEWEST * self._tolerance
-            ).all():
+            if (errors <= allowed).all() and (errors[inside] >= _FEWEST * self._tolerance).all():
                 return last, attempt
         start, aim = here.p, _LIVE_AIM if run.is_live else _AIM
         for k in range(_TRIES):

@@ -200,7 +200,7 @@ class _Label:
         self.actor.GetProperty().LightingOff()
 
     def place(self, viewpoint: Viewpoint) -> None:
-        """Put it on its face; the axes of the cube are those of the world nearest to the model's."""
+        """Put it on its face; the cube's axes are those of the world nearest to the model's."""
         away, up = viewpoint.directions(self.name)
         away = _nearest_axis(away)
         up = _nearest_axis(np.where(away == 0.0, up, 0.0))
