@@ -54,10 +54,11 @@ def _set_in(
         there = points[component == host]
         low, high = there.min(axis=0) - near, there.max(axis=0) + near
         inside = [k for k, x in own.items() if ((low <= x) & (x <= high)).all() and not found[k]]
-        tree = cKDTree(there, compact_nodes=False, balanced_tree=False) if inside else None
-        for k in inside:
-            away, _ = tree.query(own[k], distance_upper_bound=near)
-            found[k] = bool(np.isfinite(away).all())
+        if inside:
+            tree = cKDTree(there, compact_nodes=False, balanced_tree=False)
+            for k in inside:
+                away, _ = tree.query(own[k], distance_upper_bound=near)
+                found[k] = np.isfinite(away).all()
     return found
 
 
