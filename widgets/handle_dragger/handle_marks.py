@@ -14,6 +14,7 @@ from ..scene import View, Wireframe, handle_colour
 
 _HIGHLIGHT = COLOURS[4]
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
+_DOT, _ALONE, _HIGHLIGHTED = 4.0, 9.0, 2.0  # pixels; pins and pulled points stand alone
 _DESIGN_HEIGHT = 600  # pixels; dots are larger in a higher window
 
 
@@ -83,5 +84,6 @@ class HandleMarks:
                 continue
             dots, highlighted = self._dots[name], name == self._highlighted
             colour = rgb(_HIGHLIGHT) if highlighted else handle_colour(self.session, name)
-            size = 6.0 if highlighted else 4.0
+            size = _ALONE if len(self.session.handles[name]) == 1 else _DOT
+            size += _HIGHLIGHTED if highlighted else 0.0
             dots.set_style(colour, line_width=1.0, sphere_size=scale * size)
