@@ -72,10 +72,16 @@ def test_places_far_from_the_origin_have_all_their_digits(tmp_path, capsys):
     ("words", "says"),
     [
         (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* vertex is at"),
-        (["--at", "0,1", "--to", "0,0,1"], "at must be three numbers"),
+        (["--at", "0,1", "--to", "0,0,1"], "--at must be three numbers"),
+        (
+            ["--at", "{top}", "--to", "0,0,9", "--radius", "-1"],
+            "--radius must be a positive number;",
+        ),
+        (["--at", "{top}", "--to", "0,0,9", "--regions", "0"], "--regions must be a whole number"),
+        (["--at", "{top}", "--to", "0,0,9", "--cage-vertices", "1"], "--cage-vertices must be"),
         (["--at", "{top}", "--to", "0,0,x"], "to must be x,y,z"),
         (["--at", "{top}", "--to", "-.1,0,9", "--pin", "-5,0,0"], "--pin is"),
-        (["--at", "{top}", "--to", "0,0,9", "--local", "2"], "locality must be a number from 0 to"),
+        (["--at", "{top}", "--to", "0,0,9", "--local", "2"], "--local must be a number from 0 to"),
         (["--at", "{top}", "--to", "0,0,9", "--pin", "{top}"], "both pins and handle"),
     ],
 )
@@ -83,7 +89,7 @@ def test_wrong_options_are_errors_that_name_them(words, says, given, tmp_path, c
     x = Surface.read(given).mesh.vertices
     words = [word.replace("{top}", text(x[x[:, 2].argmax()])) for word in words]
     quick = ["--regions", "1", "--cage-vertices", "40"]
-    assert main(["pull", given, "-o", str(tmp_path / "out.vtp"), *words, *quick]) == 2
+    assert main(["pull", given, "-o", str(tmp_path / "out.vtp"), *quick, *words]) == 2
     message = capsys.readouterr().err
     assert re.search(says, message), message
     assert not list(tmp_path.iterdir())

@@ -30,6 +30,11 @@ from ..version import __version__
 from .progress_bar import ProgressBar
 
 _VECTOR_OPTIONS = ("--rotate", "--pivot", "--translate", "--at", "--to", "--pin")
+# Parameters of Python whose options have other names.
+_OPTIONS_OF = {
+    "locality": ("local",),
+    "n_vertices": ("cage_vertices", "size"),
+}
 DONE, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 
 # Command -> module of this folder; the function has the name of the command.
@@ -118,8 +123,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         bar.clear()
         if options.debug:
             raise
-        print(f"segdeform {options.command}: {_printable(_one_line(error))}", file=sys.stderr)
-        return MISUSED if isinstance(error, ConstraintError) else FAILED
+        text = _by_option(_one_line(error), options)
+        print(f"segdeform {options.command}: {_printable(text)}", file=sys.stderr)
+        is_misused = isinstance(error, ConstraintError) or text.startswith("--")
+        return MISUSED if is_misused else FAILED
     finally:
         logging.getLogger("vtk_segdeform").removeHandler(warnings)
 
@@ -162,6 +169,19 @@ def _one_line(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "out of memory"
     return " ".join(str(error).split()) or type(error).__name__
+
+
+def _by_option(text: str, options: argparse.Namespace) -> str:
+    """Return a message about a parameter of Python as one about the option that sets it.
+
+    >>> _by_option("n_regions must be 1 or more; got 0", argparse.Namespace(regions=0))
+    '--regions must be 1 or more; got 0'
+    """
+    name, must, rest = text.partition(" must ")
+    for option in (name.removeprefix("n_"), *_OPTIONS_OF.get(name, ())):
+        if must and option in vars(options):
+            return f"--{option.replace('_', '-')} must {rest.replace(' or None', '')}"
+    return text
 
 
 def _with_signed_vectors(words: Sequence[str]) -> list[str]:
@@ -338,7 +358,7 @@ def _unknown_words(parser: argparse.ArgumentParser, words: Sequence[str]) -> str
     text = f"unrecognized arguments: {' '.join(words)}"
     options = re.findall(r"--[a-z][a-z-]*", parser.format_help())
     for word in words:
-        near = get_close_matches(word.partition("=")[0], options, 1)
+        near = get_close_matches(word.partition("=")[0], options, 1, 0.7)
         if word.startswith("--") and near:
             return f"{text}; did you mean {near[0]}?"
     if all(re.fullmatch(r"[-+.\d][\w.+-]*,?", word) for word in words):
