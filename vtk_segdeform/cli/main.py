@@ -2,7 +2,7 @@
 
     0   success; of check: the surface can be deformed, or is repaired to a closed mesh
     1   it cannot, or the command failed; stderr gives the reason
-    2   usage error: unknown option, invalid selection or motion
+    2   usage error: unknown option or value, invalid selection or motion
     130 interrupted by Ctrl+C
 
 The module of a command is imported when the command runs, so that ``segdeform --help`` takes a
