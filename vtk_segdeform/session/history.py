@@ -268,8 +268,14 @@ class Timeline:
         self._state = state
         self._listeners.notify(change)
 
-    def _state_at(self, position: int) -> State:
-        """Return the state at *position* of `history`."""
+    def state_at(self, position: int) -> State:
+        """Return the state at *position* of `history`.
+
+        Raises
+        ------
+        SessionError
+            If there is no such state.
+        """
         self._require_position(position)
         if position == self.position:
             return self._state

@@ -253,7 +253,7 @@ class Session(Timeline):
 
         None if its cages are no longer bound, so that it could take seconds; `jump` binds them.
         """
-        state = self._state_at(position)
+        state = self.state_at(position)
         pose = state.pose
         return self.mesh.vertices if pose is None else self._pose_solver.peek(state, pose)
 

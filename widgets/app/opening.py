@@ -8,6 +8,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
+from ..editor import SessionFile
 from .autosave import Slot
 from .documents import Reader
 
@@ -32,6 +33,12 @@ class Request:
     """How to return to the document of which it is a repaired copy."""
     repaired: Request | None = None
     """How to return to its repaired copy, if that was undone."""
+    names: tuple[str, ...] = ()
+    """The states of this original or repaired copy in the history, by name."""
+    file: SessionFile | None = None
+    """The file of its session, if that was open before."""
+    position: int | None = None
+    """The position in the whole history to open it at."""
 
 
 class WaitingPage(QtWidgets.QWidget):

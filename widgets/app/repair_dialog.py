@@ -42,6 +42,8 @@ class RepairDialog(QtWidgets.QDialog):
         Where to look from at first.
     parent : QWidget
         The window of the document.
+    has_pose : bool
+        Whether the document is posed, which the repaired copy will not be.
 
     Attributes
     ----------
@@ -49,7 +51,9 @@ class RepairDialog(QtWidgets.QDialog):
         The result, once it has been computed.
     """
 
-    def __init__(self, given: Any, mesh: Mesh, camera: Any, parent: Any) -> None:
+    def __init__(
+        self, given: Any, mesh: Mesh, camera: Any, parent: Any, *, has_pose: bool = False
+    ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Repair and open")
         self.repaired: Surface | None = None
@@ -83,6 +87,11 @@ class RepairDialog(QtWidgets.QDialog):
             policy.setRetainSizeWhenHidden(True)
             each.setSizePolicy(policy)
         self.stage.setWordWrap(True)
+        self.advice = QtWidgets.QLabel(
+            "The repaired surface starts at rest. Undo returns to the present pose."
+        )
+        self.advice.setWordWrap(True)
+        self.advice.setVisible(has_pose)
         roles = QtWidgets.QDialogButtonBox.ButtonRole
         buttons = QtWidgets.QDialogButtonBox()
         self.accepting = buttons.addButton("Open repaired", roles.AcceptRole)
@@ -129,6 +138,7 @@ class RepairDialog(QtWidgets.QDialog):
         side.addWidget(self.steps, 1)
         side.addWidget(self.stage)
         side.addWidget(self.bar)
+        side.addWidget(self.advice)
         side.addWidget(buttons)
         view = QtWidgets.QVBoxLayout()
         view.addWidget(self.preview.plotter, 1)

@@ -25,10 +25,7 @@ def ask_repair(window: Any) -> Request | None:
     surface = session.surface
     given = to_polydata(session.mesh) if surface is None else surface.given
     camera = window.editor.view.camera
-    opened = window.document, session
-    name, is_new = window.document.name, window.is_modified
-    original = Request(name, lambda _: opened, is_new=is_new)
-    return _ask(window, window.document, given, session.mesh, camera, original)
+    return _ask(window, window.document, given, session.mesh, camera, window.current)
 
 
 def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Request | None:
@@ -44,7 +41,8 @@ def _ask(
     camera: Any,
     original: Request | None = None,
 ) -> Request | None:
-    dialog = RepairDialog(given, mesh, camera, window)
+    has_pose = original is not None and window.session.state.pose is not None
+    dialog = RepairDialog(given, mesh, camera, window, has_pose=has_pose)
     try:
         is_accepted = dialog.exec() == dialog.DialogCode.Accepted
         repaired = dialog.repaired if is_accepted else None

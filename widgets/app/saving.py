@@ -61,11 +61,14 @@ def export_picture(window: Any) -> bool:
     return path is not None and _done(window, lambda controller: _draw(window, controller, path))
 
 
-def may_discard(window: Any) -> bool:
-    """Return whether the document may be closed: it is saved, or the user discards it."""
+def may_discard(window: Any, *, is_kept: bool = False) -> bool:
+    """Return whether the document may be closed: it is saved or *is_kept*, or the user discards it.
+
+    It is kept if undo or redo returns to it.
+    """
     if window.has_mesh and window.editor.controller.settling.is_awaited:
         _settle(window)
-    if not window.is_modified:
+    if is_kept or not window.is_modified:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
     document = window.document

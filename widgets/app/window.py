@@ -20,7 +20,15 @@ from qtpy import QtCore, QtWidgets
 
 from vtk_segdeform.session import Session
 
-from ..editor import DeformEditor, Job, expect_session
+from ..editor import (
+    DeformEditor,
+    Job,
+    Neighbour,
+    expect_session,
+    jumping_to,
+    position_of,
+    states_of,
+)
 from ..qt import DeformWidget
 from .autosave import Autosaves, Slot
 from .autosaver import INTERVAL, Autosaver, stops_of
@@ -45,6 +53,7 @@ from .repairing import ask_repair, ask_repair_of
 from .saving import may_discard
 
 _SIZE = 1200, 800
+_REPAIR = "repair"
 _PAUSE = 300  # milliseconds from the start page to the loading of the compiled kernels
 _PERIOD = 30  # milliseconds between two polls of the job that opens a document
 
@@ -96,6 +105,8 @@ class Window(QtWidgets.QMainWindow):
         self.document = Document("")
         self.mesh_state: object = None
         self._is_new = False  # made by the program and not saved yet
+        self._original: Request | None = None  # of which the document is a repaired copy
+        self._repaired: Request | None = None  # its repaired copy, if that was undone
         self._make_other = partial(Window, settings, autosaves, interval=interval)
         self._other: Window | None = None  # for a file beside recovered work
         self.editor_widget: Any = None
@@ -193,14 +204,41 @@ class Window(QtWidgets.QMainWindow):
         """Repair once the current event of the view has been handled."""
         QtCore.QTimer.singleShot(0, self, self.repair)
 
-    def _undo_repair(self, original: Request) -> None:
-        """Return from a repaired copy to the original document; the copy is kept for redo."""
-        opened = self.document, self.session
-        repaired = Request(
-            self.document.name, lambda _: opened, is_new=self._is_new, original=original
+    @property
+    def current(self) -> Request:
+        """How to return to the open document, in its place of the history."""
+        opened, controller = (self.document, self.session), self.editor.controller
+        names = states_of(controller)[: position_of(controller) + 1]
+        return Request(
+            self.document.name,
+            lambda _: opened,
+            is_new=self._is_new,
+            names=names,
+            file=controller.file,
+            original=self._original,
+            repaired=self._repaired if controller.neighbours.after(self.session) else None,
         )
-        self._is_new = False  # nothing is lost
-        self._open_soon(replace(original, repaired=repaired))
+
+    def _follow_history(self, request: Request) -> None:
+        """Let the history go on from the original of the document, and to its repaired copy."""
+        self._original, self._repaired = original, repaired = request.original, request.repaired
+        neighbours = self.editor.controller.neighbours
+        if original is not None:
+            undo = partial(self._undo_repair, original)
+            neighbours.before = Neighbour(_REPAIR, original.names, undo)
+        if repaired is not None and repaired.original is not None:
+            place = len(repaired.original.names) - 1 - neighbours.count_before
+            after = Neighbour(_REPAIR, repaired.names, partial(self._redo_repair, repaired))
+            neighbours.follow(self.session, place, after)
+
+    def _redo_repair(self, repaired: Request, position: int) -> None:
+        self._open_soon(replace(repaired, position=position))
+
+    def _undo_repair(self, original: Request, position: int) -> None:
+        """Return from a repaired copy to the original document; the copy is kept for redo."""
+        names = states_of(self.editor.controller)[len(original.names) + 1 :]
+        repaired = replace(self.current, names=names)
+        self._open_soon(replace(original, repaired=repaired, position=position))
 
     def _open_soon(self, request: Request) -> None:
         """Open another document once the current event has been handled."""
@@ -236,7 +274,7 @@ class Window(QtWidgets.QMainWindow):
 
     def _open(self, request: Request) -> bool:
         """Start reading; return False if the user keeps the current document."""
-        if not may_discard(self):
+        if not may_discard(self, is_kept=bool(request.original or request.repaired)):
             return False
         self._cancel_opening()
         self.pages.waiting.begin(request.name)
@@ -263,7 +301,8 @@ class Window(QtWidgets.QMainWindow):
         self.document, session = opened
         self.mesh_state, self._is_new = None, request.is_new
         widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
-        widget.editor.controller.file = self.document.file(session, is_unsaved=bool(request.slot))
+        file = request.file or self.document.file(session, is_unsaved=bool(request.slot))
+        widget.editor.controller.file = file
         widget.editor.show_cube = True
         widget.editor.keys = self.keys
         path = self.document.session_path or self.document.source
@@ -272,12 +311,9 @@ class Window(QtWidgets.QMainWindow):
         connect_panel(self)
         if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
             widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
-        if request.original is not None:
-            undo = partial(self._undo_repair, request.original)
-            widget.editor.controller.earlier = "repair", undo
-        if request.repaired is not None:
-            redo = partial(self._open_soon, request.repaired)
-            widget.editor.controller.later = "repair", session.state, redo
+        self._follow_history(request)
+        if request.position is not None:
+            widget.editor.do(jumping_to(request.position))
         widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())

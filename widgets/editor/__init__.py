@@ -4,7 +4,7 @@ The files, in reading order:
 
     editor           `DeformEditor`
     controller       session, widgets, mode, job and file of the editor
-    mode widget_set  the modes, and the widgets of each
+    widget_set       the modes, and the widgets of each
     camera           navigation, views, up axis and orientation cube
     actions recording_actions panel_actions
                      the actions behind keys, menus and panels
@@ -18,7 +18,9 @@ The files, in reading order:
     recordings       recordings of input and video
     messages hints status_line help_card
                      messages, hints and the help card
-    history          the states of the session by name, jumps and previews
+    history neighbours
+                     the states of the session by name, jumps and previews, and the sessions
+                     before and after it
     notices notice_line
                      how the mesh differs from what was given, and where
 """
@@ -46,7 +48,7 @@ from .history import jumping_to, position_of, preview, states_of
 from .job import Job, Timer
 from .keys import Binding, Keys, key_cap, key_name
 from .messages import error_text
-from .mode import Mode
+from .neighbours import Neighbour
 from .notices import Notice, Notices, notices_of
 from .panel_actions import (
     choosing_handle,
@@ -84,6 +86,7 @@ from .session_file import (
     is_mesh,
     read_session,
 )
+from .widget_set import Mode
 
 __all__ = [
     "MESH_FILES",
@@ -97,6 +100,7 @@ __all__ = [
     "KeyChoice",
     "Keys",
     "Mode",
+    "Neighbour",
     "Notice",
     "Notices",
     "SessionFile",

@@ -23,7 +23,7 @@ from vtk_segdeform.session import FinishedPose
 from ..region_selector import Paint, Tool
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
-from .mode import Mode
+from .widget_set import Mode
 
 Action = Callable[[Controller], None]
 
@@ -64,19 +64,20 @@ def undo(controller: Controller) -> None:
     if puller.waiting.has_pull and puller.cancel():
         controller.say("Undo: pull")
         return
-    label, earlier = controller.undo_label, controller.earlier
-    if not controller.session.undo() and earlier is not None:
-        earlier[1]()
+    label, before = controller.undo_label, controller.neighbours.before
+    if not controller.session.undo() and before is not None:
+        before.enter(len(before.names) - 1)
     controller.say(f"Undo: {label}" if label else "Nothing to undo")
 
 
 def redo(controller: Controller) -> None:
     """Redo the last undone step."""
-    label, following = controller.redo_label, controller.next_session
-    if following is not None:
-        following[1]()
+    label, session, neighbours = controller.redo_label, controller.session, controller.neighbours
+    after = neighbours.after(session)
+    if after is not None and after[0] == session.position:
+        after[1].enter(neighbours.count_before + after[0] + 1)
     else:
-        controller.session.redo()
+        session.redo()
     controller.say(f"Redo: {label}" if label else "Nothing to redo")
 
 

@@ -14,7 +14,7 @@ from vtk_segdeform.errors import ArgumentError
 from ..region_selector import Paint, Tool
 from . import actions, panel_actions, recording_actions
 from .keys import VIEW, Binding, Keys
-from .mode import Mode
+from .widget_set import Mode
 
 KeyChoice = str | Mapping[str, str | Sequence[str]]
 """A preset, "pyvista" or "Blender", or the keys of some actions by name; see `keys_of`."""

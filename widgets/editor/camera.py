@@ -16,8 +16,7 @@ from vtk_segdeform.geometry import guess_up_axis
 
 from ..scene import Navigation, OrientationCube, View, Viewpoint
 from .help_card import HelpCard
-from .mode import Mode
-from .widget_set import WidgetSet
+from .widget_set import Mode, WidgetSet
 
 _Y_UP = (".glb", ".gltf")  # by the definition of the format
 

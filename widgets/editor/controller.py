@@ -18,7 +18,7 @@ from typing import TypeVar
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.kernels import advice, is_first_run, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Change, Preparation, Session, State, saved_view
+from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
 from ..recording import confined_path
 from ..scene import Draft, View, Widget
@@ -29,14 +29,14 @@ from .hints import hint
 from .job import Worker, view_timer
 from .keys import Keys
 from .messages import Messages
-from .mode import Mode
+from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
 from .recordings import Recordings
 from .rest import Rest
 from .session_file import SessionFile, is_mesh, read_session
 from .settling import Settling, is_unsettled
-from .widget_set import WidgetSet
+from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling takes about half a minute, once"
 _REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
@@ -67,11 +67,8 @@ class Controller:
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
-    earlier : tuple of str and callable, or None
-        A step before the first of the session: its label, and a function that undoes it.
-    later : tuple of str, State and callable, or None
-        A step that leads from the session to another one: its label, the state of the session from
-        which it leads, and a function that repeats it.
+    neighbours : Neighbours
+        The sessions before and after this one in the history.
     recordings : Recordings
         The current recording of input and of video.
     camera : Camera
@@ -90,8 +87,7 @@ class Controller:
         self._compiles = is_first_run()
         self.messages.note(advice() or (_FIRST_RUN if self._compiles else ""))
         self.notices = Notices(view, lambda: self.messages.height)
-        self.earlier: tuple[str, Callable[[], None]] | None = None
-        self.later: tuple[str, State, Callable[[], None]] | None = None
+        self.neighbours = Neighbours()
         self.recordings = Recordings(view)
         self._mode = Mode.PULL
         self._is_on = False
@@ -129,20 +125,16 @@ class Controller:
     @property
     def undo_label(self) -> str | None:
         """The step to undo: of the session, or else the one from which the session came."""
-        if self.session.undo_label is None and self.earlier is not None:
-            return self.earlier[0]
-        return self.session.undo_label
+        label, before = self.session.undo_label, self.neighbours.before
+        return before.step if label is None and before is not None else label
 
     @property
     def redo_label(self) -> str | None:
         """The step to redo: to the session that came from this state, or else of the session."""
-        return self.session.redo_label if self.next_session is None else self.next_session[0]
-
-    @property
-    def next_session(self) -> tuple[str, Callable[[], None]] | None:
-        """The step to another session, if it leads from the current state: label and function."""
-        later = self.later
-        return None if later is None or later[1] is not self.session.state else (later[0], later[2])
+        after = self.neighbours.after(self.session)
+        if after is not None and after[0] == self.session.position:
+            return after[1].step
+        return self.session.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -469,8 +461,9 @@ class Controller:
         return self._is_free() and not self._preparing.is_running
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
-        was_modified = self.file.is_modified(session)
+        was_modified, after = self.file.is_modified(session), self.neighbours.after(session)
         session.accept(preparation)
+        self.neighbours.prepared(session, after)
         self._rest.begin()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()

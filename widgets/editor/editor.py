@@ -34,8 +34,7 @@ from .actions import Action, show_pose, show_rest
 from .bindings import KeyChoice, keys_of
 from .controller import Controller
 from .keys import Keys, key_cap, pressed_key
-from .mode import Mode
-from .widget_set import WidgetSet
+from .widget_set import Mode, WidgetSet
 
 _REPEAT = 50  # milliseconds between release and press of a key that is held and repeats, at most
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0

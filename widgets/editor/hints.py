@@ -11,8 +11,7 @@ from vtk_segdeform.solver import Status
 from ..region_selector import Paint, Tool
 from ..volume_overlay import brief, signed
 from .keys import Keys
-from .mode import Mode
-from .widget_set import WidgetSet
+from .widget_set import Mode, WidgetSet
 
 _TOOLS = {
     Tool.BRUSH: "Brush",

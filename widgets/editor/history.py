@@ -1,7 +1,7 @@
 """The history of an editor: its states by name, jumps to them and previews of them.
 
 The first state is the session as it was opened.  If it came from another one, as a repaired mesh
-does, that one is before it; a session that came from the current state follows it.
+does, the states of that one are before it; those of a session that came from it follow.
 """
 
 from __future__ import annotations
@@ -9,41 +9,45 @@ from __future__ import annotations
 from .actions import Action
 from .controller import Controller
 
-_OPENED = "Opened"
-
 
 def states_of(controller: Controller) -> tuple[str, ...]:
     """Return the names of all states, the oldest first: of each, the action that led to it."""
-    labels = controller.session.history
-    if controller.earlier is not None:
-        first = controller.earlier[0] if labels[0] == _OPENED.lower() else labels[0]
-        labels = _OPENED, first, *labels[1:]
-    if controller.next_session is not None:
-        labels = *labels[: position_of(controller) + 1], controller.next_session[0]
-    return tuple(label[:1].upper() + label[1:] for label in labels)
+    session, neighbours = controller.session, controller.neighbours
+    labels, before, after = session.history, neighbours.before, neighbours.after(session)
+    earlier: tuple[str, ...] = ()
+    if before is not None:
+        is_whole = labels[0] == "opened"  # otherwise its first steps were discarded
+        earlier, labels = before.names, (before.step if is_whole else labels[0], *labels[1:])
+    names = tuple(label[:1].upper() + label[1:] for label in labels)
+    if after is not None:
+        position, following = after
+        names = *names[: position + 1], following.step.capitalize(), *following.names
+    return *earlier, *names
 
 
 def position_of(controller: Controller) -> int:
     """Return the index of the current state in `states_of`."""
-    return controller.session.position + _offset(controller)
+    return controller.neighbours.count_before + controller.session.position
 
 
 def jumping_to(position: int) -> Action:
     """Return the action that undoes or redoes as many steps as lead to the state at *position*."""
 
     def jump(controller: Controller) -> None:
-        session, earlier, following = (
-            controller.session,
-            controller.earlier,
-            controller.next_session,
+        session, neighbours = controller.session, controller.neighbours
+        name, before, after = (
+            states_of(controller)[position],
+            neighbours.before,
+            neighbours.after(session),
         )
-        name = states_of(controller)[position]
-        if following is not None and position > position_of(controller):
-            following[1]()
+        place = position - neighbours.count_before
+        if after is not None and place > after[0]:
+            session.jump(after[0])
+            after[1].enter(position)
         else:
-            session.jump(max(position - _offset(controller), 0))
-            if earlier is not None and position == 0:
-                earlier[1]()
+            session.jump(max(place, 0))
+            if before is not None and place < 0:
+                before.enter(position)
         controller.say(f"History: {name}")
 
     return jump
@@ -58,19 +62,17 @@ def preview(controller: Controller, position: int | None) -> None:
     with controller.view.guarded(), controller.view.drawing_once():
         vertices = None
         if position is not None and not _is_active(controller):
-            place = position - _offset(controller)
-            is_here = 0 <= place < len(controller.session.history)
-            if is_here and place != controller.session.position:
-                vertices = controller.session.vertices_at(place)
+            place = position - controller.neighbours.count_before
+            session = controller.session
+            after = controller.neighbours.after(session)
+            last = len(session.history) - 1 if after is None else after[0]
+            if 0 <= place <= last and place != session.position:
+                vertices = session.vertices_at(place)
         if vertices is not None:
             assert position is not None
             controller.show_instead(vertices, f"History: {states_of(controller)[position]}")
         else:
             controller.show_instead(None)
-
-
-def _offset(controller: Controller) -> int:
-    return 0 if controller.earlier is None else 1
 
 
 def _is_active(controller: Controller) -> bool:

@@ -16,7 +16,7 @@ from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
 from .help_card import Section
-from .mode import Mode
+from .widget_set import Mode
 
 VIEW = "View"
 """The section of the help card about the camera."""

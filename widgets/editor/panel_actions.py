@@ -16,7 +16,7 @@ from vtk_segdeform.errors import RegionError, SessionError
 from ..region_selector import Paint
 from .actions import Action, fit_cages, once_settled, segment, toggle_volume
 from .controller import Controller
-from .mode import Mode
+from .widget_set import Mode
 
 
 def choosing_regions(regions: Sequence[int]) -> Action:

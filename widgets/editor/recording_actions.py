@@ -8,8 +8,8 @@ from ..recording import Input
 from ..region_selector import Tool
 from .controller import Controller
 from .keys import event_key
-from .mode import Mode
 from .recordings import film_place
+from .widget_set import Mode
 
 _FILMED = Mode.PULL, Mode.DEFORM
 _KEY_OF = {Tool.BRUSH: "b", Tool.LASSO: "l", Tool.RECTANGLE: "t", Tool.COMPONENT: "k",

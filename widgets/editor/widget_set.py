@@ -7,6 +7,7 @@ decides whether cages, volume changes and the outlines of regions are shown as w
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Sequence
 from contextlib import ExitStack
 
@@ -27,7 +28,21 @@ from ..region_selector import (
 )
 from ..scene import Pointer, SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
-from .mode import Mode
+
+
+class Mode(enum.Enum):
+    """The current action of the mouse on the mesh."""
+
+    PULL = 0
+    """Pull the surface at any point."""
+    REGIONS = 1
+    """Paint regions."""
+    CAGES = 2
+    """Drag cage vertices."""
+    HANDLES = 3
+    """Paint fixed vertices and handles."""
+    DEFORM = 4
+    """Move and rotate handles."""
 
 
 class WidgetSet:

@@ -14,9 +14,11 @@ from qt_hands import Qt, QtCore, QtHand, QtTest, application, until
 
 from vtk_segdeform import load_session
 from vtk_segdeform.errors import Cancelled
-from vtk_segdeform.io import read_polydata
+from vtk_segdeform.io import Surface, read_polydata
 from vtk_segdeform.widgets.app.autosave import Autosaves
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
+from vtk_segdeform.widgets.app.repairing import _request
+from vtk_segdeform.widgets.editor import jumping_to, position_of, states_of
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 BLANK = pytest.mark.usefixtures("unpainted")
@@ -88,6 +90,10 @@ def lines(dialog):
     return [dialog.steps.item(k).text() for k in range(dialog.steps.count())]
 
 
+def rows(hand):
+    return hand.window.editor_widget.panel.history.list
+
+
 def repair(hand, steps):
     """Open the repair dialog from the menu, and do *steps* with it."""
     reader = Reader(steps)
@@ -156,7 +162,6 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     content = path.read_bytes()
     original = hand.window.session
     original.set_fixed([0, 1, 2])
-    boxes.answers.append("Discard")
 
     def accept(dialog):
         assert lines(dialog)[0].startswith("Fill 3 holes of ")
@@ -176,10 +181,15 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     boxes.answers.append("Cancel")
     hand.window.open(path)
     assert hand.title == "bottle (repaired)* - segdeform"
-    rows = hand.window.editor_widget.panel.history.list
-    until(lambda: rows.count() == 2, "the history")
-    assert [rows.item(row).text() for row in range(2)] == ["Opened", "Repair"]
     session.set_fixed([5, 6])
+    whole = ["Opened", "Set fixed vertices", "Repair", "Set fixed vertices"]
+
+    def shows(row):
+        shown = rows(hand)
+        until(lambda: shown.count() == 4 and shown.currentRow() == row, "the history")
+        return [shown.item(k).text() for k in range(4)] == whole
+
+    assert shows(3)
     hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
@@ -187,15 +197,26 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     assert hand.title == "bottle.ply* - segdeform"
     assert original.undo_label == "set fixed vertices"
     assert len(original.mesh.borders) == 3
-    rows = hand.window.editor_widget.panel.history.list
-    until(lambda: rows.count() == 3, "the history")
-    assert [rows.item(row).text() for row in range(3)] == ["Opened", "Set fixed vertices", "Repair"]
-    boxes.answers.append("Discard")
+    assert shows(1)
+    hand.choose("Edit", "Undo set fixed vertices")
+    assert hand.title == "bottle.ply - segdeform"
+    assert shows(0)
+    hand.choose("Edit", "Redo set fixed vertices")
     hand.choose("Edit", "Redo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is session, "the copy")
     hand.settle()
     assert hand.title == "bottle (repaired)* - segdeform"
     assert (session.undo_label, session.redo_label) == (None, "set fixed vertices")
+    assert shows(2)
+    hand.window.editor.do(jumping_to(0))
+    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
+    hand.settle()
+    assert shows(0)
+    hand.window.editor.do(jumping_to(3))
+    until(lambda: hand.window.has_mesh and hand.window.session is session, "the copy")
+    hand.settle()
+    assert shows(3)
+    hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
     until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
     hand.settle()
@@ -207,6 +228,40 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     assert hand.title == "bottle.ply - segdeform"
     assert hand.window.session is not original
     assert len(hand.window.session.mesh.borders) == 3
+
+
+@BLANK
+def test_two_repairs_are_undone_and_redone_one_after_the_other(hand, tmp_path):
+    opened(hand, bottle(2), tmp_path / "bottle.ply")
+    sessions = [hand.window.session]
+    for _ in range(2):
+        hand.window.session.set_fixed([len(sessions)])
+        document, surface = hand.window.document, hand.window.session.surface
+        hand.window._open(_request(document, Surface(surface.given), hand.window.current))
+        hand.settle()
+        sessions.append(hand.window.session)
+    assert len(set(sessions)) == 3
+    fixed = "Set fixed vertices"
+    whole = ("Opened", fixed, "Repair", fixed, "Repair")
+
+    def shows(session, position):
+        until(lambda: hand.window.has_mesh and hand.window.session is session, "the session")
+        hand.settle()
+        controller = hand.window.editor.controller
+        assert states_of(controller) == whole
+        return position_of(controller) == position
+
+    for label in ("repair", "set fixed vertices", "repair"):
+        hand.choose("Edit", f"Undo {label}")
+        hand.settle()
+    assert shows(sessions[0], 1)
+    for position, number in ((4, 2), (0, 0), (3, 1), (4, 2), (2, 1), (1, 0)):
+        hand.window.editor.do(jumping_to(position))
+        assert shows(sessions[number], position)
+    for label in ("repair", "set fixed vertices", "repair"):
+        hand.choose("Edit", f"Redo {label}")
+        hand.settle()
+    assert shows(sessions[2], 4)
 
 
 @pytest.mark.campaign

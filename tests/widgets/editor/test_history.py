@@ -10,7 +10,14 @@ from scenes import sausage
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor.history import jumping_to, position_of, preview, states_of
+from vtk_segdeform.widgets.editor.actions import redo, undo
+from vtk_segdeform.widgets.editor.history import (
+    jumping_to,
+    position_of,
+    preview,
+    states_of,
+)
+from vtk_segdeform.widgets.editor.neighbours import Neighbour
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 UP = np.eye(4)
@@ -41,12 +48,44 @@ def test_states_are_named_and_a_jump_reaches_even_the_one_before_the_session(edi
     editor.do(jumping_to(1))
     assert editor.status.startswith("History: Set tip")
     assert (position_of(controller), len(states_of(controller))) == (1, 3)
-    controller.earlier = "repair", lambda: undone.append(session.position)
-    assert states_of(controller) == ("Opened", "Repair", "Set tip", "Drag tip")
-    editor.do(jumping_to(3))
-    assert (session.position, position_of(controller), undone) == (2, 3, [])
+    before = Neighbour(
+        "repair", ("Opened", "Pull"), lambda at: undone.append((session.position, at))
+    )
+    controller.neighbours.before = before
+    assert states_of(controller) == ("Opened", "Pull", "Repair", "Set tip", "Drag tip")
+    editor.do(jumping_to(4))
+    assert (session.position, position_of(controller), undone) == (2, 4, [])
     editor.do(jumping_to(0))
-    assert undone == [0]
+    assert undone == [(0, 0)]
+    assert controller.undo_label == "repair"
+    editor.do(undo)
+    assert undone == [(0, 0), (0, 1)]
+
+
+def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_replaces_them(
+    editor,
+):
+    controller, session, entered = editor.controller, editor.session, []
+    session.jump(1)
+    after = Neighbour("repair", ("Pull",), lambda at: entered.append((session.position, at)))
+    controller.neighbours.follow(session, 1, after)
+    assert states_of(controller) == ("Opened", "Set tip", "Repair", "Pull")
+    assert controller.redo_label == "repair"
+    session.jump(0)
+    assert controller.redo_label == "set tip"
+    assert states_of(controller)[2:] == ("Repair", "Pull")
+    for position in (2, 3):
+        session.jump(0)
+        editor.do(jumping_to(position))
+    session.jump(1)
+    editor.do(redo)
+    assert entered == [(1, 2), (1, 3), (1, 2)]
+    preview(controller, 2)
+    assert editor.widgets.surface.instead is None  # that pose is of another mesh
+    session.set_fixed([250])
+    assert states_of(controller) == ("Opened", "Set tip", "Set fixed vertices")
+    session.undo()
+    assert controller.redo_label == "set fixed vertices"
 
 
 def test_a_preview_shows_another_state_until_anything_happens(editor):
@@ -77,7 +116,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
     controller.start("Waiting", lambda _: None, lambda _: None)
     assert not shows_rest(0)  # during a job
     editor.wait()
-    controller.earlier = "repair", lambda: None
+    controller.neighbours.before = Neighbour("repair", ("Opened",), lambda _: None)
     assert not shows_rest(0)  # the pose before the session is not known
     assert shows_rest(1)
 
