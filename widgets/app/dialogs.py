@@ -20,6 +20,7 @@ class Answer(enum.Enum):
     """Answers of the user to a dialog."""
 
     SAVE = enum.auto()
+    SAVE_MESH = enum.auto()
     DISCARD = enum.auto()
     CANCEL = enum.auto()
     RECOVER = enum.auto()
@@ -35,14 +36,16 @@ def ask_file(parent: Any, folder: Path) -> Path | None:
 
 def ask_save(parent: Any, name: str, *, has_session: bool, mesh_is_saved: bool) -> Answer:
     """Ask whether to save the changes to the document *name*, for which there may be a session."""
+    answers = {Answer.SAVE: "Save", Answer.SAVE_MESH: "Save mesh ..."}
     warning = "Unsaved changes will be lost."
     if mesh_is_saved:
         warning = "The mesh is saved, but its regions, cages and handles are not."
+        del answers[Answer.SAVE_MESH]
     return _ask(
         parent,
         f"Save changes to {name}{'' if has_session else ' as a session'}?",
         warning,
-        {Answer.SAVE: "Save", Answer.DISCARD: "Discard", Answer.CANCEL: "Cancel"},
+        {**answers, Answer.DISCARD: "Discard", Answer.CANCEL: "Cancel"},
     )
 
 
@@ -127,6 +130,7 @@ def moment(when: datetime, now: datetime) -> str:
 
 _ROLES = {
     Answer.SAVE: "AcceptRole",
+    Answer.SAVE_MESH: "AcceptRole",
     Answer.RECOVER: "AcceptRole",
     Answer.REPAIR: "AcceptRole",
     Answer.DISCARD: "DestructiveRole",

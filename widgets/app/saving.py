@@ -78,6 +78,8 @@ def may_discard(window: Any, *, is_kept: bool = False) -> bool:
         has_session=document.session_path is not None,
         mesh_is_saved=mesh_is_saved,
     )
+    if answer is Answer.SAVE_MESH:
+        return _mesh_saved_now(window)
     return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD
 
 
@@ -87,6 +89,14 @@ def _saved_now(window: Any) -> bool:
         return False
     _settle(window)
     return not window.is_modified
+
+
+def _mesh_saved_now(window: Any) -> bool:
+    """Save the mesh, and wait until that is done."""
+    if not save_mesh(window):
+        return False
+    _settle(window)
+    return window.mesh_state is window.session.state
 
 
 def _settle(window: Any) -> None:

@@ -209,6 +209,17 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
 
 
 @BLANK
+def test_the_mesh_may_be_saved_on_closing(start, ball_file, tmp_path, monkeypatch, boxes):
+    hand = start(ball_file)
+    change(hand)
+    posed = hand.window.session.vertices
+    choose_file(monkeypatch, tmp_path / "posed.ply")
+    boxes.answers.append("Save mesh ...")
+    assert hand.window.close()
+    assert_allclose(Surface.read(tmp_path / "posed.ply").mesh.vertices, posed, atol=1e-6)
+
+
+@BLANK
 def test_recent_files_are_listed_once_behind_an_error(start, ball_file, tmp_path, monkeypatch):
     start(ball_file).window.close()
     hand, counts, program = start(), [], QtCore.QEventLoop()
@@ -273,6 +284,8 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
         assert boxes.seen[-1].startswith("Save changes to ball.vtp as a session?")
     choose_file(monkeypatch, None)
     boxes.answers.append("Save")  # but no file is chosen
+    assert not hand.window.close()
+    boxes.answers.append("Save mesh ...")
     assert not hand.window.close()
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
     boxes.answers.append("Save")
