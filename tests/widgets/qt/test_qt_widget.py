@@ -274,6 +274,15 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen.settle()
     volumes = [text for _, _, text in rows(panel.controls["regions.list"])]
     assert any(text not in ("", "0 %") for text in volumes)
+    compare, surface = panel.toolbar.buttons["compare"], seen.editor.widgets.surface
+    for expected in (MESH.vertices, bent):  # a click keeps it until the next one
+        seen.click(compare)
+        assert_array_equal(surface.points, expected)
+    compare.pressed.emit()
+    assert_array_equal(surface.points, MESH.vertices)
+    QtTest.QTest.qWait(350)
+    compare.released.emit()  # it was held
+    assert_array_equal(surface.points, bent)
     seen.click(panel.toolbar.buttons["undo"])
     assert_array_equal(seen.session.vertices, MESH.vertices)
     seen.click(panel.toolbar.buttons["redo"])
