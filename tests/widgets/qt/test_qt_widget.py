@@ -278,11 +278,6 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     for expected in (MESH.vertices, bent):  # a click keeps it until the next one
         seen.click(compare)
         assert_array_equal(surface.points, expected)
-    compare.pressed.emit()
-    assert_array_equal(surface.points, MESH.vertices)
-    QtTest.QTest.qWait(350)
-    compare.released.emit()  # it was held
-    assert_array_equal(surface.points, bent)
     seen.click(panel.toolbar.buttons["undo"])
     assert_array_equal(seen.session.vertices, MESH.vertices)
     seen.click(panel.toolbar.buttons["redo"])
@@ -986,6 +981,7 @@ def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
     seen.settle()
     bar.buttons["compare"].pressed.emit()
     assert seen.editor.controller.shows_rest
+    QtTest.QTest.qWait(350)  # a shorter press would be a click
     bar.buttons["compare"].released.emit()
     assert not seen.editor.controller.shows_rest
 
