@@ -206,8 +206,10 @@ def test_a_finished_pose_rotates_with_its_handles():
     dragged(session).finish()
     plain = session.vertices
     assert rotated(session, rotation([1.0, 2.0, 3.0], 2.0)) < 1e-4
+    assert session.can_finish
     session.undo()
     assert_array_equal(session.vertices, plain)
+    assert not session.can_finish
     # A handle made in a finished pose is where the cages do not put it.
     away = np.abs(plain - scene.mesh.vertices).sum(axis=1)
     away[session.state.handle] = 0.0

@@ -139,7 +139,6 @@ class Session(Timeline):
         self._pose_solver = PoseSolver(mesh)
         self._solution: tuple[Pose, Solution] | None = None
         self._effort = Effort(0, 0.0)
-        self._finished: Pose | None = None  # the last one accepted
         # The result of `fitted_cages`, which `set_cages` need not check.
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None
         # The state before the ongoing pull, and what it has grabbed.
@@ -886,13 +885,15 @@ class Session(Timeline):
             return False
         self._pose_solver.accept(before, pose)
         self._solution = pose, solution
-        self._finished = pose
         self._set_state(replace(self._state, pose=pose), Change(0))
         return True
 
     @property
     def _is_finished(self) -> bool:
-        return self._finished is not None and self._finished is self._state.pose
+        pose = self._state.pose
+        if pose is None or pose.finished is None:
+            return False
+        return pose.finished.cage_vertices is pose.cage_vertices  # it was not moved since then
 
     def _reason_not_to_finish(self) -> str:
         """Return why the pose cannot be finished, or ""."""
