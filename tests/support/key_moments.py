@@ -32,6 +32,7 @@ from soaking import session_of, slender
 from vtk_segdeform import Session, save_session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+from vtk_segdeform.widgets.editor import finishing
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, DEFAULT_KEYS
 from vtk_segdeform.widgets.handle_dragger import live_solve
 from vtk_segdeform.widgets.recording.film import Film
@@ -94,7 +95,8 @@ def slow_down(monkeypatch) -> None:
     """
     for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
-    monkeypatch.setattr(draft, "_REST", 0.0)
+    for waits in (draft, finishing):
+        monkeypatch.setattr(waits, "_REST", 0.0)
     monkeypatch.setattr(viewpoint, "_DURATION", 0.001)
 
 

@@ -6,7 +6,15 @@ from collections.abc import Iterator
 
 import pytest
 
-from vtk_segdeform.widgets.editor import preparing
+from vtk_segdeform.widgets.editor import controller, preparing
+
+
+@pytest.fixture(scope="session", autouse=True)
+def restless() -> Iterator[None]:
+    """Load kernels as soon as nothing happens, so that no test waits for a second of rest."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(controller, "_REST", 0.0)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -359,6 +359,7 @@ def test_kernels_are_loaded_once_the_hand_has_rested(kernels, bench, monkeypatch
         monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: seconds))
         bench.hand.tick(3)
 
+    bench.editor.controller._rest._seconds = 1.0  # as in the program
     bench.until(bench.gate.has_begun.is_set)
     bench.hand.press(bench.place + [0.0, 10.0])
     bench.hand.release()
