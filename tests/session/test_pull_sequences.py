@@ -46,8 +46,8 @@ def one_pull(session: Session, rng: np.random.Generator, near: int) -> int:
 
 TOPPLES = pytest.mark.xfail(reason="forces stored in a limb do not turn with it", strict=True)
 CAMPAIGN = [
-    pytest.param(seed, marks=[pytest.mark.campaign, *([TOPPLES] if seed == 13 else [])])
-    for seed in range(1, 30)
+    pytest.param(seed, marks=[pytest.mark.campaign, *([TOPPLES] if seed == 44 else [])])
+    for seed in [*range(1, 30), 44]
 ]
 
 
