@@ -38,7 +38,7 @@ _MOUSE = [
     ("Middle drag", "Pan"),
     ("Right drag", "Zoom"),
     ("Wheel", "Zoom to the pointer"),
-    ("Double click", "Frame the part under the pointer, or all"),
+    ("Double click", "Frame this part, or all"),
 ]
 _UNLISTED = {"equal", "backspace", "ctrl+shift+z"}  # alternatives, left out of the help card
 _CAPS = {
