@@ -34,6 +34,7 @@ _HIGHEST = 1e4  # times the initial weight
 # _COST; at a higher cost, poses begin to fold.
 _GAIN, _COST = 0.7, 1.75
 _FEWEST = 0.5  # of the tolerance: errors from which on a drag keeps its weights
+_SLACK = 1.1  # of errors above the tolerance that no weight reduces, up to which it keeps them
 _AIM = 0.95  # of the tolerance; closer to it, interpolation too often fails
 _LIVE_AIM = 0.8  # in a drag, whose targets go on
 _TRIES = 3
@@ -362,7 +363,8 @@ class WeightContinuation:
         self, run: _Run, here: _Weighted, result: SolverResult, bracket: _Bracket
     ) -> tuple[_Weighted, SolverResult]:
         """Return a solver with less weight and no larger errors, and its pose; or *here*."""
-        run.allowed = allowed = np.maximum(self._tolerance, bracket.high_errors)
+        allowed = np.maximum(self._tolerance, bracket.high_errors)
+        run.allowed = np.maximum(self._tolerance, _SLACK * bracket.high_errors)
         last = self._current
         if run.is_live and result.status is not Status.STEP_LIMIT and bracket.contains(last):
             attempt = run.solve(last)
@@ -370,7 +372,8 @@ class WeightContinuation:
                 return last, attempt
             errors = _Errors.of(last, run.places).both
             inside = bracket.high > bracket.low
-            if (errors <= allowed).all() and (errors[inside] >= _FEWEST * self._tolerance).all():
+            is_enough = (errors <= run.allowed).all()
+            if is_enough and (errors[inside] >= _FEWEST * self._tolerance).all():
                 return last, attempt
         start, aim = here.p, _LIVE_AIM if run.is_live else _AIM
         for k in range(_TRIES):
