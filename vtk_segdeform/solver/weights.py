@@ -317,10 +317,7 @@ class WeightContinuation:
         return self._followed is not None and bool(np.abs(places - self._followed).max() <= _JUMP)
 
     def _kept(self, run: _Run) -> tuple[_Weighted, SolverResult] | None:
-        """Converge from the last pose; None if its weights do not suffice.
-
-        Weights that are a little too low are raised.
-        """
+        """Converge from the last pose, with higher weights if needed; None if that fails."""
         here = self._current
         for _ in range(_TRIES):
             result = run.solve(here, run.options)
