@@ -34,16 +34,16 @@ def ask_file(parent: Any, folder: Path) -> Path | None:
     return Path(name) if name else None
 
 
-def ask_save(parent: Any, name: str, *, has_session: bool, mesh_is_saved: bool) -> Answer:
-    """Ask whether to save the changes to the document *name*, for which there may be a session."""
-    answers = {Answer.SAVE: "Save", Answer.SAVE_MESH: "Save mesh ..."}
+def ask_save(parent: Any, name: str, *, mesh_is_saved: bool) -> Answer:
+    """Ask whether to save the changes to the document *name*."""
+    answers = {Answer.SAVE: "Save session", Answer.SAVE_MESH: "Save mesh ..."}
     warning = "Unsaved changes will be lost."
     if mesh_is_saved:
         warning = "The mesh is saved, but its regions, cages and handles are not."
         del answers[Answer.SAVE_MESH]
     return _ask(
         parent,
-        f"Save changes to {name}{'' if has_session else ' as a session'}?",
+        f"Save changes to {name}?",
         warning,
         {**answers, Answer.DISCARD: "Discard", Answer.CANCEL: "Cancel"},
     )

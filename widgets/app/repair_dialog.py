@@ -88,7 +88,7 @@ class RepairDialog(QtWidgets.QDialog):
             each.setSizePolicy(policy)
         self.stage.setWordWrap(True)
         self.advice = QtWidgets.QLabel(
-            "The repaired surface starts at rest. Undo returns to the present pose."
+            "The repaired surface is not deformed. Undo returns to the current pose."
         )
         self.advice.setWordWrap(True)
         self.advice.setVisible(has_pose)

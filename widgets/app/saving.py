@@ -71,13 +71,7 @@ def may_discard(window: Any, *, is_kept: bool = False) -> bool:
     if is_kept or not window.is_modified:
         return True
     mesh_is_saved = window.mesh_state is window.session.state
-    document = window.document
-    answer = ask_save(
-        window,
-        document.name,
-        has_session=document.session_path is not None,
-        mesh_is_saved=mesh_is_saved,
-    )
+    answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
     if answer is Answer.SAVE_MESH:
         return _mesh_saved_now(window)
     return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD

@@ -220,7 +220,7 @@ class Window(QtWidgets.QMainWindow):
         )
 
     def _follow_history(self, request: Request) -> None:
-        """Let the history go on from the original of the document, and to its repaired copy."""
+        """Connect the history with that of the original, and with that of the repaired copy."""
         self._original, self._repaired = original, repaired = request.original, request.repaired
         neighbours = self.editor.controller.neighbours
         if original is not None:

@@ -189,11 +189,14 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
         until(lambda: shown.count() == 4 and shown.currentRow() == row, "the history")
         return [shown.item(k).text() for k in range(4)] == whole
 
+    def comes(wanted):
+        until(lambda: hand.window.has_mesh and hand.window.session is wanted, "the session")
+        hand.settle()
+
     assert shows(3)
     hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
-    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
-    hand.settle()
+    comes(original)
     assert hand.title == "bottle.ply* - segdeform"
     assert original.undo_label == "set fixed vertices"
     assert len(original.mesh.borders) == 3
@@ -203,23 +206,19 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     assert shows(0)
     hand.choose("Edit", "Redo set fixed vertices")
     hand.choose("Edit", "Redo repair")
-    until(lambda: hand.window.has_mesh and hand.window.session is session, "the copy")
-    hand.settle()
+    comes(session)
     assert hand.title == "bottle (repaired)* - segdeform"
     assert (session.undo_label, session.redo_label) == (None, "set fixed vertices")
     assert shows(2)
     hand.window.editor.do(jumping_to(0))
-    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
-    hand.settle()
+    comes(original)
     assert shows(0)
     hand.window.editor.do(jumping_to(3))
-    until(lambda: hand.window.has_mesh and hand.window.session is session, "the copy")
-    hand.settle()
+    comes(session)
     assert shows(3)
     hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
-    until(lambda: hand.window.has_mesh and hand.window.session is original, "the original")
-    hand.settle()
+    comes(original)
     original.set_fixed([7])  # nothing is left to redo
     assert hand.window.editor.controller.redo_label is None
     boxes.answers.append("Discard")

@@ -281,14 +281,14 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
         boxes.answers.append(answer)
         hand.choose("File", "Quit")
         assert hand.window.isVisible()
-        assert boxes.seen[-1].startswith("Save changes to ball.vtp as a session?")
+        assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
     choose_file(monkeypatch, None)
-    boxes.answers.append("Save")  # but no file is chosen
+    boxes.answers.append("Save session")  # but no file is chosen
     assert not hand.window.close()
     boxes.answers.append("Save mesh ...")
     assert not hand.window.close()
     choose_file(monkeypatch, tmp_path / "knob.segdeform")
-    boxes.answers.append("Save")
+    boxes.answers.append("Save session")
     assert hand.window.close()
     assert list(load_session(tmp_path / "knob.segdeform").handles) == ["knob"]
     again = start(ball_file)
@@ -327,7 +327,7 @@ def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, 
     if is_saving:  # so that there is nothing to ask
         hand.choose("File", "Save session")
     else:
-        boxes.answers.append("Save")
+        boxes.answers.append("Save session")
     n_asked = len(boxes.seen)
     rests.clear()
     assert hand.window.close()
@@ -362,9 +362,9 @@ def test_closing_asks_about_a_pull_that_waits_and_saves_it(
     puller.waiting.begin(pull)
     boxes.answers.append("Cancel")
     assert not hand.window.close()
-    assert boxes.seen[-1].startswith("Save changes to ball.vtp as a session?")
+    assert boxes.seen[-1].startswith("Save changes to ball.vtp?")
     choose_file(monkeypatch, tmp_path / "ball.segdeform")
-    boxes.answers.append("Save")
+    boxes.answers.append("Save session")
     threading.Timer(0.2, go_on.set).start()
     assert hand.window.close()
     assert session.undo_label == "pull"
