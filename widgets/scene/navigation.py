@@ -12,6 +12,7 @@ receive them, and the style receives every other event.  No drag of the camera w
 timers or moves of the mouse from anybody.
 
 A drag, or a click that has edited the session, is never the first half of a double click.
+A left press while another button moves the camera ends that drag, and edits nothing.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ class Navigation:
             return
         observe = self.view.observe
         self._stops = [
-            observe("LeftButtonPressEvent", self._double_click, _DOUBLE_CLICKS),
+            observe("LeftButtonPressEvent", self._left_press, _DOUBLE_CLICKS),
             observe("MouseMoveEvent", self._moved, _BELOW_WIDGETS),
             observe("MouseWheelForwardEvent", lambda: self._wheel("Forward", 1), _BELOW_WIDGETS),
             observe("MouseWheelBackwardEvent", lambda: self._wheel("Backward", -1), _BELOW_WIDGETS),
@@ -198,9 +199,13 @@ class Navigation:
         self.viewpoint.zoom(_WHEEL**clicks, pivot)
         return False
 
-    def _double_click(self) -> bool:
+    def _left_press(self) -> bool:
         self._end_withholding()
+        is_second = self._move is not None and self._button != "Left"
         self._move = None  # in case the last release never arrived
+        if is_second:
+            self._click = None
+            return True
         pointer, now = self.view.pointer(Phase.PRESS), time.monotonic()
         last, self._click = self._click, (now, pointer, self._state())
         if (

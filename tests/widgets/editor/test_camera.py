@@ -169,6 +169,25 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     assert bench.view.window.GetRenderers().GetNumberOfItems() < count
 
 
+@pytest.mark.parametrize("button", ["Middle", "Right"])
+def test_a_left_press_during_a_drag_of_another_button_edits_nothing(bench, button):
+    """A finger that slips onto the left button ends the drag; the next press edits again."""
+    bench.editor.mode = Mode.HANDLES
+    session, hand, start = bench.editor.session, bench.hand, bench.middle
+    position = session.position
+    hand.hover(start)
+    hand.event(f"{button}ButtonPressEvent", start)
+    hand.move(start + (10, 4))
+    hand.drag([start + (10, 4), start + (30, 10), start + (60, 30)])
+    hand.event(f"{button}ButtonReleaseEvent", start + (60, 30))
+    assert session.position == position
+    after = bench.camera
+    hand.drag([start, start + (30, 10)])
+    assert session.position > position
+    assert np.array_equal(bench.camera, after)
+    session.undo()
+
+
 @pytest.mark.parametrize("axis", [1, 2])
 def test_each_face_of_the_cube_is_named_upright_in_its_view(axis):
     bench = Bench()
