@@ -13,7 +13,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.mesh import self_intersections
 from vtk_segdeform.models.implicit import Limb, standing_body
 from vtk_segdeform.solver import Contact
-from vtk_segdeform.solver.contact import ContactSurface
+from vtk_segdeform.solver.contact import ContactSurface, _Pairs
 
 SIDE = [(-0.35, 0, 1.2), (-0.35, 0, 0.6), (-0.2, 0, 0.3)]
 CURVE = [*SIDE, (0, 0, 0.2), *((-x, y, z) for x, y, z in reversed(SIDE))]
@@ -101,6 +101,32 @@ def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, mon
     assert there == pytest.approx(value, rel=1e-9)
     assert turned == pytest.approx(turn.apply(slope), abs=1e-9 * np.abs(slope).max())
     assert Contact(contact.surface, contact.held | True, 1.0).value_and_slope(p)[0] == 0.0
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_on_a_way_into_contact_no_pair_is_missed(fork, through, compiled, monkeypatch):
+    """The list of pairs, searched anew now and then, has every pair that is active."""
+    deformer, end = fork[0], through[1]
+    contact, start = deformer._constraints.contact, deformer._rest_cages
+    monkeypatch.setattr(contact, "_listed", None)
+    if not compiled:
+        monkeypatch.setattr("vtk_segdeform.solver.contact.compiled_kernels", lambda: None)
+    lists, searched = [], Contact._list
+    monkeypatch.setattr(Contact, "_list", lambda *given: lists.append(0) or searched(*given))
+    a, b = np.nonzero(np.triu(~contact.surface.excluded, 1))
+    kept = ~(contact.held[a] & contact.held[b])
+    everything = np.stack([a[kept], b[kept]], axis=1)
+    values = []
+    for share in np.linspace(0.0, 1.0, 40):
+        p = start + share * (end - start)
+        y = contact.surface.rows @ p
+        pairs = _Pairs.of(contact.surface, y, everything)
+        values.append(0.0 if pairs is None else contact.stiffness * pairs.value)
+        assert contact.value_and_slope(p)[0] == pytest.approx(values[-1], rel=1e-9)
+        assert contact.value_and_slope(p, y)[0] == pytest.approx(values[-1], rel=1e-9)
+    assert 2 <= len(lists) <= 20
+    assert values[0] == 0.0
+    assert values[-1] > 0.0
 
 
 def test_far_from_contact_no_bit_changes():

@@ -23,8 +23,8 @@ Three kinds of pairs are no contact, since they are near each other at rest alre
 and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is the height of the true
 surface over its sample, and a tenth of the distance between samples.
 
-Only pairs within reach are evaluated.  Their list is valid until a sample has moved by half the
-additional distance to which it was searched.
+Only pairs that may soon be active are evaluated.  Their list is valid until a sample has moved by
+half the additional distance to which it was searched.
 
 Long because the derivatives of a pair, its search and what is no contact at rest share one formula.
 """
@@ -55,7 +55,7 @@ _FACING = 0.1, 0.6  # -<n_a, n_b> where f begins and ends to rise
 _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the next search
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
-_SLACK = 2.0  # median (h_a + h_b): additional distance of a search
+_SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
 _STIFFNESS = 5e3  # k, times the scale of the shape energy
@@ -91,7 +91,6 @@ class ContactSurface:
     excluded: BoolArray
     spacing: float  # median of h_a + h_b
     corners: sparse.csr_array  # (s, t), 1 where a face is at a sample
-    norm: float  # of W~: largest motion of a sample by motions of cage vertices of length 1
 
     @classmethod
     def of(
@@ -126,9 +125,9 @@ class ContactSurface:
         places = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
         corners = sparse.coo_array((np.ones(faces.size), places), (n, len(faces))).tocsr()
         no_pairs, spacing = np.eye(n, dtype=bool), 2.0 * float(np.median(radii))
-        norm, free = float(np.abs(rows).sum(axis=1).max(initial=1.0)), np.full(n, np.inf)
+        free = np.full(n, np.inf)
         margins = _MARGIN * radii
-        own = cls(rows, faces, areas, radii, margins, free, no_pairs, spacing, corners, norm)
+        own = cls(rows, faces, areas, radii, margins, free, no_pairs, spacing, corners)
         return own._excluding(points, edges)
 
     def with_heights(self, heights: FloatArray) -> ContactSurface:
@@ -186,7 +185,10 @@ class ContactSurface:
 
 @dataclass(eq=False)
 class Contact:
-    """The term of one `ContactSurface`; *stiffness* is k."""
+    """The term of one `ContactSurface`, whose samples are those of the volumes.
+
+    *stiffness* is k.
+    """
 
     surface: ContactSurface
     held: BoolArray  # (s,), samples whose places are given: no contact among them
@@ -199,21 +201,21 @@ class Contact:
         return cls(surface, held, _STIFFNESS * scale)
 
     def value_and_slope(
-        self, p: FloatArray, _x: FloatArray = NO_SURFACE
+        self, p: FloatArray, x: FloatArray = NO_SURFACE
     ) -> tuple[float, FloatArray]:
         """Return the term at cages *p* (m, 3), and half its gradient (m, 3)."""
-        found = self._active(p)
+        found = self._active(p, x)
         if found is None:
             return 0.0, np.zeros_like(p)
         weight = 0.5 * self.stiffness
         return 2.0 * weight * found.value, weight * (self.surface.rows.T @ found.gradient())
 
-    def hessian(self, p: FloatArray, _x: FloatArray = NO_SURFACE) -> FloatArray | None:
+    def hessian(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> FloatArray | None:
         """Return half the Gauss-Newton Hessian at *p*, (3m, 3m); or None.
 
         The derivatives of normals and weights are in it: without them poses converge slowly.
         """
-        found = self._active(p)
+        found = self._active(p, x)
         if found is None:
             return None
         jacobian = found.jacobian()
@@ -257,33 +259,20 @@ class Contact:
         pairs = self.surface.pairs_near(y, reach)
         return pairs[~self.held[pairs].all(axis=1)]
 
-    def _active(self, p: FloatArray) -> _Pairs | None:
+    def _active(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""
-        known, norm = self._listed, self.surface.norm
-        if known is not None and norm * _largest(p - known.tested) <= known.quiet:
-            return None
-        slack = _SLACK * self.surface.spacing
-        moved = np.inf if known is None else known.moved + norm * _largest(p - known.p)
-        if known is not None and moved > 0.5 * slack:  # at most; by how much exactly?
-            moved = _largest(self.surface.rows @ p - known.all)
-            known = replace(known, p=p.copy(), moved=moved)
-        if known is None or moved > 0.4 * slack:
-            known, moved = self._list(p, slack), 0.0
-        y = known.rows @ p
-        a, b = known.places.T
-        move = _lengths(y - known.y)
-        apart = np.maximum(_lengths(y[a] - y[b]) - known.reach, known.gap - move[a] - move[b])
-        quiet = min(0.5 * float(apart.min(initial=slack)), 0.5 * slack - moved)
-        self._listed = replace(known, tested=p.copy(), quiet=quiet)
-        near = apart < 0.0
-        if not near.any():
-            return None
-        return _Pairs.of(self.surface, self.surface.rows @ p, known.samples[known.places[near]])
+        surface, listed = self.surface, self._listed
+        y = x if len(x) else surface.rows @ p
+        if listed is None or 2.0 * _largest(y - listed.y) > _SLACK * surface.spacing:
+            listed = self._listed = _Listed.of(surface, y, self._list(y, _SLACK * surface.spacing))
+        return listed.active(y)
 
-    def _list(self, p: FloatArray, slack: float) -> _Listed:
-        """Return the pairs that may be in contact before a sample has moved by half the *slack*."""
+    def _list(self, y: FloatArray, slack: float) -> IntArray:
+        """Return the pairs (k, 2) that may be active before a sample has moved by half *slack*.
+
+        *y* (s, 3) are the samples.
+        """
         surface, reaches = self.surface, np.hypot(_DEPTH, _LATERAL) * self.surface.radii
-        y = surface.rows @ p
         normals, reach = surface.normals(y), 2.0 * float(reaches.max()) + slack
         kernels = compiled_kernels()
         if kernels is not None:
@@ -291,53 +280,49 @@ class Contact:
             order = np.argsort(y[:, axis])
             limits = np.array([reach, _AWAY, _OF_MOTION, slack])
             turned = [np.roll(each, -axis, axis=1) for each in (y, normals)]
-            sorted_by_x = [each[order] for each in (*turned, reaches, surface.margins)]
+            sorted_by_x = [each[order] for each in (*turned, reaches, surface.margins, self.held)]
             given = inputs(*sorted_by_x, order, surface.excluded, limits)
             count = room = _ROOM * len(y)
             while count >= room:
                 room = max(room, count + 1)
                 found = np.empty((room, 2), dtype=np.int64)
                 count = kernels.facing_pairs(*given, found)
-            a, b = np.sort(order[found[:count]], axis=1).T
-        else:
-            a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
-            facing = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
-            a, b = a[facing], b[facing]
+            return np.asarray(order[found[:count]])
+        a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
+        kept = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
+        kept &= ~(self.held[a] & self.held[b]) & ~surface.excluded[a, b]
+        a, b = a[kept], b[kept]
         e = y[a] - y[b]
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
         gap = _OF_MOTION * (gap - surface.margins[a] - surface.margins[b])
-        beyond = np.maximum(_lengths(e) - reaches[a] - reaches[b], gap)
-        kept = (beyond < slack) & ~(self.held[a] & self.held[b]) & ~surface.excluded[a, b]
-        a, b, gap = a[kept], b[kept], gap[kept]
-        samples, places = np.unique(np.stack([a, b], axis=1), return_inverse=True)
-        return _Listed(
-            p=p.copy(),
-            samples=samples,
-            rows=surface.rows[samples],
-            y=y[samples],
-            all=y,
-            places=places.reshape(-1, 2),
-            reach=reaches[a] + reaches[b],
-            gap=gap,
-            tested=p,
-        )
+        near = np.maximum(_lengths(e) - reaches[a] - reaches[b], gap) < slack
+        return np.stack([a[near], b[near]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Listed:
-    """Pairs of samples that may soon be in contact."""
+    """Pairs that may soon be active."""
 
-    p: FloatArray  # (m, 3), cages where `moved` was computed
-    samples: IntArray  # (s,), in the pairs
-    rows: FloatArray  # (s, m), W~ of them
-    y: FloatArray  # (s, 3), their positions when they were searched
-    all: FloatArray  # (n, 3), those of all samples
-    places: IntArray  # (k, 2), of the pairs among the samples
-    reach: FloatArray  # (k,), the distance from which they may be active
-    gap: FloatArray  # (k,), the least motion of both together that closes their gap
-    tested: FloatArray  # (m, 3), where they were last tested
-    moved: float = 0.0  # largest motion of a sample since the search
-    quiet: float = 0.0  # the least motion from there that makes a pair active
+    surface: ContactSurface
+    y: FloatArray  # (s, 3), the samples when the pairs were listed
+    pairs: IntArray  # (k, 2)
+    given: tuple[FloatArray, ...]  # for the kernel
+
+    @classmethod
+    def of(cls, surface: ContactSurface, y: FloatArray, pairs: IntArray) -> _Listed:
+        """Return the *pairs* (k, 2) listed with the samples at *y* (s, 3)."""
+        corners, limits = surface.corners, np.array([_DEPTH, _LATERAL, _FACING[0]])
+        faces = surface.faces, corners.indptr, corners.indices
+        given = inputs(*faces, surface.radii, surface.margins, limits, pairs)
+        return cls(surface, y, pairs, given)
+
+    def active(self, y: FloatArray) -> _Pairs | None:
+        """Return the active ones with the samples at *y* (s, 3), if there are any."""
+        pairs, kernels = self.pairs, compiled_kernels()
+        if kernels is not None:
+            found = np.empty(len(pairs), dtype=np.int64)
+            pairs = pairs[found[: kernels.opposite_pairs(*inputs(y), *self.given, found)]]
+        return _Pairs.of(self.surface, y, pairs) if len(pairs) else None
 
 
 @dataclass(frozen=True, eq=False)

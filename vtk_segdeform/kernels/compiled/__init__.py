@@ -48,7 +48,7 @@ from .half_edges import (
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
 from .normals import ring_normals, rings
-from .pairs import facing_pairs
+from .pairs import facing_pairs, opposite_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
@@ -112,6 +112,7 @@ __all__ = [
     "number_trees",
     "numbers_of_lines",
     "one_fan_each",
+    "opposite_pairs",
     "opposite_slope",
     "opposite_volumes",
     "pair_half_edges",
