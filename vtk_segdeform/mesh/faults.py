@@ -16,7 +16,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import BoolArray, FloatArray, IntArray, plain
+from ..arrays import BoolArray, FloatArray, IntArray, bounds_of, plain
 from ..errors import ArgumentError
 from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import repeats_vertex
@@ -145,8 +145,11 @@ class Search:
     def extent(self) -> float:
         """Largest side of the box around the points in faces, which are finite."""
         points = self.points if self.used.all() else self.points[self.used]
+        if not len(points):
+            return 0.0
+        low, high = bounds_of(points)
         with np.errstate(over="ignore"):
-            return float(np.ptp(points, axis=0).max(initial=0.0))
+            return float((high - low).max())
 
     @cached_property
     def number_faults(self) -> tuple[Fault, ...]:
@@ -343,7 +346,8 @@ def _outlying(points: FloatArray, used: BoolArray) -> IntArray:
     centre = np.median(some, axis=0)
     reach = _OUTLYING * float(np.median(np.abs(some - centre).max(axis=1)))
     low, high = centre - reach, centre + reach
-    if reach == 0.0 or ((low <= points.min(axis=0)).all() and (points.max(axis=0) <= high).all()):
+    lowest, highest = bounds_of(points)
+    if reach == 0.0 or ((low <= lowest).all() and (highest <= high).all()):
         return ids[:0]
     return np.flatnonzero(((points < low) | (points > high)).any(axis=1) & used)
 
