@@ -3,7 +3,7 @@
 The active handle has a gizmo at its pivot, by default its centre.  The ball moves it in the view
 plane, an arrow along an axis, a square in a plane; a ring rotates it, the outer one about the line
 of sight.  A press on the vertices of any handle activates that handle and moves it in the view
-plane.
+plane.  A pin or pulled point is moved by a pull, so that the pose around it is kept.
 
     x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
                 again: no constraint.  While rotating: about the axis; again: no constraint
@@ -21,6 +21,7 @@ same undo step.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -30,7 +31,8 @@ import numpy as np
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.checks import as_flag, require
 from vtk_segdeform.geometry import rigid_fit
-from vtk_segdeform.session import Change, Session, require_handle
+from vtk_segdeform.session import Change, Session, middle_vertex, require_handle
+from vtk_segdeform.solver import Solution
 
 from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
@@ -60,6 +62,9 @@ class HandleDragger(Widget):
     ----------
     gizmo : Gizmo
         The gizmo of the active handle.
+    pulls_with : callable
+        Returns the radius and the locality with which pins and pulled points are moved; see
+        `Session.pull`.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -71,6 +76,7 @@ class HandleDragger(Widget):
         self._picker = Picker(self._surface)
         self._marks = HandleMarks(self.view, session)
         self.gizmo = Gizmo(self.view)
+        self.pulls_with: Callable[[], tuple[float | None, float | None]] = lambda: (None, None)
         self._local = False
         self._handle: str | None = None
         self._locked: frozenset[str] = frozenset()
@@ -232,6 +238,7 @@ class HandleDragger(Widget):
         motion = self._motion_of(part, grip, press)
         self._grabbed, self._constraint = part, None
         entry = self._entry = NumberEntry()
+        move = self._mover(name)
         has_moved = committed = False
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
@@ -244,7 +251,7 @@ class HandleDragger(Widget):
                 is_far = distance > tolerance or bool(entry.text)
                 if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
                     has_moved = True
-                    self._live.solve(partial(session.move_handle, name, matrix))
+                    self._live.solve(move(matrix))
                 if has_moved or entry.text:
                     gizmo.set_caption(entry.caption(motion))
             if pointer.phase is Phase.RELEASE:
@@ -257,6 +264,21 @@ class HandleDragger(Widget):
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
             self._live.resume()
+
+    def _mover(self, name: str) -> Callable[[FloatArray], Callable[..., Solution]]:
+        """Return what moves the handle *name* by a matrix (4, 4) since now."""
+        session, ids = self.session, self.session.handles[name]
+        if len(ids) > 1 and name not in session.state.pulls:
+            return lambda matrix: partial(session.move_handle, name, matrix)
+        vertex, (radius, locality) = middle_vertex(session.mesh, ids), self.pulls_with()
+        start = session.targets[name][ids == vertex][0]
+        pull = partial(session.pull, vertex, radius=radius, locality=locality)
+
+        def moved(matrix: FloatArray) -> Callable[..., Solution]:
+            turns = (matrix[:3, :3] != np.eye(3)).any()
+            return partial(pull, matrix if turns else start + matrix[:3, 3])
+
+        return moved
 
     def _move_pivot(self, press: Pointer) -> Gesture:
         """Move the pivot of the active handle in the view plane, in one undo step."""

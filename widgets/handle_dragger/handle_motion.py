@@ -117,10 +117,13 @@ class Motion:
     def amount(self) -> str:
         """The size of the motion as text: "30.0°", or a length in the mesh's unit.
 
-        With Control the step follows: "0.25, step 0.05".
+        Along an axis it is signed, as the number that `exact` takes.  With Control the step
+        follows: "0.25, step 0.05".
         """
         if self.part.kind is Kind.ROTATION:
             amount, unit = f"{np.degrees(self._applied[0]):.1f}°", "°"
+        elif self.part.kind is Kind.AXIS:
+            amount, unit = f"{self._applied @ self._axis + 0.0:.3g}", ""
         else:
             amount, unit = f"{np.linalg.norm(self._applied):.3g}", ""
         return f"{amount}, step {self._current_step:.3g}{unit}" if self._is_stepped else amount

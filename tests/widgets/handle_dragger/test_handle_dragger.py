@@ -529,7 +529,48 @@ def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
     assert session.undo_label == "rotate handle 1"
 
 
+@pytest.mark.parametrize("way", [1.0, -1.0])
+@about_targets
+def test_the_amount_along_an_axis_is_the_number_to_type(bench, way):
+    hand, part = bench.hand, Part(Kind.AXIS, 2)
+    start, end = bench.gizmo.line(part)[[0, -1], :2]
+    place = bench.aim(part)
+    hand.press(place)
+    hand.move(place + way * 0.4 * (end - start))
+    amount, dragged = bench.captions[-1].split()[-1], bench.shift()[2]
+    assert way * dragged > 0.0
+    hand.key("Escape")
+    hand.release()
+    hand.press(bench.aim(part))
+    for character in amount:
+        hand.key({"-": "minus", ".": "period"}.get(character, character))
+    assert bench.shift()[2] == pytest.approx(dragged, rel=1e-2)
+
+
 # Handles.
+
+
+@pytest.mark.parametrize("part", [FREE, VIEW_RING])
+def test_a_pulled_point_is_moved_by_a_pull_and_what_was_pulled_elsewhere_stays(bench, part):
+    session, mesh = bench.session, SCENE.mesh
+    session.remove_handle(TIP, TOP)
+    session.set_fixed([])
+    ends = [int(np.argmin(mesh.vertices @ way)) for way in ([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0])]
+    for vertex in ends:
+        session.pull(vertex, mesh.vertices[vertex] + [0.0, 0.0, 1.0], locality=0.8)
+        session.commit("pull")
+    bench.dragger.pulls_with = lambda: (0.15 * mesh.diagonal, 0.8)
+    bench.dragger.handle = "pull 2"
+    bench.view.camera.Zoom(0.8)
+    View.render(bench.view)
+    before, place = session.vertices, bench.aim(part)
+    bench.hand.drag([place, place + [4, 4], place + [12, 8]])
+    moved = np.linalg.norm(session.vertices - before, axis=1)
+    is_far = np.linalg.norm(mesh.vertices - mesh.vertices[ends[1]], axis=1) > 0.5 * mesh.diagonal
+    assert moved.max() > 0.01
+    assert moved[is_far].max() < 0.05 * moved.max()
+    assert session.state.pulls == ("pull 1", "pull 2")
+    assert not bench.hand.failures
 
 
 @about_targets
