@@ -99,6 +99,8 @@ class RepairDialog(QtWidgets.QDialog):
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         shortcut("Esc", self, self.reject)  # the preview keeps its keys
+        for key in ("Return", "Enter"):
+            shortcut(key, self, self._press_button)
         self._lay_out(buttons)
         self._delay = QtCore.QTimer(self)
         self._delay.setSingleShot(True)
@@ -123,6 +125,9 @@ class RepairDialog(QtWidgets.QDialog):
         self.deleteLater()
         QtCore.QCoreApplication.sendPostedEvents(self, getattr(_DELETE, "value", _DELETE))
         gc.collect()  # as `Pages.delete_views`
+
+    def _press_button(self) -> None:
+        (self.cancelling if self.cancelling.hasFocus() else self.accepting).click()
 
     def _lay_out(self, buttons: Any) -> None:
         choice = QtWidgets.QHBoxLayout()

@@ -224,6 +224,7 @@ def toggle_help(controller: Controller) -> None:
 
 def cancel(controller: Controller) -> None:
     """Cancel the job, the drag or the stroke, or close the help card."""
+    controller.show_instead(None)
     controller.cancel()
 
 

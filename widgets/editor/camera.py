@@ -1,6 +1,7 @@
 """The camera of the editor: navigation, views, the up axis and the orientation cube.
 
-A session file keeps them in its header, with the mode; see `Camera.settings`.
+A session file keeps them in its header, with the mode and with the handles that are hidden or
+locked; see `Camera.settings`.
 """
 
 from __future__ import annotations
@@ -106,12 +107,19 @@ class Camera:
     # State.
 
     def settings(self, mode: Mode) -> dict[str, Any]:
-        """Return camera and *mode* for the header of a session file."""
-        return {"mode": mode.name, **self.viewpoint.settings()}
+        """Return camera, *mode*, hidden and locked handles for the header of a session file."""
+        dragger = self._widgets.dragger
+        handles = {"hidden": sorted(dragger.hidden), "locked": sorted(dragger.locked)}
+        return {"mode": mode.name, **handles, **self.viewpoint.settings()}
 
     def restore(self, settings: Mapping[str, Any]) -> Mode | None:
-        """Restore the camera of `settings`; return their mode, or None if it is damaged."""
+        """Restore all of `settings` but the mode; return that, or None if it is damaged."""
         self.viewpoint.restore(settings)
+        dragger, handles = self._widgets.dragger, self._widgets.session.handles
+        for key, change in (("hidden", dragger.set_hidden), ("locked", dragger.set_locked)):
+            names = settings.get(key)
+            for name in handles if isinstance(names, list) else ():
+                change(name, name in names)
         name = settings.get("mode")
         return Mode[name] if isinstance(name, str) and name in Mode.__members__ else None
 

@@ -29,7 +29,7 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..recording import recorded_keys
-from ..scene import Stop, View
+from ..scene import Phase, Stop, View
 from .actions import Action, show_pose, show_rest
 from .bindings import KeyChoice, keys_of
 from .controller import Controller
@@ -37,6 +37,7 @@ from .keys import Keys, key_cap, pressed_key
 from .widget_set import Mode, WidgetSet
 
 _REPEAT = 50  # milliseconds between release and press of a key that is held and repeats, at most
+_BEFORE_CAMERA = 0.5  # priority: that of the camera is 0.25
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
 
 
@@ -228,7 +229,7 @@ class DeformEditor:
                 self.view.observe("KeyPressEvent", self._key, _AFTER_WIDGETS),
                 self.view.observe("CharEvent", lambda: self._took_key, _AFTER_WIDGETS),
                 self.view.observe("KeyReleaseEvent", self._release, _AFTER_WIDGETS),
-                self.view.observe("LeftButtonPressEvent", self._show_pose),
+                self.view.observe("LeftButtonPressEvent", self._press, _BEFORE_CAMERA),
             ]
             self._controller.is_on = True
 
@@ -281,6 +282,16 @@ class DeformEditor:
             self._stop_waiting()
             self._stop_waiting = self.view.every(_REPEAT, self._show_pose)
 
+    def _press(self) -> bool:
+        """Show the pose again at a press on the mesh, which does nothing else then."""
+        controller, pointer = self._controller, self.view.pointer(Phase.PRESS)
+        if controller.widgets.surface.instead is None or pointer.alt:
+            return False
+        if controller.widgets.point_at(pointer) is None:
+            return False
+        self._show_pose()
+        return True
+
     def _show_pose(self) -> None:
         self._stop_waiting()
         show_pose(self._controller)
@@ -308,12 +319,11 @@ class DeformEditor:
         if not while_busy:
             controller.settling.flush()
         self._stop_waiting()
-        if action is not show_rest:
+        is_edit = not while_busy and action is not show_rest
+        if is_edit:  # the camera may move around the mesh at rest
             controller.show_instead(None)
         action(controller)
-        if (
-            not while_busy and action is not show_rest
-        ):  # otherwise Escape would restart the job it has just cancelled
+        if is_edit:  # otherwise Escape would restart the job it has just cancelled
             controller.prepare()
         controller.refresh()
         return None

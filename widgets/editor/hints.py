@@ -46,6 +46,8 @@ def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     if mode is Mode.DEFORM:
         return _deform_hint(widgets, keys)
     now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets)
+    if mode is Mode.REGIONS and widgets.session.state.pose is not None:
+        now += ". A stroke resets the pose"
     next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
 
@@ -103,6 +105,9 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
         return _drag_hint(session)
     if _is_volume_off(session):
         return f"Move or rotate a handle · {_volume_off(keys)}"
+    stuck = _out_of_reach(widgets)
+    if stuck:
+        return stuck
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         text = str(solution.status)
@@ -111,6 +116,16 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     next_step = "" if len(session.fixed) else fixing
     axes = f" · Local axes ({keys.cap('local_axes')})" if widgets.dragger.local else ""
     return f"Move or rotate a handle{axes}{next_step}"
+
+
+def _out_of_reach(widgets: WidgetSet) -> str:
+    """Return why no handle can be moved, or the selected one cannot; "" if it can."""
+    name, dragger = widgets.dragger.handle, widgets.dragger
+    if name is None or name not in dragger.locked | dragger.hidden:
+        return ""
+    flag, state = ("Lock", "locked") if name in dragger.locked else ("Show", "hidden")
+    verb = "Clear" if flag == "Lock" else "Set"
+    return f"{name} is {state}. {verb} {flag} in the list of handles to move it"
 
 
 def _next_step(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:

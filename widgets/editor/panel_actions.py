@@ -6,7 +6,10 @@ move the camera work during a job and during a drag, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -100,10 +103,13 @@ def renaming(name: str, new_name: str) -> Action:
     """Return the action that renames a handle."""
 
     def rename(controller: Controller) -> None:
+        was_pull = name in controller.session.state.pulls
         controller.session.rename_handle(name, new_name)
         if controller.widgets.selector.handle == name:
             controller.widgets.selector.handle = new_name
-        controller.say(f"Renamed {name} to {new_name}")
+        is_pull = new_name in controller.session.state.pulls
+        remark = ", which is now a handle" if was_pull and not is_pull else ""
+        controller.say(f"Renamed {name} to {new_name}{remark}")
 
     return rename
 
@@ -199,8 +205,9 @@ def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
 def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
-    The suffix selects the format, which may not support all arrays: see `io.write_mesh`.  A pose
-    that still converges is written once it has settled, and *then* is called.
+    The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
+    left out is said.  A pose that still converges is written once it has settled, and *then* is
+    called.
     """
 
     def export(controller: Controller) -> None:
@@ -208,11 +215,32 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        session.write_deformed(path)
-        controller.say(f"Mesh saved to {path}{controller.pose_remark}")
+        with _warnings() as remarks:
+            session.write_deformed(path)
+        saved = f"Mesh saved to {path}{controller.pose_remark}"
+        controller.say(". ".join([saved, *map(_shortened, remarks)]))
         then()
 
     return once_settled(export)
+
+
+@contextmanager
+def _warnings() -> Iterator[list[str]]:
+    """Collect the warnings that reading and writing files logs inside a ``with`` block."""
+    found: list[str] = []
+    handler, logger = logging.Handler(logging.WARNING), logging.getLogger("vtk_segdeform.io")
+    handler.emit = lambda record: found.append(record.getMessage())  # type: ignore[method-assign]
+    logger.addHandler(handler)
+    try:
+        yield found
+    finally:
+        logger.removeHandler(handler)
+
+
+def _shortened(warning: str) -> str:
+    """Return a *warning* about arrays for the status line: their names only."""
+    text = re.sub(r"\b(point|cell|field) array ", "", warning)
+    return text[:1].upper() + text[1:]
 
 
 # The camera.

@@ -67,8 +67,9 @@ class WidgetSet:
         self.dragger = HandleDragger(view, session, self.surface)
         self.puller = Puller(view, session, self.surface)
         self.puller.binds = False  # the editor does, in the background
-        self.dragger.pulls_with = lambda: (self.puller.radius, self.puller.locality)
         self.puller.is_locked = lambda name: name in self.dragger.locked
+        self.puller.is_hidden = lambda name: name in self.dragger.hidden
+        self.dragger.pulls_with = lambda: (self.puller.radius, self.puller.locality)
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()

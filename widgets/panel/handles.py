@@ -120,7 +120,7 @@ def _rows(editor: DeformEditor) -> tuple[Row, ...]:
     if is_painted and not paints_fixed and handle is None:
         colour = as_rgb(handle_colour(session, None))
         cells = Cell("0"), Cell(), Cell()
-        rows.append(Row(_NEW, "New handle (not painted yet)", colour, cells, selected=True))
+        rows.append(Row(_NEW, "New handle", colour, cells, selected=True))
     return tuple(rows)
 
 

@@ -5,6 +5,7 @@ Dots that the body hides are drawn faintly through it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,10 +37,15 @@ class Markers:
         The displayed mesh.
     picker : Picker
         Decides which dots are visible.
+    is_hidden : callable
+        ``is_hidden(name)``: whether a pin or pulled point is not shown.
     """
 
-    def __init__(self, surface: SurfaceDisplay, picker: Picker) -> None:
+    def __init__(
+        self, surface: SurfaceDisplay, picker: Picker, is_hidden: Callable[[str], bool]
+    ) -> None:
         self._surface, self._picker, self._view = surface, picker, surface.view
+        self._is_hidden = is_hidden
         self._vertices: dict[str, int] = {}
         self._highlighted: str | None = None
         self._is_shown = False
@@ -66,11 +72,12 @@ class Markers:
 
     def at(self, pointer: Pointer) -> str | None:
         """Return the visible marker nearest to *pointer* and near it, or None."""
-        if not self._vertices:
+        shown = self._shown
+        if not shown:
             return None
-        places = self._surface.points[list(self._vertices.values())]
+        places = self._surface.points[list(shown.values())]
         away = np.linalg.norm(self._view.to_display(places)[:, :2] - pointer.position, axis=1)
-        names = list(self._vertices)
+        names = list(shown)
         for k in np.argsort(away):
             if not away[k] <= _REACH * self._scale:
                 break
@@ -91,6 +98,10 @@ class Markers:
             dots.remove()
 
     @property
+    def _shown(self) -> dict[str, int]:
+        return {name: v for name, v in self._vertices.items() if not self._is_hidden(name)}
+
+    @property
     def _scale(self) -> float:
         return float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.8, 3.0))
 
@@ -102,9 +113,9 @@ class Markers:
 
     def _lay_out(self) -> None:
         """Place the dots in front of the surface, as seen from the camera."""
-        scale, pulls = self._scale, self._surface.session.state.pulls
+        scale, pulls, shown = self._scale, self._surface.session.state.pulls, self._shown
         for is_pin, size in ((True, _PIN), (False, _PULLED)):
-            ids = [v for name, v in self._vertices.items() if (name in pulls) is not is_pin]
+            ids = [v for name, v in shown.items() if (name in pulls) is not is_pin]
             places = self._surface.points[np.array(ids, dtype=np.int64)]
             rim = scale * (size + _RIM)
             for part, lift, width, colour, opacity in (

@@ -69,10 +69,9 @@ class Puller(Widget):
     Attributes
     ----------
     binds : bool
-        Whether the first pull binds a session that is not bound.  Otherwise it waits until that is
-        done elsewhere.
-    is_locked : callable
-        ``is_locked(name)``: whether a pin or pulled point must not be grabbed; by default none.
+        Whether the first pull binds the session if need be; otherwise it waits until that is done.
+    is_locked, is_hidden : callable
+        Of a name: whether a pin or pulled point must not be grabbed, or is not shown; none is.
     waiting : Waiting
         The pull that waits until the session is ready.
     """
@@ -83,13 +82,14 @@ class Puller(Widget):
             require(surface, SurfaceDisplay, "surface")
         self.binds = True
         self.is_locked: Callable[[str], bool] = lambda _: False
+        self.is_hidden: Callable[[str], bool] = lambda _: False
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         changed = partial(self._invoke, "ModifiedEvent")
         self.waiting = Waiting(self._surface, self._is_ready, self._go_on, changed)
         self._picker = Picker(self._surface)
         self._ring = BrushRing(self._surface)
-        self._markers = Markers(self._surface, self._picker)
+        self._markers = Markers(self._surface, self._picker, lambda name: self.is_hidden(name))
         self._gizmo = Gizmo(self.view)
         self._guide = Guide(self.view)
         self._caption = Caption(self.view, lambda: self._surface.points)

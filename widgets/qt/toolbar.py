@@ -120,6 +120,7 @@ class Toolbar(QtWidgets.QWidget):
         elif field.kind == "hold":
             button.pressed.connect(lambda: self._hold(name))
             button.released.connect(lambda: self._let_go(name))
+            highlighted(button)
         else:
             button.clicked.connect(lambda: press(name))
         if field.value is not None and field.kind == "button":
@@ -135,6 +136,7 @@ class Toolbar(QtWidgets.QWidget):
     def _let_go(self, name: str) -> None:
         if self._was_held or self._since.elapsed() > _CLICK:
             self._press(name, False)
+        self.refresh()
 
     def _asker(self, name: str) -> Callable[[], None]:
         def ask() -> None:

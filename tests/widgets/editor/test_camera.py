@@ -15,6 +15,7 @@ from vtkmodules.vtkInteractionStyle import (
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.editor import show_rest
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -188,6 +189,24 @@ def test_a_left_press_during_a_drag_of_another_button_edits_nothing(bench, butto
     session.undo()
 
 
+def test_the_mesh_at_rest_stays_while_the_camera_moves_until_a_press_on_it(bench):
+    controller, hand = bench.editor.controller, bench.hand
+    show_rest(controller)
+    bench.drag("Left", bench.middle, alt=True)
+    bench.drag("Left", np.array([6.0, 6.0]))
+    bench.drag("Middle", bench.middle)
+    hand.wheel(1, bench.middle)
+    hand.key("KP_1")
+    assert controller.shows_rest
+    controller.camera.viewpoint.home()
+    View.render(bench.view)
+    before, position = bench.camera, bench.editor.session.position
+    hand.drag([bench.middle, bench.middle + [20, 10]])
+    assert not controller.shows_rest
+    assert np.array_equal(bench.camera, before)
+    assert bench.editor.session.position == position
+
+
 @pytest.mark.parametrize("axis", [1, 2])
 def test_each_face_of_the_cube_is_named_upright_in_its_view(axis):
     bench = Bench()
@@ -215,10 +234,19 @@ def test_a_session_file_keeps_the_view_and_ignores_a_damaged_one(tmp_path):
     bench, path = Bench(), tmp_path / "work.segdeform"
     bench.hand.key("KP_3")
     bench.editor.mode = Mode.CAGES
+    for k in range(3):
+        bench.editor.session.add_handle([k])
+    bench.editor.widgets.dragger.set_hidden("handle 1", True)
+    bench.editor.widgets.dragger.set_locked("handle 2", True)
     bench.editor.save(path)
     kept = saved_view(path)
     other = Bench()
     other.editor.load(path)
+    dragger = other.editor.widgets.dragger
+    assert (dragger.hidden, dragger.locked) == ({"handle 1"}, {"handle 2"})
+    for damaged in (3, [{}], ["handle 7"]):
+        other.editor.controller.camera.restore({**kept, "hidden": damaged, "locked": damaged})
+        assert not (dragger.hidden | dragger.locked) - {"handle 1", "handle 2"}
     assert np.allclose(other.camera, bench.camera)
     assert other.editor.mode is Mode.CAGES
     before = other.camera

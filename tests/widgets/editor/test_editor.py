@@ -648,6 +648,25 @@ def test_the_status_line_does_not_repeat_a_result_that_the_hint_contains(bench):
     assert bench.editor.status.startswith("Volume preservation off · Brush")
 
 
+def test_the_hint_says_that_a_stroke_resets_the_pose_and_which_handle_cannot_be_moved(bench):
+    bench.type("4")
+    (name,) = bench.session.handles
+    for change, word in ((bench.editor.widgets.dragger.set_locked, "locked"),
+                         (bench.editor.widgets.dragger.set_hidden, "hidden")):  # fmt: skip
+        change(name, True)
+        bench.editor.controller.refresh()
+        assert f"{name} is {word}. " in bench.editor.status
+        change(name, False)
+        bench.editor.controller.refresh()
+        assert "Move or rotate a handle" in bench.editor.status
+    bench.type("1")
+    assert "resets the pose" not in bench.editor.status
+    bench.session.move_handle(name, np.eye(4) + 0.01 * np.eye(4, k=3))
+    bench.session.commit()
+    bench.editor.controller.refresh()
+    assert "A stroke resets the pose" in bench.editor.status
+
+
 # Jobs.
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
 from solids import icosphere
 
@@ -233,6 +233,19 @@ def test_a_locked_point_stays_and_the_reason_is_said(bench):
     assert bench.puller.remark == f"{name} is locked. Clear Lock in the list of handles to move it"
     assert bench.session.state.pose is None
     bench.puller.is_locked = lambda _: False
+    bench.hand.drag([place, place + [0, 30]])
+    assert bench.session.undo_label == "pull"
+
+
+def test_a_hidden_point_is_not_drawn_and_the_surface_there_is_pulled(bench):
+    place, vertex = bench.on()
+    name = bench.session.pin(vertex)
+    View.render(bench.view)
+    pinned = picture(bench.view)
+    bench.puller.is_hidden = lambda each: each == name
+    assert (picture(bench.view) != pinned).any()
+    bench.hand.hover(place)
+    assert bench.puller.marker_under_pointer() is None
     bench.hand.drag([place, place + [0, 30]])
     assert bench.session.undo_label == "pull"
 
