@@ -35,6 +35,7 @@ from qt_hands import (
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
 import pyvistaqt  # isort: skip
+from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.qt.widget import DeformWidget, deform_dock
@@ -210,6 +211,7 @@ def mebibytes():
 def watch_cycles(kind, times):
     """Run some cycles and check that each releases everything."""
     application()
+    compiled_kernels()  # or a thread would load them meanwhile
     memory = []
 
     def cycle(number):
@@ -239,7 +241,6 @@ def watch_cycles(kind, times):
 
 
 DELETED = """
-import time
 import shiboken6
 from qtpy import QtWidgets
 from vtk_segdeform import models
