@@ -322,6 +322,8 @@ class DeformEditor:
         is_edit = not while_busy and action is not show_rest
         if is_edit:  # the camera may move around the mesh at rest
             controller.show_instead(None)
+        else:
+            controller.widgets.leave()
         action(controller)
         if is_edit:  # otherwise Escape would restart the job it has just cancelled
             controller.prepare()

@@ -199,6 +199,11 @@ class WidgetSet:
         progress(0.0, "")
         self.overlay.prepare()
 
+    def leave(self) -> None:
+        """Show nothing at the pointer until it moves again, as the view has moved under it."""
+        self.puller.leave()
+        self.selector.leave()
+
     def finish(self) -> None:
         """Finish the ongoing drag or stroke as if the button had been released."""
         for widget in self.interactive:

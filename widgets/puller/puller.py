@@ -161,7 +161,7 @@ class Puller(Widget):
         """Start handling events, show the pins, and refine a pose that has not converged."""
         if not self.GetEnabled():
             super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self._left))
+            self._stops.append(self.view.observe("LeaveEvent", self.leave))
             self._markers.show(True)
             self._live.resume()
 
@@ -362,7 +362,6 @@ class Puller(Widget):
             self.remark = "" if self.waiting.is_shown else _PREPARING
 
     # Display.
-
     def _resize(self, clicks: int, pointer: Pointer) -> None:
         self.radius = self.radius * GROWTH**clicks
         self.on_hover(pointer)
@@ -385,7 +384,8 @@ class Puller(Widget):
         lines = self._guide.show(part, place)
         self._caption.show("" if motion is None else motion.caption, place, lines)
 
-    def _left(self) -> None:
+    def leave(self) -> None:
+        """Show nothing at the pointer until it moves again."""
         self._ring.hide()
         self._markers.highlight(None)
 

@@ -108,7 +108,7 @@ class RegionSelector(Widget):
     @tool.setter
     def tool(self, tool: Tool) -> None:
         self._tool = require(tool, Tool, "tool")
-        self._end_hover()
+        self.leave()
         self._invoke("ModifiedEvent")
 
     @property
@@ -164,14 +164,14 @@ class RegionSelector(Widget):
         """Start handling events."""
         if not self.GetEnabled():
             super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self._end_hover))
+            self._stops.append(self.view.observe("LeaveEvent", self.leave))
 
     def Off(self) -> None:  # noqa: N802
         """Stop handling events; finish an ongoing stroke."""
         try:
             super().Off()
         finally:
-            self._end_hover()
+            self.leave()
 
     def on_press(self, press: Pointer) -> Gesture | None:
         """Start a stroke; pass the press to the camera beside the mesh."""
@@ -257,7 +257,7 @@ class RegionSelector(Widget):
         hit = self._picker.hit(pointer) if self.view.contains(pointer) else None
         regions = self.session.regions
         if hit is None or (self.tool is Tool.REGION and regions is None):
-            self._end_hover()
+            self.leave()
             return
         if self.tool is Tool.REGION and regions is not None:
             number = dominant_region(regions, hit.vertex)
@@ -272,7 +272,7 @@ class RegionSelector(Widget):
             self._preview(stroke, self._target, pointer.control)
             self._hovered = now
 
-    def _end_hover(self) -> None:
+    def leave(self) -> None:
         """Hide the ring and the preview under the pointer."""
         self._ring.hide()
         if self._hovered:
@@ -312,4 +312,4 @@ class RegionSelector(Widget):
         if change & Change.POSE:
             self._ring.hide()  # the surface has moved away from it
         if change & (Change.POSE | Change.REGIONS | Change.CONSTRAINTS) and not self.is_grabbing:
-            self._end_hover()
+            self.leave()

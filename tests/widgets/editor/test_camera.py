@@ -189,6 +189,19 @@ def test_a_left_press_during_a_drag_of_another_button_edits_nothing(bench, butto
     session.undo()
 
 
+@pytest.mark.parametrize("mode", [Mode.PULL, Mode.HANDLES])
+def test_no_ring_stays_behind_where_a_view_key_was_pressed(bench, mode):
+    widgets, bench.editor.mode = bench.editor.widgets, mode
+    ring = (widgets.puller if mode is Mode.PULL else widgets.selector)._ring
+    is_shown = lambda: any(actor.GetVisibility() for actor in ring._actors)  # noqa: E731
+    bench.hand.hover(bench.middle)
+    assert is_shown()
+    bench.hand.key("KP_7")
+    assert not is_shown()
+    bench.hand.hover(bench.middle)
+    assert is_shown()
+
+
 def test_the_mesh_at_rest_stays_while_the_camera_moves_until_a_press_on_it(bench):
     controller, hand = bench.editor.controller, bench.hand
     show_rest(controller)
