@@ -262,9 +262,9 @@ class Contact:
     def _active(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""
         surface, listed = self.surface, self._listed
-        y = x if len(x) else surface.rows @ p
-        if listed is None or 2.0 * _largest(y - listed.y) > _SLACK * surface.spacing:
-            listed = self._listed = _Listed.of(surface, y, self._list(y, _SLACK * surface.spacing))
+        y, slack = x if len(x) else surface.rows @ p, _SLACK * surface.spacing
+        if listed is None or 2.0 * _largest(y - listed.y) > slack:
+            listed = self._listed = _Listed.of(surface, y.copy(), self._list(y, slack))
         return listed.active(y)
 
     def _list(self, y: FloatArray, slack: float) -> IntArray:

@@ -124,7 +124,7 @@ def _out_of_reach(widgets: WidgetSet) -> str:
     if name is None or name not in dragger.locked | dragger.hidden:
         return ""
     flag, state = ("Lock", "locked") if name in dragger.locked else ("Show", "hidden")
-    verb = "Clear" if flag == "Lock" else "Set"
+    verb = "Clear" if flag == "Lock" else "Tick"
     return f"{name} is {state}. {verb} {flag} in the list of handles to move it"
 
 
