@@ -117,9 +117,9 @@ class Camera:
         self.viewpoint.restore(settings)
         dragger, handles = self._widgets.dragger, self._widgets.session.handles
         for key, change in (("hidden", dragger.set_hidden), ("locked", dragger.set_locked)):
-            names = settings.get(key)
-            for name in handles if isinstance(names, list) else ():
-                change(name, name in names)
+            names: Any = settings.get(key)
+            for handle in handles if isinstance(names, list) else ():
+                change(handle, handle in names)
         name = settings.get("mode")
         return Mode[name] if isinstance(name, str) and name in Mode.__members__ else None
 
