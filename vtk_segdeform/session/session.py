@@ -699,6 +699,11 @@ class Session(Timeline):
         self._grasp = start, grasp
         return solution
 
+    @property
+    def last_pulled(self) -> str | None:
+        """The handle that the last call of `pull` moved, which may have been removed since."""
+        return None if self._grasp is None else self._grasp[1].name
+
     def turned(self) -> FloatArray:
         """Return the rotation (3, 3) of the surface around the pulled vertex since the press.
 

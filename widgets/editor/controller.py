@@ -93,6 +93,7 @@ class Controller:
         self._is_on = False
         self._left = False, False  # by turning off: as `_ahead`
         self._instead = ""
+        self._began_at = 0  # the position in the history when the last gesture began
         self._worker = Worker(view_timer(view), self._job_changed)
         self._preparing = Preparing(
             view_timer(view),
@@ -313,11 +314,15 @@ class Controller:
             self.messages.note(widget.remark)
         self._rest.begin()
         is_pull = widget is self.widgets.puller  # smooth, while a finish may end in a step
+        pulled = self.session.last_pulled
+        if is_pull and self.session.position != self._began_at and pulled in self.session.handles:
+            self.widgets.dragger.handle = pulled  # as in `_gesture_began`
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
 
     def _gesture_began(self, *_: object) -> None:
+        self._began_at = self.session.position
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects

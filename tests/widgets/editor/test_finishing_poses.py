@@ -239,6 +239,25 @@ def test_a_pull_stays_as_it_is_unless_contact_is_avoided(bench, avoids):  # noqa
     assert bench.editor.controller.finishing.is_pending == avoids
 
 
+def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # noqa: F811
+    """Otherwise Remove would remove the point that was pulled last but one."""
+    bench.session.bind()
+    bench.type("0")
+    bench.session.remove_handle(*bench.session.handles)
+    puller, dragger = bench.editor.widgets.puller, bench.editor.widgets.dragger
+    grabbed(bench, 0.6)
+    grabbed(bench, -0.4)
+    assert dragger.handle == "pull 2"
+    puller.radius = bench.session.mesh.diagonal
+    (vertex,) = bench.session.handles["pull 1"]
+    dot = np.array(bench.hand.at(bench.session.vertices[vertex]))
+    bench.hand.hover(dot + [14, 0])
+    assert puller.marker_under_pointer() is None
+    bench.hand.drag([dot + [14, 0], dot + [24, 10]])
+    assert list(bench.session.handles) == ["pull 1", "pull 2"]
+    assert dragger.handle == "pull 1"
+
+
 @pytest.mark.parametrize("replayed", [False, pytest.param(True, marks=pytest.mark.campaign)])
 def test_pulls_are_finished_and_add_up_and_are_replayed(bench, tmp_path, replayed):  # noqa: F811
     bench.editor.path = tmp_path / "work.segdeform"
