@@ -102,6 +102,22 @@ def automatic_locality(state: State) -> float:
     return deformer.automatic_locality(len(state.fixed) + sum(map(len, others)))
 
 
+def grabbed(mesh: Mesh, state: State, vertex: int, radius: float) -> str | None:
+    """Return the handle that a pull of *vertex* moves; None if it makes a new one.
+
+    It has that vertex, or else is the nearest pulled point within a quarter of the *radius*.
+    """
+    x = mesh.vertices
+    near = []
+    for name, ids in state.handles.items():
+        away = float(np.linalg.norm(x[ids] - x[vertex], axis=1).min())
+        if away == 0.0:
+            return name
+        if name in state.pulls and away < _SAME_POINT * radius:
+            near.append((away, name))
+    return min(near, key=lambda each: each[0])[1] if near else None
+
+
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
     """Grab the pose *vertices* (n, 3) of *state*; ConstraintError if the vertex is fixed."""
     vertex, radius, locality, turns = grip
@@ -109,15 +125,11 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
     x = mesh.vertices
     pulls = tuple(name for name in state.pulls if name in state.handles)
-    names = list(state.handles)
     away = {
         name: float(np.linalg.norm(x[ids] - x[vertex], axis=1).min())
         for name, ids in state.handles.items()
     }
-    name = next((each for each in names if away[each] == 0.0), None)
-    if name is None:
-        near = [each for each in pulls if away[each] < _SAME_POINT * radius]
-        name = min(near, key=away.__getitem__, default=None)
+    name = grabbed(mesh, state, vertex, radius)
     if locality is None:
         locality = automatic_locality(state)
     handles = state.handles
@@ -224,7 +236,7 @@ def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
     if array.ndim == 2:
         raise ConstraintError(f"to must be a point (3,) or a matrix (4, 4); got {array.shape}")
     point = checked_point(array)
-    require_near(mesh, point, "coordinates of to")
+    require_near(mesh, point, "the pulled positions")
     return point
 
 

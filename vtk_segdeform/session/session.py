@@ -684,7 +684,7 @@ class Session(Timeline):
                 grasp = pulling.as_it_is(grasp, self.turned(), self.vertices)
         targets = grasp.targets(motion)
         for points in targets.values():
-            handles.require_near(self.mesh, points, "coordinates of to")
+            handles.require_near(self.mesh, points, "the pulled positions")
         state = grasp.state
         assert state.pose is not None
         wanted = {**state.pose.targets, **targets}
@@ -698,6 +698,11 @@ class Session(Timeline):
         solution = self._drag(state, wanted, [grasp.name], (max_steps, within))
         self._grasp = start, grasp
         return solution
+
+    def grabbed(self, vertex: int, radius: float | None = None) -> str | None:
+        """Return the handle that `pull` would move with these arguments; None for a new one."""
+        vertex, radius = checked_vertex(self.mesh, vertex), checked_radius(self.mesh, radius)
+        return pulling.grabbed(self.mesh, self.state, vertex, radius)
 
     @property
     def last_pulled(self) -> str | None:

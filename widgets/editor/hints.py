@@ -8,6 +8,7 @@ from __future__ import annotations
 from vtk_segdeform.session import Session, region_name
 from vtk_segdeform.solver import Status
 
+from ..puller import LOCKED
 from ..region_selector import Paint, Tool
 from ..volume_overlay import brief, signed
 from .keys import Keys
@@ -103,11 +104,11 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
     if session.is_dragging:
         return _drag_hint(session)
-    if _is_volume_off(session):
-        return f"Move or rotate a handle · {_volume_off(keys)}"
     stuck = _out_of_reach(widgets)
     if stuck:
         return stuck
+    if _is_volume_off(session):
+        return f"Move or rotate a handle · {_volume_off(keys)}"
     solution = session.solution
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         text = str(solution.status)
@@ -119,13 +120,13 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
 
 
 def _out_of_reach(widgets: WidgetSet) -> str:
-    """Return why no handle can be moved, or the selected one cannot; "" if it can."""
+    """Return why the selected handle cannot be moved; "" if it can."""
     name, dragger = widgets.dragger.handle, widgets.dragger
-    if name is None or name not in dragger.locked | dragger.hidden:
-        return ""
-    flag, state = ("Lock", "locked") if name in dragger.locked else ("Show", "hidden")
-    verb = "Clear" if flag == "Lock" else "Tick"
-    return f"{name} is {state}. {verb} {flag} in the list of handles to move it"
+    if name in dragger.locked:
+        return LOCKED.format(name)
+    if name in dragger.hidden:
+        return f"{name} is hidden. Tick Show in the list of handles to move it"
+    return ""
 
 
 def _next_step(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:

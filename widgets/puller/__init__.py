@@ -10,8 +10,9 @@ The files, in reading order:
     caption        the amount of the pull
 """
 
-from .puller import Puller
+from .puller import LOCKED, Puller
 
 __all__ = [
+    "LOCKED",
     "Puller",
 ]

@@ -48,7 +48,7 @@ GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
-_LOCKED = "{} is locked. Clear Lock in the list of handles to move it"
+LOCKED = "{} is locked. Clear Lock in the list of handles to move it"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
 _NOT_YET = "The last pull is not computed yet. Wait a moment, or press Esc to cancel it"
 _PREPARING = "Preparing: the pull starts in a moment"
@@ -204,16 +204,18 @@ class Puller(Widget):
         hit = self._picker.hit(press) if marker is None else None
         if self.waiting.has_pull and (marker is not None or hit is not None):
             return self._refuse(_NOT_YET)
-        if marker is not None and self.is_locked(marker):
-            return self._refuse(_LOCKED.format(marker))
         if marker is not None:
             vertex = self._markers.vertex(marker)
-            return self._pull(vertex, np.array(self._surface.points[vertex]), press)
-        if hit is None:
+            point = np.array(self._surface.points[vertex])
+        elif hit is not None:
+            vertex, point = hit.vertex, hit.point
+        else:
             return None
-        if np.isin(hit.vertex, self.session.fixed):
-            return self._refuse(_FIXED)
-        return self._pull(hit.vertex, hit.point, press)
+        name = self.session.grabbed(vertex, self.radius)
+        if name is not None and self.is_locked(name):
+            return self._refuse(LOCKED.format(name))
+        is_fixed = bool(np.isin(vertex, self.session.fixed))
+        return self._refuse(_FIXED) if is_fixed else self._pull(vertex, point, press)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
         """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
@@ -250,7 +252,6 @@ class Puller(Widget):
         return True
 
     # Gestures.
-
     def _pull(self, vertex: int, point: FloatArray, press: Pointer) -> Gesture:
         """Pull *vertex*; *point*, on the surface near it, stays under the pointer."""
         session = self.session
@@ -325,7 +326,6 @@ class Puller(Widget):
         self.waiting.hide()
 
     # Pulls that wait for the session.
-
     def cancel(self) -> bool:
         """Cancel a running gesture or else a pull that waits; False if there was none."""
         if super().cancel():

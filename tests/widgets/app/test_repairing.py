@@ -458,27 +458,25 @@ def test_the_dialog_shows_the_progress_and_a_cancelled_repair_stops(shared, monk
     assert shared.title == "bottle.ply - segdeform"
 
 
+def type_in_preview(dialog, key):
+    """Type a key that ends the dialog while its preview has the focus."""
+    dialog.activateWindow()
+    dialog.preview.plotter.setFocus()
+    until(dialog.preview.plotter.hasFocus, "the focus")
+    QtTest.QTest.keyClick(dialog.preview.plotter, key)
+    until(lambda: not dialog.isVisible(), "the end of the dialog")
+
+
 def test_enter_opens_the_repaired_copy_even_if_the_preview_has_the_keys(hand, tmp_path):
     opened(hand, bottle(), tmp_path / "bottle.ply")
 
     def enter(dialog):
         until(lambda: dialog.accepting.isEnabled(), "the repair")
-        dialog.activateWindow()
-        dialog.preview.plotter.setFocus()
-        until(dialog.preview.plotter.hasFocus, "the focus")
-        QtTest.QTest.keyClick(dialog.preview.plotter, Qt.Key_Return)
-        until(lambda: not dialog.isVisible(), "the end of the dialog")
+        type_in_preview(dialog, Qt.Key_Return)
 
     repair(hand, enter)
     assert hand.title == "bottle (repaired)* - segdeform"
 
 
 def test_escape_closes_the_dialog_even_if_its_preview_has_the_keys(shared):
-    def escape(dialog):
-        dialog.activateWindow()
-        dialog.preview.plotter.setFocus()
-        until(dialog.preview.plotter.hasFocus, "the focus")
-        QtTest.QTest.keyClick(dialog.preview.plotter, Qt.Key_Escape)
-        until(lambda: not dialog.isVisible(), "the end of the dialog")
-
-    repair(shared, escape)
+    repair(shared, lambda dialog: type_in_preview(dialog, Qt.Key_Escape))

@@ -240,7 +240,7 @@ def test_a_pull_stays_as_it_is_unless_contact_is_avoided(bench, avoids):  # noqa
 
 
 def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # noqa: F811
-    """Otherwise Remove would remove the point that was pulled last but one."""
+    """Otherwise Remove would remove the point that was pulled before it."""
     bench.session.bind()
     bench.type("0")
     bench.session.remove_handle(*bench.session.handles)

@@ -231,8 +231,10 @@ def test_a_locked_point_stays_and_the_reason_is_said(bench):
     bench.puller.is_locked = lambda each: each == name
     bench.hand.drag([place, place + [0, 30]])
     assert bench.puller.remark == f"{name} is locked. Clear Lock in the list of handles to move it"
+    bench.puller.is_hidden = bench.puller.is_locked  # without a dot the surface there is grabbed
+    bench.hand.drag([place, place + [0, 30]])
     assert bench.session.state.pose is None
-    bench.puller.is_locked = lambda _: False
+    bench.puller.is_locked = bench.puller.is_hidden = lambda _: False
     bench.hand.drag([place, place + [0, 30]])
     assert bench.session.undo_label == "pull"
 
