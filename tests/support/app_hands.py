@@ -60,14 +60,20 @@ class Boxes(QtCore.QObject):
         What the boxes said.
     """
 
+    _newest = 0
+
     def __init__(self):
         super().__init__()
         self.answers, self.seen, self.unexpected = [], [], []
+        self._number = Boxes._newest = Boxes._newest + 1
         self._timer = QtCore.QTimer(self)
         self._timer.timeout.connect(self._look)
         self._timer.start(10)
 
     def _look(self):
+        if self._number != Boxes._newest:  # of a test that failed, whose objects live on
+            self._timer.stop()
+            return
         box = application().activeModalWidget()
         if not isinstance(box, QtWidgets.QMessageBox) or not box.isVisible():
             return
@@ -124,12 +130,10 @@ class AppHand:
 
     def choose(self, *path):
         """Click through menus, by the beginnings of their labels."""
-        bar = self.window.menuBar()
-        action = _named(bar, path[0])
-        _click(bar, action)
+        action = self._open_menu(path[0])
         for name in path[1:]:
             menu = action.menu()
-            until(menu.isVisible, f"the menu {path[0]}")
+            until(menu.isVisible, f"the menu {name}")
             action = _named(menu, name)
             assert action.isEnabled(), name
             _click(menu, action)
@@ -137,10 +141,7 @@ class AppHand:
 
     def reads(self, *path):
         """Return (is enabled, is ticked) of the entries of an open menu, by label."""
-        bar = self.window.menuBar()
-        action = _named(bar, path[0])
-        menus = [action.menu()]
-        _click(bar, action)
+        menus = [self._open_menu(path[0]).menu()]
         for name in path[1:]:
             action = _named(menus[-1], name)
             _click(menus[-1], action)
@@ -154,6 +155,22 @@ class AppHand:
             QtTest.QTest.keyClick(menu, Qt.Key_Escape)
         application().processEvents()
         return said
+
+    def _open_menu(self, name):
+        """Click on a menu of the bar until it is open; return its action.
+
+        The focus that returns late from a dialog can close it again.
+        """
+        bar = self.window.menuBar()
+        action = _named(bar, name)
+
+        def is_open():
+            if not action.menu().isVisible():
+                _click(bar, action)
+            return action.menu().isVisible()
+
+        until(is_open, f"the menu {name}")
+        return action
 
     def view_hand(self) -> QtHand:
         """Return a hand on the view, from the front, with handles to drag."""
