@@ -122,7 +122,29 @@ def deform(
         progress=next(stages),
     )
     solution = deformer.solve(targets, progress=next(stages))
-    return finished(deformer, solution, refine, progress=next(stages))
+    last = next(stages)
+    if not avoid_contact:
+        return finished(deformer, solution, refine, progress=last)
+    solution = finished(deformer, solution, refine, progress=part(last, 0.0, 0.5))
+    solution = _kept_apart(deformer, solution, targets, refine, part(last, 0.5, 1.0))
+    tell(last, 1.0, "solved")
+    return solution
+
+
+def _kept_apart(
+    deformer: Deformer,
+    solution: Solution,
+    targets: ArrayLike,
+    refine: bool | None,
+    progress: Progress | None,
+) -> Solution:
+    """Return *solution*, or one with firmer contact if fewer of its faces cross."""
+    if not len(solution.crossings()):
+        return solution
+    firm = deformer.with_firm_contact()
+    again = firm.solve(targets, progress=part(progress, 0.0, 0.5))
+    again = finished(firm, again, refine, progress=part(progress, 0.5, 1.0))
+    return again if len(again.crossings()) < len(solution.crossings()) else solution
 
 
 def checked_refine(refine: bool | None) -> bool | None:

@@ -58,7 +58,7 @@ _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
-_STIFFNESS = 5e3  # k, times the scale of the shape energy
+_STIFFNESS, _FIRM = 5e3, 2e4  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
@@ -196,9 +196,14 @@ class Contact:
     _listed: _Listed | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, surface: ContactSurface, held: BoolArray, scale: float) -> Contact:
-        """Return the term of *surface* beside a shape energy of this *scale*."""
-        return cls(surface, held, _STIFFNESS * scale)
+    def of(
+        cls, surface: ContactSurface, held: BoolArray, scale: float, *, is_firm: bool = False
+    ) -> Contact:
+        """Return the term of *surface* beside a shape energy of this *scale*.
+
+        A firm one keeps parts apart more often, in more steps.
+        """
+        return cls(surface, held, (_FIRM if is_firm else _STIFFNESS) * scale)
 
     def value_and_slope(
         self, p: FloatArray, x: FloatArray = NO_SURFACE
