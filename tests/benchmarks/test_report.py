@@ -110,10 +110,12 @@ def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, d
 
 
 @pytest.mark.campaign
+@pytest.mark.usefixtures("steady")
 def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
     section = drag_profile.run(TINY)
-    frame, set_up = section.tables
+    frame, options, set_up = section.tables
     assert frame.column("vertices") == set_up.column("vertices") == [500]
+    assert all(0.3 < options.column(name)[0] < 30.0 for name in ("avoid folds", "avoid contact"))
     for name in ("frame", "other", "map", "volume", "read W"):
         assert math.isfinite(frame.column(name)[0])
     assert frame.column("volume change")[0] <= 1e-12

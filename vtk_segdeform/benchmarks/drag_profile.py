@@ -57,7 +57,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             "cache to disk; *reopen* loads the binding of the same mesh, regions and cages from "
             "it.",
         ],
-        tables=[_frame_table(profiles), _set_up_table(profiles)],
+        tables=[_frame_table(profiles), _option_table(profiles), _set_up_table(profiles)],
         figures=_figures(profiles),
         ratios=_ratios(profiles),
         skipped=skipped,
@@ -79,6 +79,12 @@ def _frame_table(profiles: list[Profile]) -> Table:
         for p in profiles
     ]  # fmt: skip
     return Table(columns, rows, "a frame; times in milliseconds")
+
+
+def _option_table(profiles: list[Profile]) -> Table:
+    columns = "vertices", "avoid folds", "avoid contact"
+    rows = [(p.vertices, p.with_folds, p.with_contact) for p in profiles]
+    return Table(columns, rows, "a frame with an option, divided by one without; nothing is near")
 
 
 def _set_up_table(profiles: list[Profile]) -> Table:
@@ -129,6 +135,10 @@ def _ratios(profiles: list[Profile]) -> list[Ratio]:
             ratios.append(
                 Ratio(f"{what}, in processor time", p.processors / p.arap_processors, limit)
             )
+    ratios += [
+        Ratio(f"frame that avoids contact / frame, {p.vertices:,} vertices", p.with_contact, 1.1)
+        for p in profiles
+    ]
     for n, limit in _MAX_SET_UP.items():
         if p := by_size.get(n):
             ratios.append(Ratio(f"set-up at {n:,} vertices, s", p.set_up, limit))

@@ -60,6 +60,23 @@ def frames(deformer: Deformer, path: Sequence[FloatArray]) -> Iterator[Frame]:
         yield Frame(solution, steps, seconds, time.process_time() - start)
 
 
+def times_beside_first(deformers: Sequence[Deformer], path: Sequence[FloatArray]) -> list[float]:
+    """Return the time of a drag along *path* with each of *deformers*, divided by that of the first.
+
+    Each frame takes the steps that the first one needs.  The deformers alternate, so that the load
+    of the machine is the same for all of them.
+    """
+    spent = np.zeros(len(deformers))
+    for each in deformers:
+        each.reset()
+    for number, targets in enumerate(path):
+        steps, _ = steps_to_convergence(deformers[0].copy(), targets)
+        solves = [partial(each.solve, targets, max_steps=steps) for each in deformers]
+        times = np.array([timed(solve)[1] for solve in solves])
+        spent += times if number >= _WARM_UP else 0.0
+    return [float(each) for each in spent / spent[0]]
+
+
 def drag_path(task: Task, moves: int) -> list[FloatArray]:
     """Return targets that move by 1 % of the mesh diagonal per frame, starting at rest."""
     rest = task.mesh.vertices[task.handle]

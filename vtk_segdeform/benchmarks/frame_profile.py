@@ -7,6 +7,7 @@
     other     the rest of a frame: Hessian at its start, position constraints
     normals   at all vertices
     render    off-screen, by OpenGL
+    options   frames that avoid folds or contact, divided by those that do not
 
 Handles move by 1 % of the mesh diagonal per frame; `drags` defines when a frame has converged.
 """
@@ -25,7 +26,7 @@ from ..errors import MissingDependencyError
 from ..kernels import in_parallel, one_blas_thread
 from ..solver import total_volume
 from ..subspace import Subspace
-from .drags import drag_path, frames, seconds_per_step
+from .drags import drag_path, frames, seconds_per_step, times_beside_first
 from .drawing import drawing_seconds
 from .measuring import forget_peak, median_seconds, peak_memory, timed
 from .scale import Scale
@@ -33,6 +34,7 @@ from .tasks import bent_cactus, make_deformer, prepare, warm_up
 
 _NAN = float("nan")
 _PIECE = 1 << 18
+_OPTION_FRAMES = 15  # there, and as many back
 _PAUSE = 0.5  # seconds after the set-up, until idle threads of BLAS stop spinning
 
 
@@ -57,6 +59,8 @@ class Profile:
     read: float  # W from memory
     volume_change: float  # largest of all frames
     processors: float  # processor time of a frame
+    with_folds: float  # time of a frame that avoids folds, divided by that of one that does not
+    with_contact: float  # the same for contact
     arap: float = _NAN
     arap_processors: float = _NAN
 
@@ -96,6 +100,11 @@ def profile_of(size: int, scale: Scale) -> Profile:
     pose = drag[-1].solution.vertices
     cage_vertices = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
+    held = {"fixed": deformer.fixed, "handle": deformer.handle}
+    options = [{}, {"avoid_folds": True}, {"avoid_contact": True}]
+    variants = [deformer.hold(**held, **option) for option in options]
+    path = drag_path(task, _OPTION_FRAMES)
+    _, with_folds, with_contact = times_beside_first(variants, [*path, *path[::-1]])
     steps = seconds_per_step([smallest, (deformer, task)], scale.repeats)
     try:
         normals, render = drawing_seconds(task.mesh, pose, scale.repeats)
@@ -117,6 +126,8 @@ def profile_of(size: int, scale: Scale) -> Profile:
         normals=1e3 * normals,
         render=1e3 * render,
         read=1e3 * median(reads),
+        with_folds=with_folds,
+        with_contact=with_contact,
         processors=1e3 * median(frame.processors for frame in drag),
         volume_change=max(abs(frame.solution.volume_change) for frame in drag),
     )
