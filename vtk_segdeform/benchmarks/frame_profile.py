@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from statistics import median
 from tempfile import TemporaryDirectory
 
@@ -100,9 +101,8 @@ def profile_of(size: int, scale: Scale) -> Profile:
     pose = drag[-1].solution.vertices
     cage_vertices = drag[-1].solution.cage_vertices
     whole = total_volume(task.mesh)
-    held = {"fixed": deformer.fixed, "handle": deformer.handle}
-    options = [{}, {"avoid_folds": True}, {"avoid_contact": True}]
-    variants = [deformer.hold(**held, **option) for option in options]
+    hold = partial(deformer.hold, fixed=deformer.fixed, handle=deformer.handle)
+    variants = [hold(), hold(avoid_folds=True), hold(avoid_contact=True)]
     path = drag_path(task, _OPTION_FRAMES)
     _, with_folds, with_contact = times_beside_first(variants, [*path, *path[::-1]])
     steps = seconds_per_step([smallest, (deformer, task)], scale.repeats)

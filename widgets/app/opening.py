@@ -39,6 +39,8 @@ class Request:
     """The file of its session, if that was open before."""
     position: int | None = None
     """The position in the whole history to open it at."""
+    message: str = ""
+    """What to say then."""
 
 
 class WaitingPage(QtWidgets.QWidget):

@@ -228,21 +228,19 @@ class Window(QtWidgets.QMainWindow):
             neighbours.before = Neighbour(_REPAIR, original.names, undo)
         if repaired is not None and repaired.original is not None:
             place = len(repaired.original.names) - 1 - neighbours.count_before
-            after = Neighbour(_REPAIR, repaired.names, partial(self._redo_repair, repaired))
+            after = Neighbour(_REPAIR, repaired.names, partial(self._open_soon, repaired))
             neighbours.follow(self.session, place, after)
 
-    def _redo_repair(self, repaired: Request, position: int) -> None:
-        self._open_soon(replace(repaired, position=position))
-
-    def _undo_repair(self, original: Request, position: int) -> None:
+    def _undo_repair(self, original: Request, position: int, message: str) -> None:
         """Return from a repaired copy to the original document; the copy is kept for redo."""
         names = states_of(self.editor.controller)[len(original.names) + 1 :]
         repaired = replace(self.current, names=names)
-        self._open_soon(replace(original, repaired=repaired, position=position))
+        self._open_soon(replace(original, repaired=repaired), position, message)
 
-    def _open_soon(self, request: Request) -> None:
-        """Open another document once the current event has been handled."""
-        QtCore.QTimer.singleShot(0, self, lambda: self._open(request))
+    def _open_soon(self, request: Request, position: int, message: str) -> None:
+        """Open another document of the history once the current event has been handled."""
+        there = replace(request, position=position, message=message)
+        QtCore.QTimer.singleShot(0, self, lambda: self._open(there))
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
@@ -313,7 +311,7 @@ class Window(QtWidgets.QMainWindow):
             widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
         self._follow_history(request)
         if request.position is not None:
-            widget.editor.do(jumping_to(request.position))
+            widget.editor.do(jumping_to(request.position, request.message))
         widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         widget.session_changed.connect(lambda _: self._autosave())

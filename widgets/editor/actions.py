@@ -65,20 +65,21 @@ def undo(controller: Controller) -> None:
         controller.say("Undo: pull")
         return
     label, before = controller.undo_label, controller.neighbours.before
+    message = f"Undo: {label}" if label else "Nothing to undo"
     if not controller.session.undo() and before is not None:
-        before.enter(len(before.names) - 1)
-    controller.say(f"Undo: {label}" if label else "Nothing to undo")
+        before.enter(len(before.names) - 1, message)
+    controller.say(message)
 
 
 def redo(controller: Controller) -> None:
     """Redo the last undone step."""
     label, session, neighbours = controller.redo_label, controller.session, controller.neighbours
-    after = neighbours.after(session)
+    after, message = neighbours.after(session), f"Redo: {label}" if label else "Nothing to redo"
     if after is not None and after[0] == session.position:
-        after[1].enter(neighbours.count_before + after[0] + 1)
+        after[1].enter(neighbours.count_before + after[0] + 1, message)
     else:
         session.redo()
-    controller.say(f"Redo: {label}" if label else "Nothing to redo")
+    controller.say(message)
 
 
 def reset(controller: Controller) -> None:

@@ -30,25 +30,25 @@ def position_of(controller: Controller) -> int:
     return controller.neighbours.count_before + controller.session.position
 
 
-def jumping_to(position: int) -> Action:
-    """Return the action that undoes or redoes as many steps as lead to the state at *position*."""
+def jumping_to(position: int, message: str = "") -> Action:
+    """Return the action that undoes or redoes as many steps as lead to the state at *position*.
+
+    It says the *message*, by default the name of the state.
+    """
 
     def jump(controller: Controller) -> None:
         session, neighbours = controller.session, controller.neighbours
-        name, before, after = (
-            states_of(controller)[position],
-            neighbours.before,
-            neighbours.after(session),
-        )
+        before, after = neighbours.before, neighbours.after(session)
+        said = message or f"History: {states_of(controller)[position]}"
         place = position - neighbours.count_before
         if after is not None and place > after[0]:
             session.jump(after[0])
-            after[1].enter(position)
+            after[1].enter(position, said)
         else:
             session.jump(max(place, 0))
             if before is not None and place < 0:
-                before.enter(position)
-        controller.say(f"History: {name}")
+                before.enter(position, said)
+        controller.say(said)
 
     return jump
 

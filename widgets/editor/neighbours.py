@@ -16,8 +16,8 @@ class Neighbour:
     """The label of the step between the two sessions."""
     names: tuple[str, ...]
     """Its states that are in the history, by name."""
-    enter: Callable[[int], None]
-    """Open it in the state at a position of the whole history."""
+    enter: Callable[[int, str], None]
+    """Open it in the state at a position of the whole history, and say so by this message."""
 
 
 class Neighbours:

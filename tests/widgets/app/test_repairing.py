@@ -197,6 +197,7 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     hand.choose("Edit", "Undo set fixed vertices")
     hand.choose("Edit", "Undo repair")
     comes(original)
+    assert hand.window.editor.status.startswith("Undo: repair")
     assert hand.title == "bottle.ply* - segdeform"
     assert original.undo_label == "set fixed vertices"
     assert len(original.mesh.borders) == 3
@@ -207,11 +208,13 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     hand.choose("Edit", "Redo set fixed vertices")
     hand.choose("Edit", "Redo repair")
     comes(session)
+    assert hand.window.editor.status.startswith("Redo: repair")
     assert hand.title == "bottle (repaired)* - segdeform"
     assert (session.undo_label, session.redo_label) == (None, "set fixed vertices")
     assert shows(2)
     hand.window.editor.do(jumping_to(0))
     comes(original)
+    assert hand.window.editor.status.startswith("History: Opened")
     assert shows(0)
     hand.window.editor.do(jumping_to(3))
     comes(session)
