@@ -48,18 +48,19 @@ def test_states_are_named_and_a_jump_reaches_even_the_one_before_the_session(edi
     editor.do(jumping_to(1))
     assert editor.status.startswith("History: Set tip")
     assert (position_of(controller), len(states_of(controller))) == (1, 3)
-    before = Neighbour(
-        "repair", ("Opened", "Pull"), lambda at: undone.append((session.position, at))
-    )
-    controller.neighbours.before = before
+
+    def enter(position, message):
+        undone.append((session.position, position, message))
+
+    controller.neighbours.before = Neighbour("repair", ("Opened", "Pull"), enter)
     assert states_of(controller) == ("Opened", "Pull", "Repair", "Set tip", "Drag tip")
     editor.do(jumping_to(4))
     assert (session.position, position_of(controller), undone) == (2, 4, [])
     editor.do(jumping_to(0))
-    assert undone == [(0, 0)]
+    assert undone == [(0, 0, "History: Opened")]
     assert controller.undo_label == "repair"
     editor.do(undo)
-    assert undone == [(0, 0), (0, 1)]
+    assert undone[1:] == [(0, 1, "Undo: repair")]
 
 
 def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_replaces_them(
@@ -67,7 +68,11 @@ def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_r
 ):
     controller, session, entered = editor.controller, editor.session, []
     session.jump(1)
-    after = Neighbour("repair", ("Pull",), lambda at: entered.append((session.position, at)))
+
+    def enter(position, message):
+        entered.append((session.position, position, message))
+
+    after = Neighbour("repair", ("Pull",), enter)
     controller.neighbours.follow(session, 1, after)
     assert states_of(controller) == ("Opened", "Set tip", "Repair", "Pull")
     assert controller.redo_label == "repair"
@@ -79,7 +84,11 @@ def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_r
         editor.do(jumping_to(position))
     session.jump(1)
     editor.do(redo)
-    assert entered == [(1, 2), (1, 3), (1, 2)]
+    assert entered == [
+        (1, 2, "History: Repair"),
+        (1, 3, "History: Pull"),
+        (1, 2, "Redo: repair"),
+    ]
     preview(controller, 2)
     assert editor.widgets.surface.instead is None  # that pose is of another mesh
     session.set_fixed([250])
@@ -116,7 +125,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
     controller.start("Waiting", lambda _: None, lambda _: None)
     assert not shows_rest(0)  # during a job
     editor.wait()
-    controller.neighbours.before = Neighbour("repair", ("Opened",), lambda _: None)
+    controller.neighbours.before = Neighbour("repair", ("Opened",), lambda *_: None)
     assert not shows_rest(0)  # the pose before the session is not known
     assert shows_rest(1)
 
