@@ -305,9 +305,9 @@ def _told_poses(tell):
             digests[id(pose)] = digest(session)
             tell("pose", digests[id(pose)])
 
-    def telling_write(slot, session):
+    def telling_write(slot, session, view):
         shown = digests.get(id(session.state.pose))
-        write(slot, session)
+        write(slot, session, view)
         if shown is not None:
             tell("kept", shown)
 

@@ -428,30 +428,43 @@ class Session(Timeline):
 
     # Cages.
 
-    def set_cages(self, cages: Sequence[Cage], *, label: str = "set cages") -> None:
-        """Set the cages, one around each region; CageError if they do not fit."""
+    def set_cages(
+        self,
+        cages: Sequence[Cage],
+        *,
+        label: str = "set cages",
+        n_cage_vertices: int | None = None,
+    ) -> None:
+        """Set the cages, one around each region; CageError if they do not fit.
+
+        *n_cage_vertices*, if given, becomes the option of the same step.
+        """
         require(label, str, "label")
+        options = self._options_with(n_cage_vertices)
         regions, fitted = self._fitted
         if cages is not fitted or self.regions is not regions:
             cages = fitting_cages(self.regions, cages, self._state.region_names)
-        self._set_cages(tuple(cages), label)
+        self._set_cages(tuple(cages), label, options)
 
-    def fitted_cages(self, progress: Progress | None = None) -> tuple[Cage, ...]:
+    def fitted_cages(
+        self, progress: Progress | None = None, *, n_cage_vertices: int | None = None
+    ) -> tuple[Cage, ...]:
         """Fit cages to the regions and return them, without changing the session.
 
         This may run in another thread; pass the result to `set_cages` in the session's thread.
-        Unless the options have another number of cage vertices, it follows the number of regions.
+        *n_cage_vertices* is the total of their vertices, by default that of the options; unless
+        these have another number than the default one, it follows the number of regions.
         """
         if self.regions is None:
             raise RegionError("there are no regions to fit cages to; segment or paint them first")
-        regions = self.regions
-        cages = self._cages_around(regions, progress)
+        regions, options = self.regions, self._options_with(n_cage_vertices)
+        cages = self._cages_around(regions, options, progress)
         self._fitted = regions, cages
         return cages
 
     def fit_cages(self, progress: Progress | None = None) -> None:
         """Fit cages to the regions; if cancelled, nothing changes."""
-        self._set_cages(self.fitted_cages(progress), "fit cages")
+        self._set_cages(self.fitted_cages(progress), "fit cages", self.options)
 
     def bind(self, progress: Progress | None = None) -> None:
         """Bind the cages and constraints in advance, so that the first move does not wait."""
@@ -475,7 +488,7 @@ class Session(Timeline):
             regions = segment(self.mesh, None, progress=part(progress, 0.0, _SEGMENTED))
         cages = self.cages
         if not cages:
-            cages = self._cages_around(regions, part(progress, _SEGMENTED, _FITTED))
+            cages = self._cages_around(regions, options, part(progress, _SEGMENTED, _FITTED))
         state = State(regions, cages, options=options)
         deformer = PoseSolver(self.mesh).bind(state, part(progress, _FITTED, 1.0))
         _ = self.mesh.adjacency, self._pose_solver.lids(state)  # the first frame needs them
@@ -991,15 +1004,22 @@ class Session(Timeline):
         after = replace(self._state, regions=regions, cages=cages, region_names=names)
         self._step(label, after.at_rest())
 
-    def _cages_around(self, regions: Regions, progress: Progress | None) -> tuple[Cage, ...]:
-        wanted, offset = self.options.n_cage_vertices, self.options.offset
+    def _options_with(self, n_cage_vertices: int | None) -> Options:
+        if n_cage_vertices is None:
+            return self.options
+        return replace(self.options, n_cage_vertices=n_cage_vertices)
+
+    def _cages_around(
+        self, regions: Regions, options: Options, progress: Progress | None
+    ) -> tuple[Cage, ...]:
+        wanted, offset = options.n_cage_vertices, options.offset
         size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
         return fit_cages(
             self.mesh, regions, size, fixed=self.fixed, offset=offset, progress=progress
         )
 
-    def _set_cages(self, cages: tuple[Cage, ...], label: str) -> None:
-        self._step(label, replace(self._state, cages=cages).at_rest())
+    def _set_cages(self, cages: tuple[Cage, ...], label: str, options: Options) -> None:
+        self._step(label, replace(self._state, cages=cages, options=options).at_rest())
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
         pivots = self._state.pivots

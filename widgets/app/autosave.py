@@ -21,12 +21,12 @@ import os
 import re
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -92,8 +92,8 @@ class Slot:
         """Local time of the last autosave."""
         return datetime.fromtimestamp(self.path.stat().st_mtime)
 
-    def write(self, session: Session) -> None:
-        """Write the current state of *session*; in any thread.
+    def write(self, session: Session, view: Mapping[str, Any] | None = None) -> None:
+        """Write the current state of *session*, and the *view* of its editor; in any thread.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Slot:
         if session.surface is not None and session.surface is not self._surface:
             save_session(given, Session(session.surface))
             self._surface = session.surface
-        save_session(self.path, session, surface=False)
+        save_session(self.path, session, surface=False, view=view)
 
     def read(self, progress: Progress) -> Session:
         """Return the autosaved session, bound if it has a pose.

@@ -6,7 +6,7 @@ its display waits for the disk.  Once the work has been saved or undone, its aut
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from qtpy import QtCore
@@ -56,6 +56,7 @@ class Autosaver(QtCore.QObject):
         self._slot: Slot | None = None
         self.about = About()
         self._is_modified: Callable[[], bool] = bool
+        self._view: Callable[[], Mapping[str, Any]] = dict
         self._saved_state: object = None  # the state in the slot
         self._job: Job[None] | None = None
         self._has_failed = self._is_due = False
@@ -76,6 +77,7 @@ class Autosaver(QtCore.QObject):
         about: About,
         is_modified: Callable[[], bool],
         *,
+        view: Callable[[], Mapping[str, Any]] = dict,
         slot: Slot | None = None,
     ) -> None:
         """Save the changes of another session from now on.
@@ -88,11 +90,14 @@ class Autosaver(QtCore.QObject):
             Its document.
         is_modified : callable
             Returns whether the session has unsaved changes.
+        view : callable
+            Returns the view of its editor.
         slot : Slot, optional
             The slot that contains the session already.
         """
         self.discard()
         self._session, self.about, self._is_modified = session, about, is_modified
+        self._view = view
         self._slot, self._saved_state = slot, session.state if slot is not None else None
         self._stops.append(session.on_change(self._changed))
 
@@ -120,10 +125,11 @@ class Autosaver(QtCore.QObject):
         if not self._is_modified():
             self._remove_slot()
         elif session.state is not self._saved_state:
+            view = self._view()
             self._saved_state = session.state  # a later one may be written, and then once more
             self._job = Job(
                 qt_timer(self, _PERIOD),
-                lambda _: self._write(session),
+                lambda _: self._write(session, view),
                 done=lambda _: self._finish(None),
                 failed=self._finish,
             )
@@ -138,11 +144,11 @@ class Autosaver(QtCore.QObject):
         if not self._at_latest.isActive():
             self._at_latest.start()
 
-    def _write(self, session: Session) -> None:
+    def _write(self, session: Session, view: Mapping[str, Any]) -> None:
         """Write the session, in the other thread; it reads only the mesh and the state, once."""
         slot = self._slot if self._slot is not None else self._autosaves.new(self.about)
         self._slot = slot
-        slot.write(session)
+        slot.write(session, view)
 
     def _finish(self, error: BaseException | None) -> None:
         self._job = None

@@ -132,7 +132,7 @@ def opening_error(error: BaseException) -> str:
     """Return the message of an error raised by a reader."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {error.strerror}"
-    return error_text(error)
+    return error_text(error).replace("`", "")  # of names of functions
 
 
 def _text(path: Path | None) -> str:

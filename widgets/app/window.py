@@ -303,8 +303,8 @@ class Window(QtWidgets.QMainWindow):
         widget.editor.controller.file = file
         widget.editor.show_cube = True
         widget.editor.keys = self.keys
-        path = self.document.session_path or self.document.source
-        if path is not None and request.slot is None:
+        own = self.document.session_path or self.document.source
+        if (path := request.slot.path if request.slot else own) is not None:
             widget.editor.controller.restore_view(path)
         connect_panel(self)
         if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
@@ -355,13 +355,14 @@ class Window(QtWidgets.QMainWindow):
             self._show_page()
 
     def _autosave(self, slot: Slot | None = None) -> None:
-        self.autosaver.watch(self.session, self.document.about, lambda: self.is_modified, slot=slot)
+        watch = partial(self.autosaver.watch, view=lambda: self.editor.controller.view_settings)
+        watch(self.session, self.document.about, lambda: self.is_modified, slot=slot)
 
     def _close_document(self) -> None:
         widget, self.editor_widget = self.editor_widget, None
+        while self._stops:
+            self._stops.pop()()
         if widget is not None:
-            while self._stops:
-                self._stops.pop()()
             widget.close()
 
     # Display.

@@ -10,6 +10,7 @@ Long because each key has its function here.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from vtk_segdeform.cages import Cage
@@ -130,9 +131,10 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
     session, widgets = controller.session, controller.widgets
 
     def show(regions: Regions) -> str:
+        reset = _reset(controller)
         session.set_regions(regions, label="auto-segment")
         widgets.choose_region(min(widgets.selector.region, regions.n_regions - 1))
-        return f"{_count(regions.n_regions, 'region')} found"
+        return f"{_count(regions.n_regions, 'region')} found{reset}"
 
     def work(progress: Progress) -> Regions:
         return segment_mesh(session.mesh, n_regions, progress=progress)
@@ -140,8 +142,8 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
     controller.start("Detecting regions", work, show)
 
 
-def fit_cages(controller: Controller) -> None:
-    """Fit cages to the regions."""
+def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> None:
+    """Fit cages to the regions, with *n_cage_vertices* in total if given."""
     session, regions = controller.session, controller.session.regions
     if regions is None:
         raise RegionError(f"No regions to fit cages to. {_detecting(controller)}, or paint one")
@@ -150,11 +152,20 @@ def fit_cages(controller: Controller) -> None:
         if session.regions is not regions:  # changed in another view of the same session
             again = f"Press {controller.keys.cap('fit_cages')} to refit"
             raise RegionError(f"The regions changed while cages were being fitted. {again}")
-        session.set_cages(cages, label="fit cages")
+        reset = _reset(controller)
+        session.set_cages(cages, label="fit cages", n_cage_vertices=n_cage_vertices)
         total = sum(cage.n_vertices for cage in cages)
-        return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total"
+        return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total{reset}"
 
-    controller.start("Fitting cages", session.fitted_cages, show)
+    work = partial(session.fitted_cages, n_cage_vertices=n_cage_vertices)
+    controller.start("Fitting cages", work, show)
+
+
+def _reset(controller: Controller) -> str:
+    """Return what to say after a step from the current state that resets the pose."""
+    if controller.session.state.pose is None:
+        return ""
+    return f". The pose was reset; {controller.keys.cap('undo')} brings it back"
 
 
 def toggle_cages(controller: Controller) -> None:

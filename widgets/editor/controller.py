@@ -501,8 +501,13 @@ class Controller:
         """Write the session to the file, in the pose that is shown."""
         self.finishing.interrupt()
         place = self.place
-        self.file.write(self.session, place, self.camera.settings(self._mode))
+        self.file.write(self.session, place, self.view_settings)
         self.say(f"Saved to {place}{self.pose_remark}")
+
+    @property
+    def view_settings(self) -> dict[str, object]:
+        """Camera, mode, up axis, and what is hidden and locked, for a session file."""
+        return self.camera.settings(self._mode)
 
     @property
     def pose_remark(self) -> str:

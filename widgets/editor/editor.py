@@ -290,6 +290,7 @@ class DeformEditor:
         if controller.widgets.point_at(pointer) is None:
             return False
         self._show_pose()
+        controller.say("The pose is shown again; the next drag moves it")
         return True
 
     def _show_pose(self) -> None:

@@ -61,9 +61,10 @@ def fitting_with(n_cage_vertices: int) -> Action:
     """Return the action that sets the total number of cage vertices, and fits cages with it."""
 
     def fit(controller: Controller) -> None:
-        controller.session.change_options(n_cage_vertices=n_cage_vertices)
-        if controller.session.regions is not None:
-            fit_cages(controller)
+        if controller.session.regions is None:
+            controller.session.change_options(n_cage_vertices=n_cage_vertices)
+        else:
+            fit_cages(controller, n_cage_vertices)
 
     return fit
 

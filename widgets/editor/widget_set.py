@@ -110,7 +110,9 @@ class WidgetSet:
         """Activate the widget of *mode* and show its actors."""
         if mode is Mode.REGIONS:
             self.selector.paints = Paint.REGION
-        elif mode is Mode.HANDLES and self.selector.paints is Paint.REGION:
+        elif mode is Mode.HANDLES and (
+            self.selector.paints is Paint.REGION or not self.session.handles
+        ):
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
         self.surface.instead = None
         self.show(mode)
@@ -123,7 +125,7 @@ class WidgetSet:
         """Show what *mode* shows, and cages, volume changes and regions that are wanted."""
         self.colours.fill(
             regions=mode is Mode.REGIONS,
-            handles=mode in (Mode.HANDLES, Mode.DEFORM),
+            handles=mode in (Mode.PULL, Mode.HANDLES, Mode.DEFORM),
             hidden=self.dragger.hidden,
         )
         self.outlines.show(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from vtk_segdeform.session import Options
+
 from ..editor import (
     DeformEditor,
     finishing_after_drags,
@@ -25,8 +27,9 @@ def cages_section(editor: DeformEditor) -> Section:
     session, widgets = editor.session, editor.widgets
     options, has_regions = session.options, session.regions is not None
     fitted = sum(cage.n_vertices for cage in session.cages)
-    # The default follows the number of regions, and other numbers are met only nearly.
-    is_other = fitted not in (0, options.n_cage_vertices)
+    wanted = options.n_cage_vertices
+    if fitted and wanted == Options().n_cage_vertices:  # which follows the number of regions
+        wanted = fitted
     least = _EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
     return Section(
@@ -37,7 +40,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "cages.detail",
                 "slider",
                 "Detail",
-                "Detail of cages: release to refit them",
+                "Detail of cages: release to refit them, which resets the pose",
                 value=fitted or options.n_cage_vertices,
                 enabled=has_regions,
                 minimum=least,
@@ -51,11 +54,11 @@ def cages_section(editor: DeformEditor) -> Section:
                 "integer",
                 "Total cage vertices",
                 "Total vertices of all cages (used at next fit)",
-                value=options.n_cage_vertices,
+                value=wanted,
                 minimum=8,
                 maximum=_MOST,
                 step=10,
-                unit=f"({fitted} fitted)" if is_other else "",
+                unit=f"({fitted} fitted)" if fitted not in (0, wanted) else "",
                 act=lambda n: setting(n_cage_vertices=n),
             ),
             Field(

@@ -41,7 +41,7 @@ def regions_section(editor: DeformEditor) -> Section:
                 "regions.count",
                 "slider",
                 "Number",
-                "Number of regions: release to segment again",
+                "Number of regions: release to segment again, which resets the pose",
                 value=min(max(1, widgets.n_regions), _MOST),
                 visible=painting,
                 minimum=1,

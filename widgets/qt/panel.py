@@ -166,6 +166,14 @@ class DeformPanel(QtWidgets.QWidget):
             QtCore.QTimer.singleShot(0, self._return_focus)  # once the field has used the key
         return bool(super().eventFilter(watched, event))
 
+    def keyPressEvent(self, event: Any) -> None:  # noqa: N802
+        """Pass keys that no control uses to what had the focus before, usually the view."""
+        with contextlib.suppress(RuntimeError):  # it was deleted meanwhile
+            if self._focused is not None:
+                QtWidgets.QApplication.sendEvent(self._focused, event)
+                return
+        super().keyPressEvent(event)
+
     def _focus_changed(self, old: Any, new: Any) -> None:
         if old is not None and self.isAncestorOf(new) and not self.isAncestorOf(old):
             self._focused = old

@@ -65,6 +65,13 @@ class TableView(QtWidgets.QTreeWidget):
         super().resizeEvent(event)
         self.scrollTo(self.currentIndex())
 
+    def keyPressEvent(self, event: Any) -> None:  # noqa: N802
+        """Pass on letters and digits, which would search for a name, and are keys of the editor."""
+        if event.text().isprintable() and event.text().strip():
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
     def edit(self, index: Any, *how: Any) -> Any:
         """Edit the name, whichever column is the current one."""
         triggers = QtWidgets.QAbstractItemView.EditTrigger

@@ -664,11 +664,12 @@ def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, ar
 def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     start, arm_file, tmp_path, monkeypatch
 ):
-    threads, write = [], Slot.write
+    threads, views, write = [], [], Slot.write
 
-    def watched(slot, session):
+    def watched(slot, session, view):
         threads.append(threading.current_thread())
-        write(slot, session)
+        views.append(view)
+        write(slot, session, view)
 
     monkeypatch.setattr(Slot, "write", watched)
     hand = start(arm_file, interval=0.05)
@@ -684,17 +685,21 @@ def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     assert hand.window.session.is_dragging
     mouse.release(place)
     assert threading.main_thread() not in threads
+    assert views[-1] == hand.window.editor.controller.view_settings
 
 
 @BLANK
 def test_abandoned_work_is_offered_and_recovered(start, bent, arm_file, tmp_path, boxes):
-    left(tmp_path, bent, About("arm.segdeform", str(arm_file)))
+    view = {"mode": "HANDLES", "locked": ["handle 1"], "hidden": []}
+    left(tmp_path, bent, About("arm.segdeform", str(arm_file)), view)
     boxes.answers.append("Recover")
     hand = start(arm_file)
     said = boxes.seen[0]
     assert said.startswith("Recover unsaved work on arm.segdeform from ")
     assert said.splitlines()[0].endswith("?")
     assert digest(hand.window.session) == digest(bent)
+    assert hand.window.editor.mode is Mode.HANDLES
+    assert hand.window.editor.widgets.dragger.locked == {"handle 1"}
     assert hand.title == "arm.segdeform* - segdeform"  # still unsaved
     assert len(slots(tmp_path)) == 1  # it would survive another crash
     hand.choose("File", "Save session")
@@ -772,10 +777,10 @@ def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file
     hand.settle()
 
 
-def left(tmp_path, session, about):
+def left(tmp_path, session, about, view=None):
     """Leave an autosave; return its file."""
     slot = Autosaves(tmp_path / "unsaved").new(about)
-    slot.write(session)
+    slot.write(session, view)
     slot.release()
     os.utime(slot.path, (1e9 + ord(about.name[0]),) * 2)
     return slot.path

@@ -216,6 +216,7 @@ def test_the_mesh_at_rest_stays_while_the_camera_moves_until_a_press_on_it(bench
     before, position = bench.camera, bench.editor.session.position
     hand.drag([bench.middle, bench.middle + [20, 10]])
     assert not controller.shows_rest
+    assert "The pose is shown again" in bench.editor.status
     assert np.array_equal(bench.camera, before)
     assert bench.editor.session.position == position
 

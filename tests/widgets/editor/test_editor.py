@@ -21,6 +21,7 @@ from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.widgets.editor import actions
+from vtk_segdeform.widgets.editor import panel_actions as actions_of_panel
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.job import _Shared
@@ -336,6 +337,27 @@ def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
     assert [style for style, _ in seen] == [SurfaceStyle.EDGES, SurfaceStyle.WIREFRAME, shaded]
     for k in range(3):
         assert np.mean(np.any(seen[k][1] != seen[k - 1][1], axis=2)) > 0.02
+
+
+@pytest.mark.parametrize("mode", [Mode.PULL, Mode.DEFORM])
+def test_painted_handles_are_coloured_where_they_hold_the_surface(bench, mode):
+    (name,) = bench.session.handles
+    bench.editor.mode = mode
+    shown = picture(bench.view)
+    bench.editor.do(actions_of_panel.hiding_handle(name, True))
+    hidden = picture(bench.view)
+    assert np.any(shown != hidden, axis=2).sum() > 100
+
+
+def test_a_stroke_paints_a_handle_once_something_is_fixed(bench):
+    session, selector = bench.session, bench.editor.widgets.selector
+    bench.type("3", "s", "2", "3")
+    assert selector.paints is Paint.FIXED  # as before, since there is a handle
+    session.remove_handle(next(iter(session.handles)))
+    for fixed, paints in ((session.fixed, Paint.HANDLE), ([], Paint.FIXED)):
+        session.set_fixed(fixed)
+        bench.type("2", "3")
+        assert selector.paints is paints
 
 
 def test_keys_select_the_target_of_painting(bench):

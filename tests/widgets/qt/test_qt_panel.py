@@ -214,6 +214,18 @@ def test_keys_act_on_the_view_again_after_a_field(widget, key):
     until(widget.plotter.hasFocus, "the focus")
 
 
+def test_letters_and_digits_in_a_list_are_keys_of_the_editor(widget):
+    widget.editor.mode = Mode.HANDLES
+    settle(widget)
+    table = widget.panel.controls["handles.list"]
+    focus(widget.plotter)
+    focus(table)
+    table.setCurrentItem(table.topLevelItem(1))
+    QtTest.QTest.keyClick(table, Qt.Key.Key_0)
+    assert widget.editor.mode is Mode.PULL
+    assert table.currentIndex().row() == 1
+
+
 def test_keys_act_on_the_view_again_after_renaming(widget):
     widget.editor.mode = Mode.HANDLES
     settle(widget)

@@ -461,8 +461,13 @@ def test_options_are_steps_and_are_shown_when_they_are_undone(make):
 def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen):
     session, before = seen.session, seen.session.cages
     seen.mode(Mode.REGIONS)
+    up = np.eye(4)
+    up[2, 3] = 0.1
+    session.move_handle(next(iter(session.handles)), up)
+    session.commit()
     seen.panel.controls["regions.count"].setValue(3)
     seen.settle()
+    assert "3 regions found. The pose was reset; Z brings it back" in seen.editor.status
     assert session.regions.n_regions == seen.panel.controls["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
     slider = seen.panel.controls["cages.detail"]
@@ -481,13 +486,19 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     )
     assert seen.panel.controls["cages.total"].text() == "40"
     assert seen.panel.controls["cages.detail"].minimum() == 3 * 12  # for each region
-    for _ in range(3):  # the cages, their number, the regions
+    assert "40 vertices in total" in seen.editor.status
+    assert "The pose was reset" not in seen.editor.status  # there was none
+    for _ in range(2):  # the cages with their number, the regions
         seen.click(seen.panel.toolbar.buttons["undo"])
     assert session.cages == before
+    assert session.state.pose is not None
     assert seen.panel.controls["regions.count"].value() == session.regions.n_regions == 2
     count = sum(cage.n_vertices for cage in before)
     assert seen.panel.controls["cages.detail"].value() == count
-    assert seen.panel.controls["cages.total"].text() == f"155 ({count} fitted)"
+    assert seen.panel.controls["cages.total"].text() == str(count)  # that of the default
+    session.change_options(n_cage_vertices=90)
+    seen.settle()
+    assert seen.panel.controls["cages.total"].text() == f"90 ({count} fitted)"
 
 
 def test_the_panel_follows_keys_and_the_wheel(seen):
