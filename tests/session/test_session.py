@@ -457,6 +457,33 @@ def test_cages_just_fitted_are_taken_as_they_are_but_not_for_other_regions(monke
         session.set_cages(cages)
 
 
+@pytest.mark.parametrize("by_pull", [False, True])
+def test_other_cages_are_carried_to_the_pose(by_pull):
+    """A pull that was carried is refined about its own pose, not towards that of the whole body."""
+    session = ready()
+    if by_pull:
+        session.set_fixed([])
+        session.remove_handle(next(iter(session.handles)))
+        tip = int(session.mesh.vertices[:, 0].argmax())
+        session.pull(tip, session.mesh.vertices[tip] + [0.0, 0.0, 0.6])
+        session.commit("pull")
+    else:
+        session.drag(SCENE.turned(40))
+        session.commit()
+    before, diagonal = session.vertices, session.mesh.diagonal
+    assert session.carried(session.cages) is not None
+    cages = session.fitted_cages(n_cage_vertices=90)
+    session.set_cages(cages, posed=session.carried(cages), n_cage_vertices=90)
+    for _ in range(2):
+        assert np.linalg.norm(session.vertices - before, axis=1).max() < 0.02 * diagonal
+        assert abs(session.volume_change) < 1e-12
+        session.refine()
+    session.undo()
+    assert_array_equal(session.vertices, before)
+    session.reset_pose()
+    assert session.carried(cages) is None
+
+
 def test_options_of_fitting_need_no_new_binding_and_others_do():
     session = ready()
     session.bind()

@@ -50,6 +50,8 @@ _CONSTRAINT_OPTIONS = (
 _TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
 _LIVE_TURNS = 12  # the same of live solves for the same targets
 _MAX_TURNED = 3  # rotations in memory: of the finished pose, the last one and the next
+_CARRIED = 4000  # about as many vertices, at most, to which cages are carried
+_HELD, _DAMPING = 30.0, 1e-6  # weights of fixed vertices and handles, and of cages at rest
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -298,6 +300,28 @@ class PoseSolver:
         pose = replace(pose, targets=targets_at(state.handles, x))
         self._evaluated = pose, state.options.lids, x, change  # targets do not change the vertices
         return pose
+
+    def carried(
+        self, state: State, x: FloatArray, progress: Progress | None = None
+    ) -> tuple[FloatArray, ...]:
+        """Return the cage vertices (m_r, 3) of *state* whose mesh is nearest to *x* (n, 3).
+
+        In the sense of least squares over some thousand vertices, of which fixed ones and handles
+        count most.  It binds *state*, and may run in another thread, as `bind`.
+        """
+        deformer = self.bind(state, progress)
+        held = np.concatenate([state.fixed, state.handle])
+        every = np.arange(self._mesh.n_vertices)
+        some = [each[:: max(1, len(each) // _CARRIED)] for each in (every, held)]
+        ids, counts = np.concatenate(some), [len(each) for each in some]
+        weights = np.repeat([1.0, _HELD], counts)[:, None]
+        rows = weights * deformer.subspace.at(ids)
+        moved = rows.T @ (weights * (x - self._mesh.vertices)[ids])
+        normal = rows.T @ rows
+        normal[np.diag_indices_from(normal)] += _DAMPING * np.trace(normal) / len(normal)
+        rest = np.concatenate([cage.vertices for cage in state.cages])
+        p = rest + np.linalg.solve(normal, moved)
+        return tuple(p[columns] for columns in deformer.subspace.columns)
 
     def _restore_volume(
         self, state: State, cage_vertices: tuple[FloatArray, ...]

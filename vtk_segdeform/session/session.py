@@ -434,17 +434,37 @@ class Session(Timeline):
         *,
         label: str = "set cages",
         n_cage_vertices: int | None = None,
+        posed: Sequence[FloatArray] | None = None,
     ) -> None:
         """Set the cages, one around each region; CageError if they do not fit.
 
-        *n_cage_vertices*, if given, becomes the option of the same step.
+        *n_cage_vertices*, if given, becomes the option of the same step.  The pose is reset, unless
+        the vertices *posed* (m_r, 3) of the cages are given; see `carried`.
         """
         require(label, str, "label")
         options = self._options_with(n_cage_vertices)
         regions, fitted = self._fitted
         if cages is not fitted or self.regions is not regions:
             cages = fitting_cages(self.regions, cages, self._state.region_names)
-        self._set_cages(tuple(cages), label, options)
+        self._set_cages(tuple(cages), label, options, posed)
+
+    def carried(
+        self,
+        cages: Sequence[Cage],
+        progress: Progress | None = None,
+        *,
+        n_cage_vertices: int | None = None,
+    ) -> tuple[FloatArray, ...] | None:
+        """Return the vertices (m_r, 3) that other *cages* have in the current pose; None at rest.
+
+        The mesh is nearly where it is now.  This may run in another thread, as `fitted_cages`; pass
+        the result to `set_cages`.
+        """
+        if self._state.pose is None:
+            return None
+        options = self._options_with(n_cage_vertices)
+        state = replace(self._state, cages=tuple(cages), options=options).at_rest()
+        return self._pose_solver.carried(state, self.vertices, progress)
 
     def fitted_cages(
         self, progress: Progress | None = None, *, n_cage_vertices: int | None = None
@@ -1018,8 +1038,22 @@ class Session(Timeline):
             self.mesh, regions, size, fixed=self.fixed, offset=offset, progress=progress
         )
 
-    def _set_cages(self, cages: tuple[Cage, ...], label: str, options: Options) -> None:
-        self._step(label, replace(self._state, cages=cages, options=options).at_rest())
+    def _set_cages(
+        self,
+        cages: tuple[Cage, ...],
+        label: str,
+        options: Options,
+        posed: Sequence[FloatArray] | None = None,
+    ) -> None:
+        after = replace(self._state, cages=cages, options=options).at_rest()
+        if posed is not None:
+            local = self._state.locality
+            after = replace(after, fixed_at=self._state.fixed_at)
+            pose = self._pose_solver.free_form(after, posed)
+            if local is not None:
+                local = replace(local, cage_vertices=pose.cage_vertices)
+            after = replace(after, pose=pose, locality=local)
+        self._step(label, after)
 
     def _set_handles(self, after: Mapping[str, IntArray], label: str) -> None:
         pivots = self._state.pivots

@@ -24,7 +24,7 @@ and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is th
 surface over its sample, and a tenth of the distance between samples.
 
 Only pairs that may soon be active are evaluated.  Their list is valid until a sample has moved by
-half the additional distance to which it was searched.
+half the additional distance to which it was searched, apart from the mean motion.
 
 Long because the derivatives of a pair, its search and what is no contact at rest share one formula.
 """
@@ -56,6 +56,7 @@ _AWAY = 0.8  # <n_a, n_b> of samples that face away from each other until the ne
 _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of the normals
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
+_PARTS = 16  # of that distance, by which pairs are sorted
 _FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
 _STIFFNESS, _FIRM = 5e3, 2e4  # k, times the scale of the shape energy
@@ -194,6 +195,7 @@ class Contact:
     held: BoolArray  # (s,), samples whose places are given: no contact among them
     stiffness: float
     _listed: _Listed | None = field(default=None, repr=False)
+    _last: tuple[FloatArray, _Pairs | None] = field(default=(NO_SURFACE, None), repr=False)
 
     @classmethod
     def of(
@@ -266,16 +268,25 @@ class Contact:
 
     def _active(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""
-        surface, listed = self.surface, self._listed
-        y, slack = x if len(x) else surface.rows @ p, _SLACK * surface.spacing
-        if listed is None or 2.0 * _largest(y - listed.y) > slack:
-            listed = self._listed = _Listed.of(surface, y.copy(), self._list(y, slack))
-        return listed.active(y)
+        last, found = self._last
+        if np.array_equal(p, last):
+            return found
+        y = x if len(x) else self.surface.rows @ p
+        pairs = None if self._listed is None else self._listed.near(y)
+        if pairs is None:
+            slack = _SLACK * self.surface.spacing
+            listed = _Listed.of(self.surface, y.copy(), *self._list(y, slack), slack=slack)
+            self._listed, pairs = listed, listed.near(y)
+        found = None
+        if pairs is not None and len(pairs):
+            found = _Pairs.of(self.surface, y, pairs)
+        self._last = p.copy(), found
+        return found
 
-    def _list(self, y: FloatArray, slack: float) -> IntArray:
+    def _list(self, y: FloatArray, slack: float) -> tuple[IntArray, FloatArray]:
         """Return the pairs (k, 2) that may be active before a sample has moved by half *slack*.
 
-        *y* (s, 3) are the samples.
+        And how far each of them is beyond the reach of a pair.  *y* (s, 3) are the samples.
         """
         surface, reaches = self.surface, np.hypot(_DEPTH, _LATERAL) * self.surface.radii
         normals, reach = surface.normals(y), 2.0 * float(reaches.max()) + slack
@@ -284,50 +295,72 @@ class Contact:
             axis = int(np.argmax(np.ptp(y, axis=0)))
             order = np.argsort(y[:, axis])
             limits = np.array([reach, _AWAY, _OF_MOTION, slack])
-            turned = [np.roll(each, -axis, axis=1) for each in (y, normals)]
-            sorted_by_x = [each[order] for each in (*turned, reaches, surface.margins, self.held)]
-            given = inputs(*sorted_by_x, order, surface.excluded, limits)
+            turned = [np.roll(each, -axis, axis=1).T for each in (y, normals)]
+            samples = np.concatenate([*turned, [reaches], [surface.margins]])[:, order]
+            given = inputs(samples, self.held[order], order, surface.excluded, limits)
             count = room = _ROOM * len(y)
             while count >= room:
                 room = max(room, count + 1)
-                found = np.empty((room, 2), dtype=np.int64)
-                count = kernels.facing_pairs(*given, found)
-            return np.asarray(order[found[:count]])
+                found, beyond = np.empty((room, 2), dtype=np.int64), np.empty(room)
+                count = kernels.facing_pairs(*given, found, beyond)
+            return np.asarray(order[found[:count]]), beyond[:count]
         a, b = np.sort(cKDTree(y).query_pairs(reach, output_type="ndarray"), axis=1).T
-        kept = np.einsum("ij,ij->i", normals[a], normals[b]) < _AWAY
-        kept &= ~(self.held[a] & self.held[b]) & ~surface.excluded[a, b]
+        kept = ~(self.held[a] & self.held[b]) & ~surface.excluded[a, b]
         a, b = a[kept], b[kept]
-        e = y[a] - y[b]
+        e, cosine = y[a] - y[b], np.einsum("ij,ij->i", normals[a], normals[b])
         gap = 0.5 * np.einsum("ij,ij->i", normals[b] - normals[a], e)
         gap = _OF_MOTION * (gap - surface.margins[a] - surface.margins[b])
-        near = np.maximum(_lengths(e) - reaches[a] - reaches[b], gap) < slack
-        return np.stack([a[near], b[near]], axis=1)
+        beyond = np.maximum(_lengths(e) - reaches[a] - reaches[b], gap)
+        near = (beyond < slack) & (cosine < _AWAY)
+        return np.stack([a[near], b[near]], axis=1), beyond[near]
 
 
 @dataclass(frozen=True, eq=False)
 class _Listed:
     """Pairs that may soon be active."""
 
-    surface: ContactSurface
     y: FloatArray  # (s, 3), the samples when the pairs were listed
     pairs: IntArray  # (k, 2)
+    farthest: float  # motion since then, apart from the mean, for which the list is valid
     given: tuple[FloatArray, ...]  # for the kernel
 
     @classmethod
-    def of(cls, surface: ContactSurface, y: FloatArray, pairs: IntArray) -> _Listed:
-        """Return the *pairs* (k, 2) listed with the samples at *y* (s, 3)."""
-        corners, limits = surface.corners, np.array([_DEPTH, _LATERAL, _FACING[0]])
-        faces = surface.faces, corners.indptr, corners.indices
-        given = inputs(*faces, surface.radii, surface.margins, limits, pairs)
-        return cls(surface, y, pairs, given)
+    def of(
+        cls,
+        surface: ContactSurface,
+        y: FloatArray,
+        pairs: IntArray,
+        beyond: FloatArray,
+        *,
+        slack: float,
+    ) -> _Listed:
+        """Return the *pairs* (k, 2) listed with the samples at *y* (s, 3).
 
-    def active(self, y: FloatArray) -> _Pairs | None:
-        """Return the active ones with the samples at *y* (s, 3), if there are any."""
+        *beyond* (k,) is how far each was beyond the reach of a pair, at most *slack*.  Those that
+        are the farther beyond come the later, and are tested only once something has moved that
+        far.
+        """
+        part = np.clip(_PARTS * beyond / slack, 0, _PARTS - 1).astype(np.int8)
+        pairs = pairs[np.argsort(part, kind="stable")]
+        ends = np.cumsum(np.bincount(part, minlength=_PARTS))
+        farthest = 0.5 * slack
+        corners, limits = surface.corners, np.array([_DEPTH, _LATERAL, _FACING[0], farthest])
+        faces = surface.faces, corners.indptr, corners.indices
+        given = inputs(y, *faces, surface.radii, surface.margins, limits, pairs, ends)
+        return cls(y, pairs, farthest, given)
+
+    def near(self, y: FloatArray) -> IntArray | None:
+        """Return those that may be active with the samples at *y* (s, 3).
+
+        None if a sample has moved too far since the pairs were listed.
+        """
         pairs, kernels = self.pairs, compiled_kernels()
-        if kernels is not None:
-            found = np.empty(len(pairs), dtype=np.int64)
-            pairs = pairs[found[: kernels.opposite_pairs(*inputs(y), *self.given, found)]]
-        return _Pairs.of(self.surface, y, pairs) if len(pairs) else None
+        if kernels is None:
+            motion = y - self.y
+            return None if _largest(motion - motion.mean(axis=0)) > self.farthest else pairs
+        found = np.empty(len(pairs), dtype=np.int64)
+        count = kernels.opposite_pairs(*inputs(y), *self.given, found)
+        return None if count < 0 else pairs[found[:count]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from typing import Any
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
-from vtk_segdeform.progress import Progress
+from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 from vtk_segdeform.session import FinishedPose
@@ -148,16 +148,25 @@ def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> Non
     if regions is None:
         raise RegionError(f"No regions to fit cages to. {_detecting(controller)}, or paint one")
 
-    def show(cages: Sequence[Cage]) -> str:
+    def work(progress: Progress) -> tuple[Sequence[Cage], Any]:
+        cages = session.fitted_cages(part(progress, 0.0, 0.4), n_cage_vertices=n_cage_vertices)
+        rest = part(progress, 0.4, 1.0)
+        return cages, session.carried(cages, rest, n_cage_vertices=n_cage_vertices)
+
+    def show(found: tuple[Sequence[Cage], Any]) -> str:
+        cages, posed = found
         if session.regions is not regions:  # changed in another view of the same session
             again = f"Press {controller.keys.cap('fit_cages')} to refit"
             raise RegionError(f"The regions changed while cages were being fitted. {again}")
-        reset = _reset(controller)
-        session.set_cages(cages, label="fit cages", n_cage_vertices=n_cage_vertices)
+        fit, reset = partial(session.set_cages, cages, label="fit cages"), ""
+        try:
+            fit(n_cage_vertices=n_cage_vertices, posed=posed)
+        except ConstraintError:  # they cannot have the pose
+            reset = _reset(controller)
+            fit(n_cage_vertices=n_cage_vertices)
         total = sum(cage.n_vertices for cage in cages)
         return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total{reset}"
 
-    work = partial(session.fitted_cages, n_cage_vertices=n_cage_vertices)
     controller.start("Fitting cages", work, show)
 
 

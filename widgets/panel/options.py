@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from vtk_segdeform.session import Options
-
 from ..editor import (
     DeformEditor,
     finishing_after_drags,
@@ -28,7 +26,7 @@ def cages_section(editor: DeformEditor) -> Section:
     options, has_regions = session.options, session.regions is not None
     fitted = sum(cage.n_vertices for cage in session.cages)
     wanted = options.n_cage_vertices
-    if fitted and wanted == Options().n_cage_vertices:  # which follows the number of regions
+    if fitted and wanted == type(options)().n_cage_vertices:  # which follows the number of regions
         wanted = fitted
     least = _EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
@@ -40,7 +38,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "cages.detail",
                 "slider",
                 "Detail",
-                "Detail of cages: release to refit them, which resets the pose",
+                "Detail of cages: release to refit them",
                 value=fitted or options.n_cage_vertices,
                 enabled=has_regions,
                 minimum=least,

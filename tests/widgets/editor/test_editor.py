@@ -349,6 +349,25 @@ def test_painted_handles_are_coloured_where_they_hold_the_surface(bench, mode):
     assert np.any(shown != hidden, axis=2).sum() > 100
 
 
+def test_a_refit_is_one_step_and_keeps_the_pose(bench):
+    session = bench.session
+    up = np.eye(4)
+    up[2, 3] = 0.3
+    session.move_handle(next(iter(session.handles)), up)
+    session.commit()
+    before, count = session.vertices, len(session.history)
+    bench.editor.do(actions_of_panel.fitting_with(60))
+    bench.settle()
+    assert sum(cage.n_vertices for cage in session.cages) == 60
+    assert len(session.history) == count + 1
+    assert np.linalg.norm(session.vertices - before, axis=1).max() < 0.01 * session.mesh.diagonal
+    assert abs(session.volume_change) < 1e-12
+    assert session.options.n_cage_vertices == 60
+    bench.type("ctrl+z")
+    assert session.options.n_cage_vertices != 60
+    assert_array_equal(session.vertices, before)
+
+
 def test_a_stroke_paints_a_handle_once_something_is_fixed(bench):
     session, selector = bench.session, bench.editor.widgets.selector
     bench.type("3", "s", "2", "3")
