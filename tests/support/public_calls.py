@@ -396,6 +396,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "pins": lambda: [0],
     "pixels": lambda: 1_000_000,
     "points": lambda: mesh().vertices[:4],
+    "posed": lambda: [cage.vertices for cage in cages()],
     "polydata": surface,
     "preparation": _preparation,
     "position": lambda: 0,

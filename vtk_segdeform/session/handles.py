@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..checks import shown
 from ..deformer import FARTHEST_APART, checked_constraints
-from ..errors import ConstraintError
+from ..errors import CageError, ConstraintError
 from ..mesh import Mesh
 from .naming import fault_of
 from .state import Pose, State, split_rows
@@ -148,6 +148,26 @@ def checked_targets(
         name: _frozen_copy(_checked_points(mesh, points, len(handles[name]), name))
         for name, points in targets.items()
     }
+
+
+def cage_places(mesh: Mesh, vertices: ArrayLike, count: int, name: str) -> FloatArray:
+    """Return a copy of the *vertices* (m, 3) of a moved cage, checked as *name*.
+
+    Raises
+    ------
+    CageError
+        If they are not *count* points.
+    ConstraintError
+        If they are too far from *mesh*.
+    """
+    try:
+        points = as_points(vertices, name).copy()
+    except ValueError as fault:
+        raise CageError(str(fault)) from None
+    if len(points) != count:
+        raise CageError(f"{name} must be {count} points; got {len(points)}")
+    require_near(mesh, points, name)
+    return points
 
 
 def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:

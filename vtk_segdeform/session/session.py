@@ -31,9 +31,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_whole, plain
+from ..arrays import FloatArray, IntArray, frozen, is_whole, plain
 from ..cages import Cage, fit_cages, suggested_size
-from ..checks import require, shown
+from ..checks import require, require_sequence, shown
 from ..deformer import (
     Deformer,
     checked_constraints,
@@ -446,6 +446,14 @@ class Session(Timeline):
         regions, fitted = self._fitted
         if cages is not fitted or self.regions is not regions:
             cages = fitting_cages(self.regions, cages, self._state.region_names)
+        if posed is not None:
+            require_sequence(posed, "posed")
+            if len(posed) != len(cages):
+                raise CageError(f"posed must have {len(cages)} arrays; got {len(posed)}")
+            posed = [
+                handles.cage_places(self.mesh, own, cage.n_vertices, "posed")
+                for own, cage in zip(posed, cages, strict=True)
+            ]
         self._set_cages(tuple(cages), label, options, posed)
 
     def carried(
@@ -460,9 +468,11 @@ class Session(Timeline):
         The mesh is nearly where it is now.  This may run in another thread, as `fitted_cages`; pass
         the result to `set_cages`.
         """
+        options = self._options_with(n_cage_vertices)
+        if cages is not self._fitted[1] or self.regions is not self._fitted[0]:
+            cages = fitting_cages(self.regions, cages, self._state.region_names)
         if self._state.pose is None:
             return None
-        options = self._options_with(n_cage_vertices)
         state = replace(self._state, cages=tuple(cages), options=options).at_rest()
         return self._pose_solver.carried(state, self.vertices, progress)
 
@@ -833,14 +843,8 @@ class Session(Timeline):
         region = int(region)
         continues = self.is_dragging and self._placed[0] is self._state.pose
         places = list(self._placed[1] if continues else self.cage_vertices)
-        try:
-            points = as_points(vertices, "vertices").copy()
-        except ValueError as fault:
-            raise CageError(str(fault)) from None
-        if points.shape != places[region].shape:
-            raise CageError(f"vertices must be {len(places[region])} points; got {len(points)}")
-        handles.require_near(self.mesh, points, "vertices")
-        places[region] = points
+        count = len(places[region])
+        places[region] = handles.cage_places(self.mesh, vertices, count, "vertices")
         pose = self._pose_solver.free_form(self._state, places)
         self._placed = pose, places
         self._move(replace(self._state, pose=pose), f"the cage of {self.region_name(region)}")

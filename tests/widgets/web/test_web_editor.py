@@ -160,7 +160,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
     page.key("d")
     page.key("a")
     start = served.seen(page, _top(served))
-    page.drag(line(start, (start[0] + 8, start[1] + 6), 4), pause=0.02)
+    page.drag(line(start, (start[0] + 24, start[1] + 18), 8), pause=0.02)
     served.wait(lambda: any(len(ids) > 1 for ids in session.handles.values()))
     page.key("4")
     served.wait(lambda: editor.mode is Mode.DEFORM and served.is_at_rest)
