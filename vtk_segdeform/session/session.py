@@ -8,12 +8,12 @@ The session is the only object with state.  Widgets and scripts read and edit a 
 Each of these calls is one undo step, except that all moves of a drag are one step, ended by
 `commit`.
 
-- New regions or cages reset the pose.  New regions keep the cages if each cage still encloses its
-  region; otherwise all cages are removed.
+- New regions or cages reset the pose, unless `carried` tells where the cages are.  New regions keep
+  the cages if each cage still encloses its region; otherwise all cages are removed.
 - New fixed vertices, handles or options keep the pose; the next move starts from it.
 
-A session belongs to one thread.  Only `fitted_cages` and `bind` may run in another thread, while
-the session is not used in any other way; they do not change its visible state.
+A session belongs to one thread.  Only `fitted_cages`, `carried` and `bind` may run in another
+thread, while the session is not used in any other way; they do not change its visible state.
 
 Long because it is the interface of one class; the implementation is in the other files.
 """
