@@ -19,7 +19,7 @@ from vtk_segdeform.errors import CageError, ConstraintError, RegionError, Sessio
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
-from vtk_segdeform.session import FinishedPose
+from vtk_segdeform.session import FinishedPose, State
 
 from ..region_selector import Paint, Tool
 from ..scene import Phase, SurfaceStyle
@@ -131,10 +131,10 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
     session, widgets = controller.session, controller.widgets
 
     def show(regions: Regions) -> str:
-        reset = _reset(controller)
+        before = session.state
         session.set_regions(regions, label="auto-segment")
         widgets.choose_region(min(widgets.selector.region, regions.n_regions - 1))
-        return f"{_count(regions.n_regions, 'region')} found{reset}"
+        return f"{_count(regions.n_regions, 'region')} found{_reset(controller, before)}"
 
     def work(progress: Progress) -> Regions:
         return segment_mesh(session.mesh, n_regions, progress=progress)
@@ -150,29 +150,30 @@ def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> Non
 
     def work(progress: Progress) -> tuple[Sequence[Cage], Any]:
         cages = session.fitted_cages(part(progress, 0.0, 0.4), n_cage_vertices=n_cage_vertices)
+        if session.regions is not regions:  # changed in another view of the same session
+            return cages, None
         rest = part(progress, 0.4, 1.0)
         return cages, session.carried(cages, rest, n_cage_vertices=n_cage_vertices)
 
     def show(found: tuple[Sequence[Cage], Any]) -> str:
         cages, posed = found
-        if session.regions is not regions:  # changed in another view of the same session
+        if session.regions is not regions:
             again = f"Press {controller.keys.cap('fit_cages')} to refit"
             raise RegionError(f"The regions changed while cages were being fitted. {again}")
-        fit, reset = partial(session.set_cages, cages, label="fit cages"), ""
+        before, fit = session.state, partial(session.set_cages, cages, label="fit cages")
         try:
             fit(n_cage_vertices=n_cage_vertices, posed=posed)
         except ConstraintError:  # they cannot have the pose
-            reset = _reset(controller)
             fit(n_cage_vertices=n_cage_vertices)
-        total = sum(cage.n_vertices for cage in cages)
-        return f"{_count(len(cages), 'cage')} fitted, {total} vertices in total{reset}"
+        count, total = _count(len(cages), "cage"), sum(cage.n_vertices for cage in cages)
+        return f"{count} fitted, {total} vertices in total{_reset(controller, before)}"
 
     controller.start("Fitting cages", work, show)
 
 
-def _reset(controller: Controller) -> str:
-    """Return what to say after a step from the current state that resets the pose."""
-    if controller.session.state.pose is None:
+def _reset(controller: Controller, before: State) -> str:
+    """Return what to say if the step from *before* has reset the pose, or ""."""
+    if before.pose is None or controller.session.state.pose is not None:
         return ""
     return f". The pose was reset; {controller.keys.cap('undo')} brings it back"
 

@@ -167,9 +167,9 @@ class DeformPanel(QtWidgets.QWidget):
         return bool(super().eventFilter(watched, event))
 
     def keyPressEvent(self, event: Any) -> None:  # noqa: N802
-        """Pass keys that no control uses to what had the focus before, usually the view."""
+        """Pass keys that no control uses to the view, if that had the focus before."""
         with contextlib.suppress(RuntimeError):  # it was deleted meanwhile
-            if self._focused is not None:
+            if hasattr(self._focused, "GetRenderWindow"):
                 QtWidgets.QApplication.sendEvent(self._focused, event)
                 return
         super().keyPressEvent(event)

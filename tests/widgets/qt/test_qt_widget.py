@@ -468,6 +468,9 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     seen.panel.controls["regions.count"].setValue(3)
     seen.settle()
     assert "3 regions found. The pose was reset; Z brings it back" in seen.editor.status
+    seen.panel.controls["regions.count"].valueChanged.emit(3)
+    seen.settle()
+    assert "The pose was reset" not in seen.editor.status
     assert session.regions.n_regions == seen.panel.controls["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
     slider = seen.panel.controls["cages.detail"]
