@@ -240,3 +240,18 @@ def test_keys_act_on_the_view_again_after_renaming(widget):
     until(widget.plotter.hasFocus, "the focus")
     settle(widget)
     assert "arm" in widget.editor.session.handles
+
+
+@pytest.mark.parametrize("key", ["Key_G", "Key_W"])
+def test_letters_in_a_field_are_no_keys_of_the_editor(widget, key):
+    widget.editor.mode = Mode.PULL
+    settle(widget)
+    field = widget.panel.controls["pull.radius"]
+    focus(widget.plotter)
+    focus(field)
+    state, style = widget.editor.session.state, widget.editor.widgets.surface.style
+    QtTest.QTest.keyClick(field.lineEdit(), getattr(Qt.Key, key))
+    QtTest.QTest.keyClick(field, getattr(Qt.Key, key))
+    settle(widget)
+    assert widget.editor.session.state is state
+    assert widget.editor.widgets.surface.style is style
