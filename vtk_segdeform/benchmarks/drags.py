@@ -61,7 +61,7 @@ def frames(deformer: Deformer, path: Sequence[FloatArray]) -> Iterator[Frame]:
 
 
 def times_beside_first(deformers: Sequence[Deformer], path: Sequence[FloatArray]) -> list[float]:
-    """Return the time of a drag along *path* with each of *deformers*, per that of the first.
+    """Return the time of a drag along *path* with each of *deformers*, relative to the first.
 
     Each frame takes the steps that the first one needs.  The deformers alternate, so that the load
     of the machine is the same for all of them.

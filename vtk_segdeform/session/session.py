@@ -449,9 +449,9 @@ class Session(Timeline):
         if posed is not None:
             require_sequence(posed, "posed")
             if len(posed) != len(cages):
-                raise CageError(f"posed must have {len(cages)} arrays; got {len(posed)}")
+                raise CageError(f"posed must have one array for each cage; got {len(posed)}")
             posed = [
-                handles.cage_places(self.mesh, own, cage.n_vertices, "posed")
+                handles.cage_places(self.mesh, own, cage.n_vertices, "posed vertices")
                 for own, cage in zip(posed, cages, strict=True)
             ]
         self._set_cages(tuple(cages), label, options, posed)

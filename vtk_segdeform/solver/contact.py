@@ -336,9 +336,8 @@ class _Listed:
     ) -> _Listed:
         """Return the *pairs* (k, 2) listed with the samples at *y* (s, 3).
 
-        *beyond* (k,) is how far each was beyond the reach of a pair, at most *slack*.  Those that
-        are the farther beyond come the later, and are tested only once something has moved that
-        far.
+        *beyond* (k,) is how far each was beyond the reach of a pair, at most *slack*.  The pairs
+        are sorted by it, and a pair is tested only once something has moved that far.
         """
         part = np.clip(_PARTS * beyond / slack, 0, _PARTS - 1).astype(np.int8)
         pairs = pairs[np.argsort(part, kind="stable")]
@@ -350,7 +349,7 @@ class _Listed:
         return cls(y, pairs, farthest, given)
 
     def near(self, y: FloatArray) -> IntArray | None:
-        """Return those that may be active with the samples at *y* (s, 3).
+        """Return the pairs (k, 2) that may be active when the samples are at *y* (s, 3).
 
         None if a sample has moved too far since the pairs were listed.
         """

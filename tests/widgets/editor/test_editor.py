@@ -368,6 +368,19 @@ def test_a_refit_is_one_step_and_keeps_the_pose(bench):
     assert_array_equal(session.vertices, before)
 
 
+def test_a_pose_that_new_cages_cannot_have_is_reset_and_that_is_said(bench, monkeypatch):
+    session = bench.session
+    session.move_handle(next(iter(session.handles)), np.diag([1.0, 1.0, 1.2, 1.0]))
+    session.commit()
+    far = 1e6 * session.mesh.diagonal
+    monkeypatch.setattr(
+        session, "carried", lambda cages, *_, **__: [cage.vertices + far for cage in cages]
+    )
+    bench.type("f")
+    assert session.state.pose is None
+    assert "The pose was reset; Z brings it back" in bench.editor.status
+
+
 def test_a_stroke_paints_a_handle_once_something_is_fixed(bench):
     session, selector = bench.session, bench.editor.widgets.selector
     bench.type("3", "s", "2", "3")

@@ -203,23 +203,25 @@ def test_icons_are_drawn_once_for_each_palette(monkeypatch):
     assert len(drawn) > count
 
 
+def entered(widget, mode, name):
+    """Give a control of the panel the focus that the view had, and return the control."""
+    widget.editor.mode = mode
+    settle(widget)
+    control = widget.panel.controls[name]
+    focus(widget.plotter)
+    focus(control)
+    return control
+
+
 @pytest.mark.parametrize("key", ["Key_Return", "Key_Escape"])
 def test_keys_act_on_the_view_again_after_a_field(widget, key):
-    widget.editor.mode = Mode.PULL
-    settle(widget)
-    field = widget.panel.controls["pull.radius"]
-    focus(widget.plotter)
-    focus(field)
+    field = entered(widget, Mode.PULL, "pull.radius")
     QtTest.QTest.keyClick(field.lineEdit(), getattr(Qt.Key, key))
     until(widget.plotter.hasFocus, "the focus")
 
 
 def test_letters_and_digits_in_a_list_are_keys_of_the_editor(widget):
-    widget.editor.mode = Mode.HANDLES
-    settle(widget)
-    table = widget.panel.controls["handles.list"]
-    focus(widget.plotter)
-    focus(table)
+    table = entered(widget, Mode.HANDLES, "handles.list")
     table.setCurrentItem(table.topLevelItem(1))
     QtTest.QTest.keyClick(table, Qt.Key.Key_0)
     assert widget.editor.mode is Mode.PULL
@@ -227,11 +229,7 @@ def test_letters_and_digits_in_a_list_are_keys_of_the_editor(widget):
 
 
 def test_keys_act_on_the_view_again_after_renaming(widget):
-    widget.editor.mode = Mode.HANDLES
-    settle(widget)
-    table = widget.panel.controls["handles.list"]
-    focus(widget.plotter)
-    focus(table)
+    table = entered(widget, Mode.HANDLES, "handles.list")
     table.setCurrentItem(table.topLevelItem(1))
     QtTest.QTest.keyClick(table, Qt.Key.Key_F2)
     editor = table.findChild(QtWidgets.QLineEdit)
@@ -244,11 +242,7 @@ def test_keys_act_on_the_view_again_after_renaming(widget):
 
 @pytest.mark.parametrize("key", ["Key_G", "Key_W"])
 def test_letters_in_a_field_are_no_keys_of_the_editor(widget, key):
-    widget.editor.mode = Mode.PULL
-    settle(widget)
-    field = widget.panel.controls["pull.radius"]
-    focus(widget.plotter)
-    focus(field)
+    field = entered(widget, Mode.PULL, "pull.radius")
     state, style = widget.editor.session.state, widget.editor.widgets.surface.style
     QtTest.QTest.keyClick(field.lineEdit(), getattr(Qt.Key, key))
     QtTest.QTest.keyClick(field, getattr(Qt.Key, key))
