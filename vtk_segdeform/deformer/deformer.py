@@ -102,7 +102,7 @@ _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
 _PULLED = 5e-5  # largest error of pulled points in a final pose
-_SPIKE, _FAR_PULL = 0.08, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
+_SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FEW_STEPS = 4  # to a pose of a live solve: it may aim farther
 _MOST_CALLS = 4  # of a live solve without a pose: it aims nearer
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
@@ -433,7 +433,7 @@ class Deformer:
             moves.  Infinite: all of it is free.
         spread : float
             Distance along the surface, from a handle of one vertex, within which it pulls, so that
-            it makes no spike.  Where the mesh is too coarse for that, its neighbours rotate as one.
+            it makes no spike.  Where that is not enough, its neighbours rotate as one.
         follows : float
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
@@ -453,7 +453,7 @@ class Deformer:
         before, p = self._constraints.solver, self._p
         rows, soft, of_target = before.positions.rows.copy(), [], []
         anchors = Anchors(quadratic, p, np.zeros_like(p))
-        energy, flat = self._with_flat_rings(anchors, spread / self._frame.size)
+        energy, flat = self._with_flat_rings(anchors)
         for number, ids in enumerate(self._constraints.handles):
             row = flat.get(number)
             row = self._soft_row(ids, spread / self._frame.size) if row is None else row
@@ -499,19 +499,16 @@ class Deformer:
         rows = samples.rows[near]
         return np.asarray((rows.T * weight) @ rows)
 
-    def _with_flat_rings(
-        self, anchors: Anchors, spread: float
-    ) -> tuple[Energy, dict[int, FloatArray]]:
+    def _with_flat_rings(self, anchors: Anchors) -> tuple[Energy, dict[int, FloatArray]]:
         """Return the shape energy with the rings of pulled vertices that would become spikes.
 
-        And the rows of these vertices by the number of their handle; see `locality`.  *spread* is
-        in mesh sizes.
+        And the rows of these vertices by the number of their handle; see `locality`.
         """
         energy, flat = self._binding.energy, dict[int, FloatArray]()
         handles, held = self._constraints.handles, np.concatenate([self.fixed, self.handle])
         single = [(k, int(self.handle[ids[0]])) for k, ids in enumerate(handles) if len(ids) == 1]
         x = self._rest.vertices
-        around = [(k, Ring.around(self.mesh, x, vertex, spread)) for k, vertex in single]
+        around = [(k, Ring.around(self.mesh, x, vertex)) for k, vertex in single]
         rings = [
             (k, ring)
             for k, ring in around

@@ -30,17 +30,17 @@ with the least psi that decrease with the distance from the vertex v: moving lea
 reproduce every affine motion of these samples.  `Deformer` corrects the target of x~ until the
 vertex itself is in its place.
 
-Where the mesh is coarse, this is not enough: pulled by 0.3 diagonals, vertices of meshes of 500 to
-2,500 vertices left the plane of their neighbours x_j by up to 1.6 edges.  There the vertex itself
-is pulled, and its ring resists.  Added to the shape energy is
+Where the mesh is coarse or its detail is sharp, this is not enough: pulled by 0.3 diagonals,
+vertices of meshes of 500 to 2,500 vertices left the plane of their neighbours x_j by up to 1.6
+edges.  There the vertex itself is pulled, and its ring resists.  Added to the shape energy is
 
     min_R  w |y - R y_rest|^2 + e w mean_j |x_j - x_v - R (x_j - x_v)_rest|^2
     y = x_v - sum_j c_j x_j,    sum_j c_j = 1,    sum_j c_j v_j = v  in their plane at rest
 
 with a rotation R for each ring (`energy.with_rotating_rows`).  The compliance H^-1 of the solver
 tells by how much y would change without it, to first order; of 57 vertices none changed by more
-than 1.1 times as much.  The weight w is such that y changes by 0.08 edges in a pull by 0.3
-diagonals.  Where y would change by less, as on all dense meshes, nothing is added.
+than 1.1 times as much.  The weight w is such that y changes by 0.05 edges in a pull by 0.3
+diagonals.  Where y would change by less, as on most dense meshes, nothing is added.
 
 The price is distortion, because a ring is wider than a point and moves more of the surface with it:
 1.10 times as much in the finished poses of ten bodies, and up to 1.18 times on a sphere.
@@ -68,7 +68,6 @@ _SHORTEST = 1e-12  # reach and spread; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
 _AROUND = 20  # nearest samples that are looked at
 _EDGES = 2000  # about, of which the median motion is computed
-_FINE = 8.0  # edges in the spread of a pull from which its ring needs no resistance to bending
 _RIGID = 0.1  # weight of the edges of a ring together, as a share of that of y
 _FLAT = 1e-3  # of the moments: thinner patches count as flat
 
@@ -87,15 +86,12 @@ class Ring:
     edge: float  # mean length
 
     @classmethod
-    def around(cls, mesh: Mesh, x: FloatArray, vertex: int, spread: float) -> Ring | None:
-        """Return the ring of *vertex* of *mesh*, at rest; None if it is small against *spread*.
-
-        *x* (n, 3) are the vertices in the unit of *spread*.
-        """
+    def around(cls, mesh: Mesh, x: FloatArray, vertex: int) -> Ring | None:
+        """Return the ring of *vertex* of *mesh*, at rest at *x* (n, 3); None if it is too small."""
         ring = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
         arms = x[ring] - x[vertex]
         edge = float(np.linalg.norm(arms, axis=1).mean()) if len(ring) else 0.0
-        if len(ring) < _FEWEST - 1 or spread > _FINE * edge:
+        if len(ring) < _FEWEST - 1 or edge == 0.0:
             return None
         plane = linalg.svd(arms - arms.mean(axis=0))[2][:2]
         basis = np.vstack([np.ones(len(ring)), plane @ arms.T])
