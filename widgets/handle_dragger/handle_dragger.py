@@ -250,8 +250,8 @@ class HandleDragger(Widget):
                 distance = float(np.linalg.norm(pointer.position - press.position))
                 is_far = distance > tolerance or bool(entry.text)
                 if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
-                    has_moved = True
                     self._live.solve(move(matrix))
+                    has_moved = has_moved or session.is_dragging  # not if it was refused
                 if has_moved or entry.text:
                     gizmo.set_caption(entry.caption(motion))
             if pointer.phase is Phase.RELEASE:

@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Callable
 from statistics import median
 
+from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution, Status
 
@@ -69,11 +70,16 @@ class LiveSolve:
         return self._stop is not None
 
     def solve(self, solve: Callable[..., Solution]) -> None:
-        """Call ``solve(max_steps=..., within=...)``, and refine its result later."""
+        """Call ``solve(max_steps=..., within=...)``, and refine its result later.
+
+        If the targets are refused, that is reported to `View.on_failure` and the pose stays, so
+        that the gesture can continue.
+        """
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
-        self._measure(solve, self.steps)
+        with self._view.guarded(ConstraintError):
+            self._measure(solve, self.steps)
         self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
 

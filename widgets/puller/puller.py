@@ -277,8 +277,8 @@ class Puller(Widget):
                     continue
                 to = motion.of(start)
                 if self._is_ready():
-                    has_moved = True
                     self._solve(partial(pull, to))
+                    has_moved = has_moved or session.is_dragging  # not if it was refused
                 else:
                     self._live.begin()
                     self.waiting.begin()

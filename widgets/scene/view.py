@@ -326,11 +326,11 @@ class View(Projection):
         return _once(lambda: self._failures.remove(listener))
 
     @contextmanager
-    def guarded(self) -> Iterator[None]:
-        """Pass exceptions raised inside to the failure listeners; without any, re-raise them."""
+    def guarded(self, kind: type[Exception] = Exception) -> Iterator[None]:
+        """Pass exceptions of a *kind* to the failure listeners; without any, re-raise them."""
         try:
             yield
-        except Exception as error:  # the border to the event loop: any exception may arrive
+        except kind as error:  # the border to the event loop: any exception may arrive
             _log.info("a callback failed", exc_info=True)
             if not self._failures:
                 raise

@@ -28,6 +28,7 @@ from vtk_segdeform.widgets.editor import (
 from vtk_segdeform.widgets.editor import settling as settling_poses
 from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.widgets.scene import Phase, Pointer
 from vtk_segdeform.widgets.scene import glide
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
@@ -251,9 +252,15 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
     puller.radius = bench.session.mesh.diagonal
     (vertex,) = bench.session.handles["pull 1"]
     dot = np.array(bench.hand.at(bench.session.vertices[vertex]))
-    bench.hand.hover(dot + [14, 0])
+    beside = next(
+        place
+        for place in dot + 14.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        if (hit := puller._picker.hit(Pointer(Phase.HOVER, *place))) is not None
+        and bench.session.grabbed(hit.vertex, puller.radius) == "pull 1"
+    )
+    bench.hand.hover(beside)
     assert puller.marker_under_pointer() is None
-    bench.hand.drag([dot + [14, 0], dot + [24, 10]])
+    bench.hand.drag([beside, beside + 10.0])
     assert list(bench.session.handles) == ["pull 1", "pull 2"]
     assert dragger.handle == "pull 1"
 

@@ -14,7 +14,7 @@ from solids import rotation
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Session
-from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets.handle_dragger import live_solve
@@ -849,12 +849,12 @@ def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatc
     hand.move(place + [-20.0, 30.0])
 
     def fail(*_, **__):
-        raise ConstraintError("these targets lead to no finite pose")
+        raise CageError("the cages do not fit")
 
     monkeypatch.setattr(bench.session, fails, fail)
     hand.move(place + [-40.0, 60.0])
     hand.tick()
-    assert [str(failure) for failure in hand.failures] == ["these targets lead to no finite pose"]
+    assert [str(failure) for failure in hand.failures] == ["the cages do not fit"]
     assert bench.session.state.pose is None
     assert not bench.dragger.is_grabbing
     assert not bench.has_timer
@@ -865,7 +865,7 @@ def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatc
     assert bench.session.undo_label == "drag handle 1"
 
 
-def test_targets_too_far_away_are_refused_and_the_drag_is_cancelled():
+def test_targets_too_far_away_are_refused_and_the_drag_continues():
     bench = Bench(parallel=True)
     bench.view.camera.SetParallelScale(1e5)
     View.render(bench.view)
@@ -874,8 +874,18 @@ def test_targets_too_far_away_are_refused_and_the_drag_is_cancelled():
     bench.hand.move(place + [150.0, 0.0])
     assert len(bench.hand.failures) == 1
     assert "mesh diagonals away" in str(bench.hand.failures[0])
-    assert not bench.dragger.is_grabbing
+    assert bench.dragger.is_grabbing
     assert bench.session.state.pose is None
+    for key in ["x", "9", "9", "9"]:
+        bench.hand.key(key)
+    assert len(bench.hand.failures) == 4  # also with x, 99 and 999
+    bench.hand.key("BackSpace")
+    bench.hand.key("BackSpace")
+    start = bench.session.mesh.vertices[bench.session.handles["handle 1"]]
+    bench.hand.key("Return")
+    assert bench.session.undo_label == "drag handle 1"
+    shift = bench.session.targets["handle 1"] - start
+    np.testing.assert_allclose(shift, np.broadcast_to([9.0, 0.0, 0.0], shift.shape), atol=1e-9)
 
 
 # Display.

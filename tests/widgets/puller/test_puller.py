@@ -132,6 +132,23 @@ def test_a_typed_number_pulls_exactly_that_far(bench, keys, shift):
     np.testing.assert_allclose(bench.target - start, shift, atol=1e-9)
 
 
+def test_a_number_that_is_too_large_can_be_corrected():
+    bench = Bench()
+    place, vertex = bench.on()
+    start = bench.session.vertices[vertex]
+    bench.hand.press(place)
+    for key in ["z", "9", "9", "9"]:
+        bench.hand.key(key)
+    assert "mesh diagonals away" in str(bench.hand.failures[-1])
+    assert bench.puller.is_grabbing
+    assert bench.session.state.pose is not None  # 9 was no error
+    for key in ["BackSpace", "BackSpace", "BackSpace", "period", "5", "Return"]:
+        bench.hand.key(key)
+    np.testing.assert_allclose(bench.target - start, [0.0, 0.0, 0.5], atol=1e-9)
+    assert not bench.puller.is_grabbing
+    assert bench.session.undo_label == "pull"
+
+
 def test_x_constrains_to_the_axis_and_then_to_the_plane(bench):
     place, vertex = bench.on()
     start = bench.session.vertices[vertex]
