@@ -71,16 +71,45 @@ def number_box(box: Any) -> Any:
     return box
 
 
-def slider(*, on_release: bool) -> Any:
-    """Return a slider; *on_release* it reports its value only then, and shows it meanwhile."""
-    bar = QtWidgets.QSlider(Qt.Orientation.Horizontal)
-    bar.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    bar.setTracking(not on_release)
-    if on_release:
-        bar.sliderMoved.connect(
-            lambda value: QtWidgets.QToolTip.showText(QtGui.QCursor.pos(), str(value), bar)
-        )
-    return bar
+class Slider(QtWidgets.QSlider):
+    """A slider with its value in `figure`, a label to put beside it.
+
+    Parameters
+    ----------
+    on_release : bool
+        Whether it reports its value only when it is released; `figure` follows it anyway.
+    """
+
+    def __init__(self, *, on_release: bool) -> None:
+        super().__init__(Qt.Orientation.Horizontal)
+        self.figure, self.unit = QtWidgets.QLabel(), ""
+        self.figure.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setTracking(not on_release)
+        self.sliderMoved.connect(self._show)
+
+    def set_unit(self, unit: str) -> None:
+        """Show *unit* after the value, and leave room for the largest one."""
+        self.unit = unit
+        widest = self.figure.fontMetrics().horizontalAdvance(self._text(self.maximum()))
+        self.figure.setMinimumWidth(widest)
+        self._show(self.sliderPosition())
+
+    def sliderChange(self, change: Any) -> None:  # noqa: N802 - Qt's name
+        """Show the value, also if its signals are blocked."""
+        super().sliderChange(change)
+        self._show(self.sliderPosition())
+
+    def setVisible(self, visible: bool) -> None:  # noqa: N802
+        """Show or hide the slider with its figure."""
+        super().setVisible(visible)
+        self.figure.setVisible(visible)
+
+    def _show(self, value: int) -> None:
+        self.figure.setText(self._text(value))
+
+    def _text(self, value: int) -> str:
+        return f"{value} {self.unit}".strip()
 
 
 def check_box(text: str, tip: str = "") -> Any:
@@ -97,6 +126,15 @@ def choice_box(choices: list[str]) -> Any:
     box.addItems(choices)
     box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return box
+
+
+def with_figure(bar: Slider) -> Any:
+    """Return a layout with a slider and its figure."""
+    layout = QtWidgets.QHBoxLayout()
+    layout.setSpacing(_GAP)
+    layout.addWidget(bar, 1)
+    layout.addWidget(bar.figure)
+    return layout
 
 
 def row(*widgets: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -13,6 +13,7 @@ from ..editor import Keys
 from ..panel import Field, Item, Section, Table, tooltip
 from .controls import (
     Press,
+    Slider,
     check_box,
     choice_box,
     column,
@@ -21,7 +22,7 @@ from .controls import (
     number_box,
     push_button,
     row,
-    slider,
+    with_figure,
 )
 from .tables import TableView
 
@@ -74,11 +75,11 @@ class SectionBox(QtWidgets.QGroupBox):
                     each.setVisible(field.visible)
             _put(control, field)  # it may show a change that was refused
 
-    def _form(self, fields: Iterable[Any]) -> Any:
-        layout = form(*((field.label, self._made(field)) for field in fields))
-        for name, control in self.controls.items():
-            if layout.indexOf(control) >= 0:
-                self._labels[name] = layout.labelForField(control)
+    def _form(self, fields: Sequence[Any]) -> Any:
+        made = {field.name: self._made(field) for field in fields}
+        places = [with_figure(each) if isinstance(each, Slider) else each for each in made.values()]
+        layout = form(*((field.label, place) for field, place in zip(fields, places, strict=True)))
+        self._labels |= zip(made, map(layout.labelForField, places), strict=True)
         return layout
 
     def _line(self, item: Any) -> Any:
@@ -118,7 +119,7 @@ def _control(field: Field, press: Callable[..., object]) -> Any:
         control = QtWidgets.QLabel()
     else:
         if field.kind == "slider":
-            control = slider(on_release=field.on_release)
+            control = Slider(on_release=field.on_release)
         else:
             is_whole = field.kind == "integer"
             control = number_box(QtWidgets.QSpinBox() if is_whole else QtWidgets.QDoubleSpinBox())
@@ -139,6 +140,7 @@ def _set_up(control: Any, field: Field, before: Field | None) -> None:
         control.setSingleStep(whole(field.step))
         if field.kind == "slider":
             control.setPageStep(round(field.page))
+            control.set_unit(field.unit)
         else:
             control.setPrefix(f"{field.prefix} " if field.prefix else "")
             control.setSuffix(f" {field.unit}" if field.unit else "")

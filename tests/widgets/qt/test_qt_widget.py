@@ -478,6 +478,7 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     slider.setSliderPosition(40)
     seen.panel.refresh()
     assert slider.sliderPosition() == 40  # a refresh leaves it to the hand
+    assert slider.figure.text() == "40"
     assert session.cages == ()
     slider.setSliderDown(False)
     seen.settle()
@@ -498,10 +499,14 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     assert seen.panel.controls["regions.count"].value() == session.regions.n_regions == 2
     count = sum(cage.n_vertices for cage in before)
     assert seen.panel.controls["cages.detail"].value() == count
+    assert slider.figure.text() == str(count)
+    assert slider.figure.isVisible()
     assert seen.panel.controls["cages.total"].text() == str(count)  # that of the default
     session.change_options(n_cage_vertices=90)
     seen.settle()
     assert seen.panel.controls["cages.total"].text() == f"90 ({count} fitted)"
+    assert not seen.panel.controls["regions.count"].figure.isVisible()
+    assert seen.panel.controls["pull.local"].figure.text().endswith(" %")
 
 
 def test_the_panel_follows_keys_and_the_wheel(seen):
