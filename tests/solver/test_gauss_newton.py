@@ -162,6 +162,13 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
     assert distance(found, expected) < 5e-3
 
 
+def test_the_iteration_ends_where_only_rounding_is_left():
+    solution = SCENE.deformer(tolerance=1e-300).solve(SCENE.turned(30))
+    assert solution.status is Status.CONVERGED
+    assert solution.steps < 100
+    assert distance(solution, SCENE.held().solve(SCENE.turned(30))) < 1e-6
+
+
 def test_the_compliance_is_how_far_points_move_under_unit_forces():
     solver = SCENE.held()._constraints.solver
     rows = solver.energy.subspace.at(np.array([100, 400]))

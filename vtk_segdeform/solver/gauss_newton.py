@@ -89,6 +89,8 @@ _EXACT = 0.99  # least share of the rotations' term with which a step tells what
 _SLOWEST = 0.9  # largest ratio of two steps by which the later ones are extrapolated
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
+_ROUNDED = 1e-6  # the longest steps that may be rounding
+_STILL = 50  # steps without a lower merit, after which they are
 
 
 @dataclass(frozen=True)
@@ -343,7 +345,7 @@ class GaussNewton:
             share = share_of_step(self._begun, step) if here.is_active else 1.0
             if here.is_active:
                 step *= min(share, _LONGEST_ACTIVE / max(state.step_size, _LONGEST_ACTIVE))
-            if state.step_size <= options.tolerance:
+            if state.step_size <= options.tolerance or self._is_still(here, merits, state):
                 status = Status.CONVERGED
                 break
             if len(merits) > 1 and remaining <= (options.within or 0.0):
@@ -574,6 +576,12 @@ class GaussNewton:
     def _rounding(self, here: _Iterate) -> float:
         """Return the difference of merits that counts as rounding."""
         return _RISE * (self.energy.constant + abs(here.merit))
+
+    def _is_still(self, here: _Iterate, merits: list[float], state: _State) -> bool:
+        """Return whether only rounding moves the pose, as it does where weights are high."""
+        if len(merits) <= _STILL or state.step_size > _ROUNDED:
+            return False
+        return merits[-1 - _STILL] - here.merit <= self._rounding(here)
 
     def farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
