@@ -489,3 +489,15 @@ def test_cancelling_at_any_step_changes_nothing_of_the_solution():
     deformer.solve(SCENE.turned(10))
     with pytest.raises(ArgumentError, match="last solve"):
         deformer.finish(solution)
+
+
+def test_a_hat_lifted_off_a_head_leaves_both_as_they_are():
+    head, faces = icosphere(3)
+    hat = 0.7 * head + [0.0, 0.0, 1.2]  # into the head
+    mesh = Mesh(np.vstack([head, hat]), np.vstack([faces, faces + len(head)]))
+    x = mesh.vertices
+    fixed = np.flatnonzero(x[:, 2] < -0.7)
+    handle = np.flatnonzero(x[:, 2] > 1.6)
+    solution = deform(mesh, fixed, handle, x[handle] + [0.0, 0.0, 1.0])
+    lifted = np.where(np.arange(len(x)) < len(head), 0.0, 1.0)[:, None] * [0.0, 0.0, 1.0]
+    assert_allclose(solution.vertices, x + lifted, atol=1e-5)

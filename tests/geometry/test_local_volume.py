@@ -53,6 +53,26 @@ def test_it_is_negative_where_a_body_shrinks_and_positive_where_it_expands():
     assert np.abs(change[np.abs(x[:, 0]) > 2.7]).max() < 0.1
 
 
+@pytest.mark.usefixtures("either")
+def test_a_body_that_reached_into_another_can_be_moved_away():
+    vertices, faces = icosphere(3)
+    count = len(vertices)
+    both = np.vstack([vertices, 0.7 * vertices + [0.0, 0.0, 1.2]])
+    local = LocalVolume(Mesh(both, np.vstack([faces, faces + count])))
+    apart = both + np.repeat([[0.0, 0.0, 0.0], [0.3, 0.0, 2.0]], count, axis=0)
+    assert_allclose(local.change(apart), 0.0, atol=1e-12)
+
+
+@pytest.mark.usefixtures("either")
+def test_a_wall_around_a_cavity_expands_with_its_thickness():
+    vertices, faces = icosphere(3)
+    inner = faces[:, ::-1] + len(vertices)
+    hollow = Mesh(np.vstack([vertices, 0.8 * vertices]), np.vstack([faces, inner]))
+    thicker = np.vstack([1.1 * vertices, 0.8 * vertices])
+    assert LocalVolume(hollow).change(thicker).min() > 0.45  # 0.5 inside, 0.815 outside
+    assert np.abs(LocalVolume(hollow).change(1.1 * hollow.vertices) - 0.331).max() < 1e-9
+
+
 def test_it_varies_over_the_thickness_of_the_body_not_from_vertex_to_vertex():
     """One vertex of a sphere, raised, changes a neighbourhood, and none much more than the next."""
     vertices, faces = icosphere(4)

@@ -67,10 +67,21 @@ class Monkey:
         # Cage vertices of poses without exact volume: made while volumes were free, or read from a
         # file.  Poses derived by marking handles share the array, so it identifies them as well.
         self.free_cages: WeakValueDictionary[int, np.ndarray] = WeakValueDictionary()
-        self.last_session = session
+        self.follow(session)
         self.view.renderer.AddObserver("EndEvent", self.on_frame)
         self.type("4")  # most events of a few hundred would otherwise come before the first pose
         self.wait()
+
+    def follow(self, session):
+        """Note the free poses of *session* from now on, also those that are never drawn."""
+        self.last_session = session
+        session.on_change(lambda _: session.options.preserve_volume or self.note_free(session))
+
+    def note_free(self, session):
+        """Note that the volume of the current pose need not be exact."""
+        if session.state.pose is not None:
+            cage = session.state.pose.cage_vertices[0]
+            self.free_cages[id(cage)] = cage
 
     def on_frame(self, *_):
         """Keep failed checks for `raise_failures`; VTK would print the exception and continue."""
@@ -95,11 +106,12 @@ class Monkey:
         self.pinned += any(name.startswith("pin ") for name in session.handles)
         pose = session.state.pose
         is_free = not session.options.preserve_volume or session is not self.last_session
-        self.last_session = session
         self.free += is_free
+        if is_free:
+            self.note_free(session)
+        if session is not self.last_session:
+            self.follow(session)
         cage = None if pose is None else pose.cage_vertices[0]
-        if is_free and cage is not None:
-            self.free_cages[id(cage)] = cage
         if cage is not None and self.free_cages.get(id(cage)) is cage:
             faces, rest = session.mesh.faces, session.mesh.vertices
             change = signed_volume(session.vertices, faces) / signed_volume(rest, faces) - 1.0

@@ -39,6 +39,7 @@ from .sampling import distinct_lengths, faces_between, nearest_source, unique_ed
 from .up_axis import guess_up_axis
 from .volume import (
     corner_and_edges,
+    outer_components,
     signed_volume,
     step_to_volume,
     volume_along,
@@ -75,6 +76,7 @@ __all__ = [
     "mixed_voronoi_areas",
     "nearest_pairs",
     "nearest_source",
+    "outer_components",
     "rigid_fit",
     "signed_volume",
     "step_to_volume",

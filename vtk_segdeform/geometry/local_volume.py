@@ -1,7 +1,8 @@
 """Local volume change: expansion and compression of the body below each vertex.
 
 The largest ball inside the body that touches the surface at vertex i also touches it at another
-vertex o(i), on the opposite side.  The tetrahedra from the triangles around i to o(i) have the
+vertex o(i), on the opposite side.  A body is a component with the cavities in it: others that reach
+into it, as a hat does, may be moved away.  The tetrahedra from the triangles around i to o(i) have the
 volume
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
@@ -29,6 +30,7 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .. import sizes
@@ -37,7 +39,7 @@ from ..kernels import compiled_kernels, in_parallel, inputs, n_threads
 from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
-from .volume import corner_and_edges, volume_gradient
+from .volume import corner_and_edges, outer_components, volume_gradient
 
 _MOST_SHRINKS = 30
 _NARROWEST = np.cos(np.radians(40.0))  # at a smaller angle both points are on one side
@@ -301,18 +303,21 @@ def _edges(faces: IntArray, n: int) -> IntArray:
 def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, FloatArray]:
     """Return the inward normals (n, 3), o (n,) and the diameters (n,) of the inner balls.
 
-    They are the largest balls inside the surface that touch vertices i and o(i).
+    They are the largest balls inside each body that touch vertices i and o(i).
     """
     inward = -volume_gradient(x, faces)
     length = np.linalg.norm(inward, axis=1, keepdims=True)
     inward = np.divide(inward, length, where=length > 0, out=np.zeros_like(inward))
-    tree = cKDTree(x)
+    size = float(np.linalg.norm(np.ptp(x, axis=0)))
+    away = 4.0 * size * _bodies(x, faces)  # in a fourth dimension: to search in one body only
+    tree = cKDTree(np.hstack([x, away]))
     workers = n_threads() if len(x) > sizes.PARALLEL_SEARCH else 1
-    radius = np.full(len(x), np.linalg.norm(np.ptp(x, axis=0)))
+    radius = np.full(len(x), size)
     active = opposite = np.arange(len(x))
     for turn in range(_MOST_SHRINKS):
         centre = x[active] + radius[active, None] * inward[active]
-        distance, touched = (np.asarray(found) for found in tree.query(centre, workers=workers))
+        places = np.hstack([centre, away[active]])
+        distance, touched = map(np.asarray, tree.query(places, workers=workers))
         if not turn:
             opposite = touched.astype(np.int64)
         chord = x[touched] - x[active]
@@ -329,3 +334,14 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
             break
         radius[active], opposite[active] = smaller, touched
     return inward, opposite, 2.0 * radius
+
+
+def _bodies(x: FloatArray, faces: IntArray) -> IntArray:
+    """Return the number of the body of each vertex, (n, 1), or (n, 0) if there is only one."""
+    links = np.ones(2 * len(faces)), faces[:, [0, 1, 1, 2]].reshape(-1, 2).T
+    graph = sparse.coo_array(links, (len(x), len(x)))
+    count, component = connected_components(graph, directed=False)
+    a, e, f = corner_and_edges(x - x.mean(axis=0), faces)
+    six = np.bincount(component[faces[:, 0]], np.einsum("ij,ij->i", a, np.cross(e, f)), count)
+    bodies = outer_components(x, component, six)[component]
+    return bodies[:, None] if bodies.any() else np.empty((len(x), 0), dtype=np.int64)

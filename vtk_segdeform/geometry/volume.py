@@ -81,6 +81,26 @@ def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
     return np.array([c0, c1, c2, c3]) / 6.0
 
 
+def outer_components(x: FloatArray, component: IntArray, volumes: FloatArray) -> IntArray:
+    """Return the component around each cavity, and of other components their own number, (c,) int.
+
+    *component* (n,) is that of each vertex at *x* (n, 3).  Those whose volume (c,) is negative are
+    cavities, in the smallest body whose bounding box is around theirs.
+    """
+    outer = np.arange(len(volumes))
+    if not (volumes < 0.0).any():
+        return outer
+    low, high = np.full((2, len(volumes), 3), [[[np.inf]], [[-np.inf]]])
+    np.minimum.at(low, component, x)
+    np.maximum.at(high, component, x)
+    largest = np.argsort(-volumes, kind="stable")
+    for cavity in np.flatnonzero(volumes < 0.0):
+        around = (low[largest] < low[cavity]) & (high[largest] > high[cavity])
+        bodies = largest[around.all(axis=1) & (volumes[largest] > 0.0)]
+        outer[cavity] = bodies[-1] if len(bodies) else cavity
+    return outer
+
+
 def step_to_volume(coefficients: FloatArray, target: float) -> float:
     """Return the step t of least magnitude at which the cubic of `volume_along` equals *target*.
 

@@ -30,6 +30,7 @@ from ..geometry import (
     Lids,
     corner_and_edges,
     lids_of,
+    outer_components,
     signed_volume,
     step_to_volume,
     volume_along_path,
@@ -240,19 +241,7 @@ class Bodies:
     @cached_property
     def _outer(self) -> IntArray:
         """The component around each cavity, and of other components their own number, (c,) int."""
-        mesh, volumes = self.mesh, self._volumes
-        outer = np.arange(len(volumes))
-        if not (volumes < 0.0).any():
-            return outer
-        low, high = np.full((2, len(volumes), 3), [[[np.inf]], [[-np.inf]]])
-        np.minimum.at(low, mesh.components, mesh.vertices)
-        np.maximum.at(high, mesh.components, mesh.vertices)
-        largest = np.argsort(-volumes, kind="stable")
-        for cavity in np.flatnonzero(volumes < 0.0):
-            around = (low[largest] < low[cavity]) & (high[largest] > high[cavity])
-            bodies = largest[around.all(axis=1) & (volumes[largest] > 0.0)]
-            outer[cavity] = bodies[-1] if len(bodies) else cavity  # the smallest around it
-        return outer
+        return outer_components(self.mesh.vertices, self.mesh.components, self._volumes)
 
 
 def region_volumes(
