@@ -116,6 +116,7 @@ class Controller:
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
+        self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
 
     @property
@@ -296,7 +297,15 @@ class Controller:
 
     def _show_error(self, error: Exception) -> None:
         self.messages.report_error(error)
+        self._has_failed = True
         self.refresh()
+
+    def _gesture_moved(self, *_: object) -> None:
+        """Clear the error of an earlier move, which may have been refused, after another one."""
+        if self.messages.error and not self._has_failed:
+            self.messages.clear()
+            self.refresh()
+        self._has_failed = False
 
     def _listen(self) -> None:
         session = self.session
@@ -306,6 +315,7 @@ class Controller:
         waiting.is_coming = lambda: self._preparing.is_running
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
+            widget.AddObserver("InteractionEvent", self._gesture_moved)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
         self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 

@@ -219,7 +219,7 @@ class HandleDragger(Widget):
         if axis >= 0:
             self._constraint = next_constraint(self._grabbed, self._constraint, axis)
         elif self._entry.is_enter(key):
-            return self.finish()
+            return self._live.is_refused or self.finish()
         elif not self._entry.type(key):
             return False
         self._send(Phase.MOVE, "InteractionEvent")

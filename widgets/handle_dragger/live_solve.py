@@ -48,10 +48,12 @@ class LiveSolve:
     ----------
     is_enabled : bool
         Whether the timer refines.
+    is_refused : bool
+        Whether the last targets of the gesture were refused.
     """
 
     def __init__(self, view: View, session: Session, failed: Callable[[], object]) -> None:
-        self.is_enabled = True
+        self.is_enabled, self.is_refused = True, False
         self._view, self._session, self._failed = view, session, failed
         self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
         self._stop: Stop | None = None
@@ -78,8 +80,10 @@ class LiveSolve:
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
+        self.is_refused = True
         with self._view.guarded(ConstraintError):
             self._measure(solve, self.steps)
+            self.is_refused = False
         self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
 
@@ -103,11 +107,13 @@ class LiveSolve:
     def begin(self) -> None:
         """Stop refining until `resume`; where pictures are slow, draw drafts from now on."""
         self._draft.begin(if_slow=True)
+        self.is_refused = False
         self._stop_refining()
 
     def pause(self) -> None:
         """Stop refining until `resume`, and draw in full quality."""
         self._draft.end()
+        self.is_refused = False
         self._stop_refining()
 
     def halt(self) -> None:

@@ -245,7 +245,7 @@ class Puller(Widget):
         elif key.lower() == "r":
             motion.toggle_turning(pointer, self.session.turned())
         elif motion.entry.is_enter(key):
-            return self.finish()
+            return self._live.is_refused or self.finish()
         elif not motion.entry.type(key):
             return False
         self._send(Phase.MOVE, "InteractionEvent")

@@ -231,6 +231,22 @@ def grabbed(bench, fraction=0.6):  # noqa: F811
     hand.drag([start + share * np.array([15.0, 25.0]) for share in np.linspace(0.0, 1.0, 3)])
 
 
+def test_the_error_of_a_move_is_shown_until_a_move_that_succeeds(bench):  # noqa: F811
+    hand, x = bench.hand, bench.session.vertices
+    bench.session.bind()
+    bench.type("0")
+    hand.press(hand.at(x[np.argmax(x[:, 0] - 2.0 * x[:, 1])]))
+    for key in ("z", "9", "9", "9", "Return"):
+        hand.key(key)
+    assert "more than 10 mesh diagonals away" in bench.editor.status
+    hand.key("BackSpace")  # 99
+    assert "more than 10 mesh diagonals away" in bench.editor.status
+    hand.key("BackSpace")
+    assert "diagonals" not in bench.editor.status
+    hand.key("Escape")
+    hand.failures.clear()
+
+
 @pytest.mark.parametrize("avoids", [False, True])
 def test_a_pull_stays_as_it_is_unless_contact_is_avoided(bench, avoids):  # noqa: F811
     bench.session.bind()

@@ -879,6 +879,8 @@ def test_targets_too_far_away_are_refused_and_the_drag_continues():
     for key in ["x", "9", "9", "9"]:
         bench.hand.key(key)
     assert len(bench.hand.failures) == 4  # also with x, 99 and 999
+    bench.hand.key("Return")
+    assert bench.dragger.is_grabbing
     bench.hand.key("BackSpace")
     bench.hand.key("BackSpace")
     start = bench.session.mesh.vertices[bench.session.handles["handle 1"]]

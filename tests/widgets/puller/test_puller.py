@@ -140,6 +140,7 @@ def test_a_number_that_is_too_large_can_be_corrected():
     for key in ["z", "9", "9", "9"]:
         bench.hand.key(key)
     assert "mesh diagonals away" in str(bench.hand.failures[-1])
+    bench.hand.key("Return")  # refused, too
     assert bench.puller.is_grabbing
     assert bench.session.state.pose is not None  # 9 was no error
     for key in ["BackSpace", "BackSpace", "BackSpace", "period", "5", "Return"]:
