@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from vtk_segdeform.cages import suggested_size
+
 from ..editor import (
     DeformEditor,
     finishing_after_drags,
@@ -26,8 +28,8 @@ def cages_section(editor: DeformEditor) -> Section:
     options, has_regions = session.options, session.regions is not None
     fitted = sum(cage.n_vertices for cage in session.cages)
     wanted = options.n_cage_vertices
-    if fitted and wanted == type(options)().n_cage_vertices:  # which follows the number of regions
-        wanted = fitted
+    if session.regions is not None and wanted == type(options)().n_cage_vertices:
+        wanted = fitted or suggested_size(session.regions)  # the default follows the regions
     least = _EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
     return Section(
@@ -39,7 +41,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "slider",
                 "Detail",
                 "Detail of cages: release to refit them",
-                value=fitted or options.n_cage_vertices,
+                value=fitted or wanted,
                 enabled=has_regions,
                 minimum=least,
                 maximum=max(least, _MOST_DETAIL),

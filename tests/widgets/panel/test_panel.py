@@ -16,6 +16,7 @@ from scenes import sausage
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.regions import segment
 from vtk_segdeform.session.state import State
 from vtk_segdeform.widgets.editor import Controller, preparing
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
@@ -273,6 +274,17 @@ def test_rows_are_selected_renamed_and_checked():
         assert [row.selected for row in regions()] == [False, False, True]
         with pytest.raises(ArgumentError, match="cannot be renamed"):
             press(editor, "regions.list.rename", ("2", "x"))
+
+
+def test_before_cages_are_fitted_their_suggested_number_of_vertices_is_shown():
+    mesh = sausage(is_coarse=True).mesh
+    session = Session(mesh)
+    session.set_regions(segment(mesh, 7))
+    with editing(Mode.CAGES, session) as made:
+        shown = [of(made, f"cages.{name}").value for name in ("detail", "total")]
+        session.fit_cages()
+        assert shown == [7 * 30] * 2
+        assert shown[0] == sum(cage.n_vertices for cage in session.cages)
 
 
 def test_the_newest_pull_is_selected_or_the_one_that_is_pulled_again():
