@@ -311,3 +311,18 @@ def test_a_finished_pose_that_does_not_fit_is_refused():
         short = replace(state.pose.finished, **{part: getattr(state.pose.finished, part)[1:]})
         with pytest.raises((CageError, ConstraintError)):
             checked_state(session.mesh, replace(state, pose=replace(state.pose, finished=short)))
+
+
+@pytest.mark.parametrize("free", [0, 1])
+def test_a_finished_pose_of_which_hardly_a_vertex_is_free_keeps_its_volume(free):
+    session = dragged(ready())
+    session.finish()
+    held = np.concatenate([session.fixed, session.handles["tip"]])
+    rest = np.setdiff1d(np.arange(session.mesh.n_vertices), held)
+    name = session.add_handle(rest[free:])
+    before = session.vertices
+    session.move_handle(name, turned(0.2))
+    assert session.state.pose.finished is not None
+    assert abs(session.volume_change) < 1e-12
+    moved = np.linalg.norm(session.vertices - before, axis=1).max()
+    assert moved < 0.3 * SCENE.mesh.diagonal
