@@ -15,6 +15,7 @@ from .controls import Press, box_frame
 Qt = QtCore.Qt
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+_MOST_ROWS = 14  # that a list is high, where there is room
 _NAME_LETTERS = 15  # of the first column, with its icon
 
 
@@ -81,6 +82,12 @@ class TableView(QtWidgets.QTreeWidget):
             return False
         return super().edit(index, *how)
 
+    def sizeHint(self) -> Any:  # noqa: N802 - Qt's name
+        """Return a height for all rows, up to the largest one."""
+        hint = super().sizeHint()
+        hint.setHeight(self.maximumHeight())
+        return hint
+
     def _set_sizes(self, n_rows: int) -> None:
         header = self.header()
         header.setStretchLastSection(False)
@@ -93,12 +100,18 @@ class TableView(QtWidgets.QTreeWidget):
         letters = _NAME_LETTERS * self.fontMetrics().averageCharWidth()
         bar = self.verticalScrollBar().sizeHint().width() + 2 * self.frameWidth()
         self.setMinimumWidth(letters + widths + bar)  # names are legible beside a scroll bar
-        height = 1.3 * self.fontMetrics().height()  # of a row
-        self.setMinimumHeight(round((0.5 * n_rows + 1.5) * height))
-        self.setMaximumHeight(round((n_rows + 1.5) * height))
+        self.setMinimumHeight(self._height_of(0.5 * n_rows))
+        self._leave_room(n_rows)
+
+    def _leave_room(self, n_rows: int) -> None:
+        self.setMaximumHeight(self._height_of(n_rows))
+
+    def _height_of(self, n_rows: float) -> int:
+        return round((n_rows + 1.5) * 1.3 * self.fontMetrics().height())
 
     def _draw_rows(self, rows: tuple[Row, ...]) -> None:
         self._rows = rows
+        self._leave_room(min(max(len(rows), self._table.n_rows), _MOST_ROWS))
         while self.topLevelItemCount() > len(rows):
             self.takeTopLevelItem(len(rows))
         while self.topLevelItemCount() < len(rows):

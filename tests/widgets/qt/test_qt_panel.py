@@ -9,10 +9,11 @@ from qtpy import QtGui
 
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.panel.fields import Table, tooltip
+from vtk_segdeform.widgets.panel.fields import Row, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, press, sections
 from vtk_segdeform.widgets.panel.toolbar import toolbar
 from vtk_segdeform.widgets.qt import icons
+from vtk_segdeform.widgets.qt.tables import TableView
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -249,3 +250,16 @@ def test_letters_in_a_field_are_no_keys_of_the_editor(widget, key):
     settle(widget)
     assert widget.editor.session.state is state
     assert widget.editor.widgets.surface.style is style
+
+
+def test_a_list_is_as_high_as_its_rows_up_to_a_largest_height():
+    application()
+    rows = tuple(Row(str(k), f"region {k}", (0, 0, 0)) for k in range(30))
+    view = TableView(Table("list", "Region", (), rows[:1], n_rows=7), lambda *_: None)
+    heights = []
+    for count in (1, 7, 12, 14, 30):
+        view.draw(Table("list", "Region", (), rows[:count], n_rows=7))
+        heights.append(view.sizeHint().height())
+    least, seven, twelve, most, still = heights
+    assert least == seven < twelve < most == still
+    assert view.minimumHeight() < seven  # where there is no room
