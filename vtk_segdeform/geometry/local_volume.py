@@ -1,9 +1,9 @@
 """Local volume change: expansion and compression of the body below each vertex.
 
 The largest ball inside the body that touches the surface at vertex i also touches it at another
-vertex o(i), on the opposite side.  A body is a component with the cavities in it: others that reach
-into it, as a hat does, may be moved away.  The tetrahedra from the triangles around i to o(i) have the
-volume
+vertex o(i), on the opposite side.  A body is a component with the cavities in it; others that reach
+into it, as a hat does, may be moved away.  The tetrahedra from the triangles around i to o(i) have
+the volume
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
            = sum_{T at i} (x_a - x_o) . N_T / 18,        N_T = (x_b - x_a) x (x_c - x_a)
@@ -342,6 +342,7 @@ def _bodies(x: FloatArray, faces: IntArray) -> IntArray:
     graph = sparse.coo_array(links, (len(x), len(x)))
     count, component = connected_components(graph, directed=False)
     a, e, f = corner_and_edges(x - x.mean(axis=0), faces)
-    six = np.bincount(component[faces[:, 0]], np.einsum("ij,ij->i", a, np.cross(e, f)), count)
-    bodies = outer_components(x, component, six)[component]
+    determinants = np.einsum("ij,ij->i", a, cross_rows(e, f))
+    volumes = np.bincount(component[faces[:, 0]], determinants, count).astype(np.float64)
+    bodies = outer_components(x, component.astype(np.int64), volumes)[component]
     return bodies[:, None] if bodies.any() else np.empty((len(x), 0), dtype=np.int64)

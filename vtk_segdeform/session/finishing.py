@@ -160,7 +160,7 @@ def _on_volumes(
         normals[stays] = 0.0
         directions.append(normals)
     paths = np.hstack([moved, *directions])
-    return moved_along(paths, steps_to_volume(constraints, paths)) + centre
+    return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
 def _offset(

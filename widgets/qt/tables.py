@@ -107,7 +107,7 @@ class TableView(QtWidgets.QTreeWidget):
         self.setMaximumHeight(self._height_of(n_rows))
 
     def _height_of(self, n_rows: float) -> int:
-        return round((n_rows + 1.5) * 1.3 * self.fontMetrics().height())
+        return int((n_rows + 1.5) * 1.3 * self.fontMetrics().height() + 0.5)
 
     def _draw_rows(self, rows: tuple[Row, ...]) -> None:
         self._rows = rows

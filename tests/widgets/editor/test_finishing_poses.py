@@ -28,8 +28,7 @@ from vtk_segdeform.widgets.editor import (
 from vtk_segdeform.widgets.editor import settling as settling_poses
 from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.recording.recording import replay
-from vtk_segdeform.widgets.scene import Phase, Pointer
-from vtk_segdeform.widgets.scene import glide
+from vtk_segdeform.widgets.scene import Phase, Pointer, glide
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
 
