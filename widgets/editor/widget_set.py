@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Options, Session
 
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
@@ -86,6 +87,16 @@ class WidgetSet:
         """Number of regions."""
         regions = self.session.regions
         return 0 if regions is None else regions.n_regions
+
+    @property
+    def n_cage_vertices(self) -> int:
+        """The total number of vertices of the cages, or else of those that fitting would make."""
+        session = self.session
+        if session.cages:
+            return sum(cage.n_vertices for cage in session.cages)
+        wanted = session.options.n_cage_vertices
+        is_default = wanted == Options().n_cage_vertices
+        return suggested_size(session.regions) if session.regions and is_default else wanted
 
     def choose_region(self, region: int) -> None:
         """Select *region* for painting; an index after the last one adds a region.

@@ -17,7 +17,6 @@ from collections import deque
 from collections.abc import Callable
 from statistics import median
 
-from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution, Status
 
@@ -81,7 +80,7 @@ class LiveSolve:
             self._session.bind()  # beforehand, so that it is not measured as part of a step
         self._draft.begin()
         self.is_refused = True
-        with self._view.guarded(ConstraintError):
+        with self._view.guarded(only_refusals=True):
             self._measure(solve, self.steps)
             self.is_refused = False
         self._draft.begin()  # again, as a slow solve is no rest

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from vtk_segdeform.cages import suggested_size
-
 from ..editor import (
     DeformEditor,
     finishing_after_drags,
@@ -28,8 +26,8 @@ def cages_section(editor: DeformEditor) -> Section:
     options, has_regions = session.options, session.regions is not None
     fitted = sum(cage.n_vertices for cage in session.cages)
     wanted = options.n_cage_vertices
-    if session.regions is not None and wanted == type(options)().n_cage_vertices:
-        wanted = fitted or suggested_size(session.regions)  # the default follows the regions
+    if wanted == type(options)().n_cage_vertices:
+        wanted = widgets.n_cage_vertices  # the default follows the regions
     least = _EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
     return Section(
@@ -41,7 +39,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "slider",
                 "Detail",
                 "Detail of cages: release to refit them",
-                value=fitted or wanted,
+                value=widgets.n_cage_vertices,
                 enabled=has_regions,
                 minimum=least,
                 maximum=max(least, _MOST_DETAIL),

@@ -32,7 +32,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
 from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import as_callable, as_text, shown
-from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.errors import ArgumentError, ConstraintError
 
 from .foreground import Foreground
 from .gestures import Phase, Pointer
@@ -326,11 +326,16 @@ class View(Projection):
         return _once(lambda: self._failures.remove(listener))
 
     @contextmanager
-    def guarded(self, kind: type[Exception] = Exception) -> Iterator[None]:
-        """Pass exceptions of a *kind* to the failure listeners; without any, re-raise them."""
+    def guarded(self, *, only_refusals: bool = False) -> Iterator[None]:
+        """Pass exceptions raised inside to the failure listeners; without any, re-raise them.
+
+        *only_refusals*: only those of type `ConstraintError`.
+        """
         try:
             yield
-        except kind as error:  # the border to the event loop: any exception may arrive
+        except Exception as error:  # the border to the event loop: any exception may arrive
+            if only_refusals and not isinstance(error, ConstraintError):
+                raise
             _log.info("a callback failed", exc_info=True)
             if not self._failures:
                 raise
