@@ -135,13 +135,15 @@ def moved_on(
         if np.abs(changed - shifts).max() > _TURNED * np.ptp(x, axis=0).max():
             shifts = changed  # else the targets of the cages stay, so that they converge
     if constraints:
+        tried, exact = [], []
         for stays in (held, fixed, held[:0]):
-            landed = _on_volumes(moved, constraints, stays)
-            if np.abs(landed - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
-                off = [abs(each.relative(landed)) for each in constraints]
-                if max(off) <= _VOLUME_KEPT:
+            tried.append(_on_volumes(moved, constraints, stays))
+            if max(abs(each.relative(tried[-1])) for each in constraints) <= _VOLUME_KEPT:
+                exact.append(tried[-1])
+                if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
+                    exact = exact[-1:]
                     break
-        moved = landed
+        moved = (exact or tried)[0]
     for array in (moved, known, shifts):
         frozen(array)
     return replace(finished, vertices=moved, held=known, shifts=shifts)
