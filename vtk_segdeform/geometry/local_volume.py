@@ -1,9 +1,9 @@
 """Local volume change: expansion and compression of the body below each vertex.
 
 The largest ball inside the body that touches the surface at vertex i also touches it at another
-vertex o(i), on the opposite side.  A body is a component with the cavities in it; others that reach
-into it, as a hat does, may be moved away.  The tetrahedra from the triangles around i to o(i) have
-the volume
+vertex o(i), on the opposite side.  A body is a component with its cavities; another component that
+reaches into it, such as a hat, does not count.  The tetrahedra from the triangles around i to o(i)
+have the volume
 
     L_i(x) = sum_{T = (a, b, c) at i} det(x_a - x_o, x_b - x_o, x_c - x_o) / 18
            = sum_{T at i} (x_a - x_o) . N_T / 18,        N_T = (x_b - x_a) x (x_c - x_a)
@@ -309,7 +309,7 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     length = np.linalg.norm(inward, axis=1, keepdims=True)
     inward = np.divide(inward, length, where=length > 0, out=np.zeros_like(inward))
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
-    away = 4.0 * size * _bodies(x, faces)  # in a fourth dimension: to search in one body only
+    away = 4.0 * size * _bodies(x, faces)  # a fourth coordinate keeps searches in one body
     tree = cKDTree(np.hstack([x, away]))
     workers = n_threads() if len(x) > sizes.PARALLEL_SEARCH else 1
     radius = np.full(len(x), size)

@@ -15,8 +15,8 @@ hand finished at -40 degrees and bent to +40 has distortion 0.118, as without an
 makes it 0.148; bent back by half it has 0.034 instead of 0.043.  The cages are solved for as
 if nothing had been finished, so the next move of a handle continues from where the cages are, and
 nothing jumps.  The volume is restored along the normals of the free vertices, by far less than the
-offset.  Where hardly a vertex is free, handles are moved, too, and at last fixed vertices: as in
-the cages, the volume comes first.
+offset.  If too few vertices are free for that, handles are moved as well, and finally fixed
+vertices: as in the solve for the cages, the volume takes precedence.
 
 The finish of a pull starts from the mesh that is shown, because it keeps the surface beyond the
 reach; any other starts from W~ p, so that the way to it makes no difference.
@@ -43,7 +43,7 @@ Cages: TypeAlias = tuple[FloatArray, ...]
 
 _EDGES = 20_000  # along which bending is compared, at most
 _ALIKE = 0.6, 0.85  # cosines between ways of bending for f = 0 and 1
-_GIVES = 0.02  # mesh sizes by which free vertices move for the volume, at most
+_GIVES = 0.02  # mesh sizes by which the correction of the volume moves vertices, at most
 _VOLUME_KEPT = 1e-9  # relative
 _TURNED = 3e-5  # mesh sizes by which shifts must turn before the targets of the cages follow
 

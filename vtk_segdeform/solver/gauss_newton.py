@@ -89,8 +89,8 @@ _EXACT = 0.99  # least share of the rotations' term with which a step tells what
 _SLOWEST = 0.9  # largest ratio of two steps by which the later ones are extrapolated
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
-_ROUNDED = 1e-6  # the longest steps that may be rounding
-_STILL = 50  # steps without a lower merit, after which they are
+_ROUNDED = 1e-6  # longest step that may be due to rounding
+_STILL = 50  # steps without a lower merit, after which it counts as rounding
 
 
 @dataclass(frozen=True)
@@ -578,7 +578,7 @@ class GaussNewton:
         return _RISE * (self.energy.constant + abs(here.merit))
 
     def _is_still(self, here: _Iterate, merits: list[float], state: _State) -> bool:
-        """Return whether only rounding moves the pose, as it does where weights are high."""
+        """Return whether the last steps were rounding only, as happens with high weights."""
         if len(merits) <= _STILL or state.step_size > _ROUNDED:
             return False
         return merits[-1 - _STILL] - here.merit <= self._rounding(here)

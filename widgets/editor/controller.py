@@ -301,7 +301,7 @@ class Controller:
         self.refresh()
 
     def _gesture_moved(self, *_: object) -> None:
-        """Clear the error of an earlier move, which may have been refused, after another one."""
+        """Clear the error of an earlier move once a move succeeds."""
         if self.messages.error and not self._has_failed:
             self.messages.clear()
             self.refresh()

@@ -90,7 +90,7 @@ class WidgetSet:
 
     @property
     def n_cage_vertices(self) -> int:
-        """The total number of vertices of the cages, or else of those that fitting would make."""
+        """Total number of cage vertices; before cages are fitted, the suggested number."""
         session = self.session
         if session.cages:
             return sum(cage.n_vertices for cage in session.cages)

@@ -73,8 +73,8 @@ class LiveSolve:
     def solve(self, solve: Callable[..., Solution]) -> None:
         """Call ``solve(max_steps=..., within=...)``, and refine its result later.
 
-        If the targets are refused, that is reported to `View.on_failure` and the pose stays, so
-        that the gesture can continue.
+        Targets that raise `ConstraintError` are reported to `View.on_failure` and leave the pose
+        unchanged, so that the gesture can continue.
         """
         if not self._session.is_bound:
             self._session.bind()  # beforehand, so that it is not measured as part of a step

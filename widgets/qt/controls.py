@@ -72,12 +72,12 @@ def number_box(box: Any) -> Any:
 
 
 class Slider(QtWidgets.QSlider):
-    """A slider with its value in `figure`, a label to put beside it.
+    """A slider whose value is shown by `figure`, a label beside it.
 
     Parameters
     ----------
     on_release : bool
-        Whether it reports its value only when it is released; `figure` follows it anyway.
+        Whether the value changes only at the release; `figure` shows it during the drag as well.
     """
 
     def __init__(self, *, on_release: bool) -> None:
@@ -89,7 +89,7 @@ class Slider(QtWidgets.QSlider):
         self.sliderMoved.connect(self._show)
 
     def set_unit(self, unit: str) -> None:
-        """Show *unit* after the value, and leave room for the largest one."""
+        """Show *unit* after the value, and make room for the largest value."""
         self.unit = unit
         widest = self.figure.fontMetrics().horizontalAdvance(self._text(self.maximum()))
         self.figure.setMinimumWidth(widest)
@@ -129,7 +129,7 @@ def choice_box(choices: list[str]) -> Any:
 
 
 def with_figure(bar: Slider) -> Any:
-    """Return a layout with a slider and its figure."""
+    """Return a layout with a slider and its value beside it."""
     layout = QtWidgets.QHBoxLayout()
     layout.setSpacing(_GAP)
     layout.addWidget(bar, 1)

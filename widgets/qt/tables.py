@@ -15,7 +15,7 @@ from .controls import Press, box_frame
 Qt = QtCore.Qt
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
-_MOST_ROWS = 14  # that a list is high, where there is room
+_MOST_ROWS = 14  # shown without scrolling
 _NAME_LETTERS = 15  # of the first column, with its icon
 
 

@@ -329,7 +329,7 @@ class View(Projection):
     def guarded(self, *, only_refusals: bool = False) -> Iterator[None]:
         """Pass exceptions raised inside to the failure listeners; without any, re-raise them.
 
-        *only_refusals*: only those of type `ConstraintError`.
+        With *only_refusals*, pass on `ConstraintError` only.
         """
         try:
             yield
