@@ -157,25 +157,6 @@ def _bodies_once() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def vtk_in_process() -> Iterator[None]:
-    """Read files of VTK in this process: for tests of contents, it saves 0.2 s for each file."""
-    from vtk_segdeform.io import isolated, reading_child
-
-    outside = isolated._exit_code
-
-    def here(arguments: list[str], folder: str, seconds: float) -> int:
-        tool, path, results, _ = arguments[-4:]
-        if tool != "vtk":
-            return outside(arguments, folder, seconds)
-        reading_child.main(tool, path, results, "0")
-        return 0
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(isolated, "_exit_code", here)
-        yield
-
-
-@pytest.fixture(scope="module")
 def bound_once() -> Iterator[None]:
     """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
     from vtk_segdeform.deformer import deformer

@@ -17,7 +17,6 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
 from vtk_segdeform.models import sphere
 
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 QUICK = ["--regions", "1", "--cage-vertices", "40"]
 OF_PARTS = ["--regions", "3", "--cage-vertices", "90"]
 ROUGH = ["--no-refine"]  # in `test_main` poses are refined

@@ -15,7 +15,6 @@ from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
 
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,6 @@ from vtk_segdeform.io.convert import (
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
-INSIDE = pytest.mark.usefixtures("vtk_without_child")  # for tests of contents only
 EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"]
 
 
@@ -50,7 +49,6 @@ def quad_cube() -> pv.PolyData:
     return cube
 
 
-@INSIDE
 @pytest.mark.parametrize("suffix", EXACT)
 def test_meshes_are_read_as_written_to_the_last_digit_in_the_same_order(tmp_path, suffix):
     mesh = shuffled()
@@ -60,7 +58,6 @@ def test_meshes_are_read_as_written_to_the_last_digit_in_the_same_order(tmp_path
     assert_array_equal(again.faces, mesh.faces)
 
 
-@INSIDE
 @pytest.mark.parametrize("suffix", EXACT)
 def test_polygons_are_preserved_and_cut_only_for_the_mesh(tmp_path, suffix):
     cube = quad_cube()
@@ -72,7 +69,6 @@ def test_polygons_are_preserved_and_cut_only_for_the_mesh(tmp_path, suffix):
     assert signed_volume(mesh.vertices, mesh.faces) == pytest.approx(1 / 27, rel=1e-14)
 
 
-@INSIDE
 @pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtkhdf"])
 def test_every_array_is_preserved_by_a_deformation_and_by_vtk_files(tmp_path, suffix):
     cube = quad_cube()
@@ -210,7 +206,6 @@ def test_normals_follow_the_surface_and_the_original_is_unchanged(dtype):
     )
 
 
-@INSIDE
 def test_strips_and_a_grid_of_triangles_become_the_same_mesh(tmp_path):
     mesh = Mesh(*icosphere(2))
     strips = to_polydata(mesh).strip()
@@ -340,7 +335,6 @@ def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
         read_polydata(tmp_path / f"a{suffix}")
 
 
-@INSIDE
 def test_text_that_vtkhdf_cannot_store_is_left_out_with_a_warning(tmp_path, caplog):
     surface = to_polydata(Mesh(*icosphere(0)))
     surface.point_data["name"] = np.array([f"point {k}" for k in range(surface.n_points)])

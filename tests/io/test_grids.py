@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from test_vtk_xml import contents
+from test_vtk_formats import contents
 from vtkmodules.vtkCommonCore import vtkFloatArray, vtkIdTypeArray, vtkStringArray
 
 from vtk_segdeform.errors import MeshError

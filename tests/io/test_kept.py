@@ -21,7 +21,6 @@ from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.polygons import corner_values, padded_corners, polydata_of, polygons_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.rst"
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".vtp", ".vtk", ".vtu", ".vtkhdf"]
 SINGLE = {".stl", ".glb"}
 FOLLOW = ("Normals", "NORMAL", "NormalCorners")
@@ -96,7 +95,7 @@ def same_cells(first, second):
 
 
 @pytest.fixture(scope="module")
-def trips(tmp_path_factory, vtk_in_process):
+def trips(tmp_path_factory):
     """Return a function that gives (made, read, moved, read again) of a format and a surface."""
     folder = tmp_path_factory.mktemp("kept")
 

@@ -23,7 +23,6 @@ import vtk_segdeform as sd
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io.polygons import polygons_of
 
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 NAMED = {each.name: each for each in SPECIMENS}
 TURN = rotation([0.0, 1.0, 0.0], 0.5)
 EACH = pytest.mark.parametrize("specimen", SPECIMENS, ids=[each.name for each in SPECIMENS])

@@ -35,7 +35,7 @@ from vtk_segdeform.widgets import plugin
 from vtk_segdeform.widgets.hosting import session_of
 from vtk_segdeform.widgets.scene.view import View
 
-pytestmark = pytest.mark.usefixtures("bound_once", "vtk_in_process")
+pytestmark = pytest.mark.usefixtures("bound_once")
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENE = sausage(is_coarse=True)

@@ -33,7 +33,7 @@ from ..arrays import FloatArray, IntArray, is_whole
 from ..checks import all_of, as_path, require, shown
 from ..errors import ArgumentError, MeshError, MissingDependencyError
 from ..mesh import Mesh, require_mesh
-from .isolated import read_isolated
+from .confined import read_confined
 from .meshlab_layers import (
     HasLayers,
     Layer,
@@ -153,9 +153,9 @@ def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
     path = as_path(path)
     _pymeshlab()
     try:
-        with read_isolated("meshlab", path) as folder, np.load(folder / "mesh.npz") as arrays:
-            return _plain(arrays["vertices"], arrays["faces"])
-    except (MeshError, OSError) as error:
+        arrays = read_confined("meshlab", path)
+        return _plain(arrays["vertices"].reshape(-1, 3), arrays["faces"])
+    except (MeshError, OSError, KeyError, ValueError) as error:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
 
 

@@ -1,23 +1,38 @@
-"""The child process that reads a file with VTK or PyMeshLab; `isolated` starts it.
+"""The confined process that reads files with VTK or PyMeshLab; `confined` starts it.
 
-    python reading_child.py vtk|meshlab FILE FOLDER BYTES
+Both libraries trust the files that they read: a wrong count crashes them, and a file can name other
+files that they then read as well.  So this process reads one request after another from its
+standard input, a line of JSON each, and forks for every one of them.  The fork gives up everything
+it does not need, reads the file, and writes plain arrays to standard output:
 
-It allocates at most about BYTES of memory, unless that is 0.  It writes its results to FOLDER:
-0.vtp, 1.vtu ... for surfaces and grids, or mesh.npz for vertices and faces.  Characters of names
-that XML cannot store are escaped as %XX.  If the file cannot be read, error.txt has the reason.
-Both libraries may crash, hence the separate process.  This module imports nothing of the package,
-so that it starts in a fraction of a second.
+    limits of memory, processor time and open files; no files written, no core dumps
+    Landlock (Linux 5.13): no file can be opened but the given one, no TCP connection made
+    HDF5 is searched for data in other files before VTK opens it
+
+Where there is no fork, the process reads the file itself, with the limits that exist there.
+
+A reply is a sequence of pairs of arrays in numpy's .npy format: a name, as bytes in UTF-8, and its
+values; it ends with an empty name.  The only name of a failed reply is "error".  A data set k has
+
+    k/points  k/verts/offsets  k/verts/corners ... (lines, polys, strips)  k/cells/...  k/types
+    k/point/j/name  /values  /lengths (of texts)  /uses  /ids  /components      (cell, field)
+
+This module imports nothing of the package, and numpy only where it must, so that it starts in a
+fraction of a second.
 """
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import importlib
+import json
+import os
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
-from urllib.parse import quote
+from typing import Any, BinaryIO
 
 # Readers of the VTK formats: module and class.
 _READERS = {
@@ -26,14 +41,9 @@ _READERS = {
     ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
     ".vtkhdf": ("vtkIOHDF", "vtkHDFReader"),
 }
-_WRITERS = {
-    "vtkPolyData": (".vtp", "vtkXMLPolyDataWriter"),
-    "vtkUnstructuredGrid": (".vtu", "vtkXMLUnstructuredGridWriter"),
-}
 _STRUCTURED = (
     "vtkStructuredGrid", "vtkRectilinearGrid", "vtkStructuredPoints", "vtkImageData",
 )  # fmt: skip
-_REFUSED = re.compile(r"[%<>&\"\x00-\x1f\x7f-\x9f]")
 # In VTK's messages.  The second is only a warning, but missing numbers are returned as zeros.
 _FAILURE = re.compile(r"ERROR:|Error reading")
 _TEXT = re.compile(rb"[^\n]*\n[^\n]*\n\s*ASCII\b", re.IGNORECASE)
@@ -41,30 +51,181 @@ _END = b"end_of_the_file"
 _LEGACY = (
     "ColorScalars", "Fields", "Normals", "Scalars", "TCoords", "Tensors", "Vectors",
 )  # fmt: skip
+_NORM_RANGE = re.compile(  # of bounded length, so that no file takes quadratic time
+    rb'<InformationKey\s[^<>]{0,200}name="L2_NORM_(?:FINITE_)?RANGE"[^<>]{0,200}>'
+    rb".{0,1000}?</InformationKey>",
+    re.DOTALL,
+)
+_KINDS = {"f": "f", "d": "f", "c": "i", **dict.fromkeys("bhilq", "i"), **dict.fromkeys("BHILQ", "u")}
+_MOST_FILES = 16  # open at a time; a reader opens one or two
+# <linux/landlock.h>: the numbers of its system calls, which are the same for all processors.
+_CREATE, _ADD, _RESTRICT, _VERSION, _BENEATH, _READ_FILE = 444, 445, 446, 1, 1, 1 << 2
+_NO_NEW_PRIVILEGES = 38
 
 
-def main(tool: str, path: str, folder: str, limit: str) -> None:
-    """Read one file, and write the results or the reason of the failure."""
+def main() -> None:
+    """Serve requests until standard input ends, or one of them crashes this process."""
+    replies = os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)  # the libraries print
+    _set_limits({"RLIMIT_CORE": 0})
+    for line in sys.stdin.buffer:
+        request = json.loads(line)
+        _import_reader(request["tool"], request["path"])
+        if sys.platform != "linux":
+            answer(replies, **request)
+            continue
+        child = os.fork()
+        if not child:
+            os.close(0)
+            answer(replies, **request, confined=True)
+            os._exit(0)
+        if code := os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]):
+            os._exit(128 - code if code < 0 else code)
+
+
+def answer(
+    replies: BinaryIO, tool: str, path: str, memory: int, seconds: int, *, confined: bool = False
+) -> None:
+    """Read the file at *path*, and write its arrays, or the reason of the failure.
+
+    Parameters
+    ----------
+    replies : binary file
+        Where to write.
+    tool : str
+        "vtk" or "meshlab".
+    path : str
+        The file, by its absolute path.
+    memory, seconds : int
+        Bytes and processor time that reading may take.
+    confined : bool
+        Give up, for good, what this process does not need for that.
+    """
     try:
-        {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path), Path(folder), int(limit))
+        if confined:
+            most = memory + _memory_in_use()
+            _set_limits(
+                {
+                    "RLIMIT_AS": most,
+                    "RLIMIT_CPU": seconds,
+                    "RLIMIT_FSIZE": 0,
+                    "RLIMIT_NOFILE": _MOST_FILES,
+                }
+            )
+            _confine(path)
+        for name, values in {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path)):
+            _write(replies, name.encode())
+            _write(replies, values)
     except (RuntimeError, ValueError, MemoryError, OSError, ImportError) as error:
         reason = str(error) or type(error).__name__
-        (Path(folder) / "error.txt").write_text(reason, encoding="utf-8", errors="replace")
+        _write(replies, b"error")
+        _write(replies, reason.encode(errors="replace"))
+    _write(replies, b"")
+    replies.flush()
 
 
-def _with_vtk(path: Path, folder: Path, limit: int) -> None:
-    core = importlib.import_module("vtkmodules.vtkCommonCore")
-    module, name = _READERS[path.suffix.lower()]
-    reader = getattr(importlib.import_module(f"vtkmodules.{module}"), name)()
-    writers = importlib.import_module("vtkmodules.vtkIOXML")
-    _limit_memory(limit)
+def landlock_version() -> int:
+    """Return the version of Landlock of this kernel; 0 if it has none."""
+    if sys.platform != "linux":
+        return 0
+    library = ctypes.CDLL(None, use_errno=True)
+    return max(0, int(library.syscall(_CREATE, None, ctypes.c_size_t(0), _VERSION)))
+
+
+def _confine(path: str) -> None:
+    """Make *path* the only file that this process can open, where the kernel supports it."""
+    version = landlock_version()
+    if not version:
+        return
+    library = ctypes.CDLL(None, use_errno=True)
+    # All rights to files that this version knows, to bind and connect TCP, and to signal others.
+    n_rights = 13 + (version >= 2) + (version >= 3) + (version >= 5)
+    rules = [(1 << n_rights) - 1, 3, 3][: 1 + (version >= 4) + (version >= 6)]
+    attributes = (ctypes.c_uint64 * len(rules))(*rules)
+    size = ctypes.c_size_t(ctypes.sizeof(attributes))
+    ruleset = library.syscall(_CREATE, attributes, size, 0)
+    file = os.open(path, os.O_PATH | os.O_CLOEXEC)
+    allowed = _READ_FILE.to_bytes(8, sys.byteorder) + file.to_bytes(4, sys.byteorder)
+    failed = (
+        ruleset < 0
+        or library.syscall(_ADD, ruleset, _BENEATH, allowed, 0)
+        or library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+        or library.syscall(_RESTRICT, ruleset, 0)
+    )
+    if failed:
+        raise OSError(f"the process cannot be confined: {os.strerror(ctypes.get_errno())}")
+    os.close(file)
+    os.close(ruleset)
+
+
+def _memory_in_use() -> int:
+    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
+    return int(pages) * int(os.sysconf("SC_PAGE_SIZE"))
+
+
+def _set_limits(limits: dict[str, int]) -> None:
+    """Lower limits of this process, those that the system has."""
+    try:
+        resource: Any = importlib.import_module("resource")
+    except ImportError:
+        return
+    for name, most in limits.items():
+        kind = getattr(resource, name, None)
+        if kind is not None:
+            hard = resource.getrlimit(kind)[1]
+            most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+            resource.setrlimit(kind, (most, most))
+
+
+def _write(replies: BinaryIO, values: Any) -> None:
+    """Write values that support the buffer protocol in numpy's format."""
+    view = memoryview(values)
+    letter = view.format.lstrip("@=<|")
+    kind = {"?": "u"}.get(letter) or _KINDS[letter]
+    order = "|" if view.itemsize == 1 else {"little": "<", "big": ">"}[sys.byteorder]
+    head = (
+        f"{{'descr': '{order}{kind}{view.itemsize}', 'fortran_order': False, "
+        f"'shape': {tuple(view.shape)}, }}"
+    )
+    head += " " * (-(len(head) + 11) % 64) + "\n"
+    replies.write(b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode())
+    if view.nbytes:
+        replies.write(view.cast("B"))
+
+
+def _import_reader(tool: str, path: str) -> None:
+    """Import what reading will need: a confined process cannot."""
+    with contextlib.suppress(ImportError):  # which reading then reports
+        if tool == "meshlab":
+            _module("pymeshlab")
+            return
+        suffix = Path(path).suffix.lower()
+        _module("vtkmodules.vtkCommonCore")
+        _module(f"vtkmodules.{_READERS[suffix][0]}")
+        if suffix in (".vtk", ".vtkhdf"):
+            _module("vtkmodules.vtkFiltersCore")
+        if suffix == ".vtkhdf":
+            _module("h5py")
+
+
+_module = importlib.import_module
+
+
+def _with_vtk(path: Path) -> Iterator[tuple[str, Any]]:
+    core = _module("vtkmodules.vtkCommonCore")
+    suffix = path.suffix.lower()
+    module, name = _READERS[suffix]
+    reader = getattr(_module(f"vtkmodules.{module}"), name)()
     window, before = core.vtkStringOutputWindow(), core.vtkOutputWindow.GetInstance()
     core.vtkOutputWindow.SetInstance(window)
     try:
+        if suffix == ".vtkhdf":
+            _require_own_data(path)
         _update(reader, path)
         if _FAILURE.search(window.GetOutput()):
             raise ValueError(window.GetOutput())
-        if path.suffix.lower() == ".vtk" and _TEXT.match(data := path.read_bytes()):
+        if suffix == ".vtk" and _TEXT.match(data := path.read_bytes()):
             own = core.vtkStringOutputWindow()
             core.vtkOutputWindow.SetInstance(own)
             _require_whole(type(reader)(), data, own)
@@ -72,19 +233,38 @@ def _with_vtk(path: Path, folder: Path, limit: int) -> None:
         for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
             if piece.GetClassName() in _STRUCTURED:
                 piece = _unstructured(piece)
-            _write_piece(piece, folder / str(number), writers)
-            if _FAILURE.search(window.GetOutput()):
-                raise ValueError(window.GetOutput())
+            for key, values in _arrays_of(piece, core):
+                yield f"{number}/{key}", values
     finally:
         core.vtkOutputWindow.SetInstance(before)
 
 
 def _update(reader: Any, path: Path) -> None:
-    reader.SetFileName(str(path))
-    if path.suffix.lower() == ".vtk":
-        for sort in _LEGACY:
-            getattr(reader, f"ReadAll{sort}On")()
+    suffix = path.suffix.lower()
+    reader.SetFileName(os.fsencode(path) if os.name == "posix" else str(path))
+    if suffix == ".vtk":
+        _read_all(reader)
+    elif suffix != ".vtkhdf":
+        plain = without_ranges(data := path.read_bytes())
+        if len(plain) < len(data):
+            reader.ReadFromInputStringOn()
+            reader.SetInputString(plain)
     reader.Update()
+
+
+def without_ranges(data: bytes) -> bytes:
+    """Return a file in XML without the ranges of norms, which VTK computes again when needed.
+
+    VTK computes norms of integers with integers, writes "-nan" where these overflow, and cannot
+    read that.
+    """
+    head, mark, rest = data.partition(b"<AppendedData")
+    return _NORM_RANGE.sub(b"", head) + mark + rest
+
+
+def _read_all(reader: Any) -> None:
+    for sort in _LEGACY:
+        getattr(reader, f"ReadAll{sort}On")()
 
 
 def _require_whole(reader: Any, data: bytes, window: Any) -> None:
@@ -96,48 +276,51 @@ def _require_whole(reader: Any, data: bytes, window: Any) -> None:
     whole = data + b"\n\n" + _END + b" 1\n"
     reader.ReadFromInputStringOn()
     reader.SetBinaryInputString(whole, len(whole))
-    for sort in _LEGACY:
-        getattr(reader, f"ReadAll{sort}On")()
+    _read_all(reader)
     reader.Update()
     if _END.decode() not in window.GetOutput():
         raise ValueError("its numbers do not fit their counts: it is damaged, or was cut off")
 
 
+def _require_own_data(path: Path) -> None:
+    """Raise ValueError if an HDF5 file refers to data in other files.
+
+    Those are external links, external storage and virtual data sets.
+    """
+    try:
+        h5py = _module("h5py")
+    except ImportError:
+        raise ValueError("reading this format needs h5py: pip install h5py") from None
+    with h5py.File(os.fsencode(path), "r") as file:
+
+        def links_out(name: bytes, info: Any) -> bytes | None:
+            is_inside = info.type in (h5py.h5l.TYPE_HARD, h5py.h5l.TYPE_SOFT)
+            return None if is_inside else name
+
+        def is_stored_outside(name: bytes) -> bytes | None:
+            item = h5py.h5o.open(file.id, name)
+            if not isinstance(item, h5py.h5d.DatasetID):
+                return None
+            made = item.get_create_plist()
+            is_outside = made.get_external_count() or made.get_layout() == h5py.h5d.VIRTUAL
+            return name if is_outside else None
+
+        found = file.id.links.visit(links_out, info=True)
+        found = h5py.h5o.visit(file.id, is_stored_outside) if found is None else found
+    if found is not None:
+        raise ValueError(
+            f"{found.decode(errors='replace')!r} is data in another file, which is not read"
+        )
+
+
 def _unstructured(grid: Any) -> Any:
     """Return the cells of a structured *grid*: of two dimensions, quads and pixels."""
-    append = importlib.import_module("vtkmodules.vtkFiltersCore").vtkAppendFilter()
+    append = _module("vtkmodules.vtkFiltersCore").vtkAppendFilter()
     append.SetInputData(grid)
     append.Update()
     cells = append.GetOutput()
     cells.GetFieldData().ShallowCopy(grid.GetFieldData())
     return cells
-
-
-def _write_piece(piece: Any, path: Path, writers: Any) -> None:
-    """Write a data set in VTK's XML format, uncompressed, to *path* with its suffix."""
-    sort = piece.GetClassName()
-    if sort not in _WRITERS:
-        raise ValueError(f"it contains a {sort}, not a surface")
-    for attributes in (piece.GetPointData(), piece.GetCellData(), piece.GetFieldData()):
-        for k in range(attributes.GetNumberOfArrays()):
-            array = attributes.GetAbstractArray(k)
-            array.SetName(_escaped(array.GetName() or ""))
-            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
-                array.SetComponentName(j, _escaped(array.GetComponentName(j) or ""))
-    suffix, name = _WRITERS[sort]
-    writer = getattr(writers, name)()
-    writer.SetFileName(f"{path}{suffix}")
-    writer.SetInputData(piece)
-    writer.SetDataModeToAppended()
-    writer.EncodeAppendedDataOff()
-    writer.SetCompressorTypeToNone()
-    writer.SetHeaderTypeToUInt64()
-    if not writer.Write():
-        raise ValueError("the data cannot be returned by the child process")
-
-
-def _escaped(name: str) -> str:
-    return _REFUSED.sub(lambda found: quote(found[0]), name)
 
 
 def _pieces(data: Any) -> Iterator[Any]:
@@ -155,10 +338,77 @@ def _pieces(data: Any) -> Iterator[Any]:
         item.GoToNextItem()
 
 
-def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
-    pymeshlab = importlib.import_module("pymeshlab")
+def _arrays_of(piece: Any, core: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the arrays of a surface or a grid by name."""
+    sort = piece.GetClassName()
+    if sort == "vtkPolyData":
+        lists = {name: getattr(piece, f"Get{name.title()}")() for name in ("verts", "lines", "polys", "strips")}
+    elif sort == "vtkUnstructuredGrid":
+        lists = {"cells": piece.GetCells()}
+        if piece.GetNumberOfCells():
+            yield "types", _plain(piece.GetCellTypesArray(), core)
+    else:
+        raise ValueError(f"it contains a {sort}, not a surface")
+    if piece.GetPoints() is not None:
+        yield "points", _plain(piece.GetPoints().GetData(), core)
+    for name, cells in lists.items():
+        if cells is not None and cells.GetNumberOfCells():
+            yield f"{name}/offsets", _plain(cells.GetOffsetsArray(), core)
+            yield f"{name}/corners", _plain(cells.GetConnectivityArray(), core)
+    for name in ("point", "cell", "field"):
+        attributes = getattr(piece, f"Get{name.title()}Data")()
+        for k in range(attributes.GetNumberOfArrays()):
+            array = attributes.GetAbstractArray(k)
+            for key, values in _array(array, core):
+                yield f"{name}/{k}/{key}", values
+            kinds = range(attributes.NUM_ATTRIBUTES if name != "field" else 0)
+            uses = bytes(kind for kind in kinds if attributes.GetAbstractAttribute(kind) is array)
+            yield f"{name}/{k}/uses", uses
+
+
+def _array(array: Any, core: Any) -> Iterator[tuple[str, Any]]:
+    yield "name", _bytes(array.GetName() or "")
+    if array.IsA("vtkStringArray"):
+        texts = [_bytes(array.GetValue(k)) for k in range(array.GetNumberOfValues())]
+        yield "values", b"".join(texts)
+        yield "lengths", _integers(map(len, texts))
+    elif array.IsA("vtkDataArray"):
+        yield "values", _plain(array, core)
+    else:
+        raise ValueError(f"it contains a {array.GetClassName()}, which is not supported")
+    yield "width", bytes([min(array.GetNumberOfComponents(), 255)])
+    if array.IsA("vtkIdTypeArray"):
+        yield "ids", b""
+    if array.HasAComponentName():
+        names = [_bytes(array.GetComponentName(k) or "") for k in range(array.GetNumberOfComponents())]
+        yield "components", b"\0".join(names)
+
+
+def _plain(array: Any, core: Any) -> Any:
+    """Return an array whose values lie in memory one after another."""
+    if array.IsA("vtkBitArray"):
+        plain = core.vtkUnsignedCharArray()
+    else:
+        plain = core.vtkDataArray.CreateDataArray(array.GetDataType())
+        if array.GetClassName() == plain.GetClassName():
+            return array
+        with contextlib.suppress(TypeError, BufferError):
+            return memoryview(array)
+    plain.DeepCopy(array)
+    return plain
+
+
+def _integers(values: Iterable[int]) -> memoryview:
+    return memoryview(b"".join(value.to_bytes(8, sys.byteorder) for value in values)).cast("q")
+
+
+def _bytes(text: str | bytes) -> bytes:
+    return text if isinstance(text, bytes) else text.encode(errors="surrogateescape")
+
+
+def _with_meshlab(path: Path) -> Iterator[tuple[str, Any]]:
+    pymeshlab = _module("pymeshlab")
     meshset = pymeshlab.MeshSet(verbose=False)
-    _limit_memory(limit)
     try:
         meshset.load_new_mesh(str(path))
         if meshset.mesh_number() > 1:
@@ -166,26 +416,9 @@ def _with_meshlab(path: Path, folder: Path, limit: int) -> None:
     except pymeshlab.PyMeshLabException as error:
         raise ValueError(str(error)) from None
     mesh = meshset.current_mesh()
-    numpy: Any = importlib.import_module("numpy")
-    numpy.savez(folder / "mesh.npz", vertices=mesh.vertex_matrix(), faces=mesh.face_matrix())
-
-
-def _limit_memory(most: int) -> None:
-    """Limit the memory of this process to *most* more bytes, where the system supports that."""
-    if not most:
-        return
-    try:
-        resource: Any = importlib.import_module("resource")
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
-        most += pages * resource.getpagesize()
-        _, hard = resource.getrlimit(resource.RLIMIT_AS)
-        if hard != resource.RLIM_INFINITY:
-            most = min(most, hard)
-        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # no core dumps
-    except (ImportError, OSError, ValueError):
-        return
+    yield "vertices", mesh.vertex_matrix().copy(order="C")
+    yield "faces", mesh.face_matrix().copy(order="C")
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

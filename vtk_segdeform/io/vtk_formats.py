@@ -1,8 +1,7 @@
 """Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
 
-Reading: the readers of VTK do not validate a file, so they run in a child process (`isolated`);
-afterwards the cells and arrays are checked, and VTK's error messages become a MeshError.  Plain
-.vtk, .vtp and .vtu files are read without VTK (`vtk_legacy`, `vtk_xml`).
+Reading: the readers of VTK do not validate a file, so they run in a `confined` process; the data
+sets are made of its arrays (`vtk_arrays`), and VTK's error messages become a MeshError.
 
 Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
 names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to
@@ -12,16 +11,13 @@ the legacy reader fails on long names and on active scalars of more than four co
 
 from __future__ import annotations
 
-import base64
 import logging
 import re
 import shutil
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, unquote
+from urllib.parse import quote
 
 import numpy as np
 import pyvista as pv
@@ -40,23 +36,14 @@ from .array_names import (
     set_names,
     warn_renamed,
 )
+from .confined import read_confined
 from .grids import grid_of, is_grid, surface_of_grid
-from .isolated import read_isolated
-from .vtk_legacy import read_plain_legacy
-from .vtk_xml import read_plain_xml
+from .reading_child import without_ranges
+from .vtk_arrays import data_sets
 
 _log = logging.getLogger(__name__)
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
 _XML = frozenset({".vtp", ".vtu"})
-_PLAIN = {".vtk": read_plain_legacy, **dict.fromkeys(_XML, read_plain_xml)}
-_DENSEST = 1100  # most bytes out of one compressed byte
-_COUNTS = re.compile(rb'(NumberOf\w+)="(\d+)"')
-_NORM_RANGE = re.compile(  # of bounded length, so that no file takes quadratic time
-    rb'<InformationKey\s[^<>]{0,200}name="L2_NORM_(?:FINITE_)?RANGE"[^<>]{0,200}>'
-    rb".{0,1000}?</InformationKey>",
-    re.DOTALL,
-)
-_BINARY = re.compile(rb'format="binary"[^>]*>\s*([A-Za-z0-9+/=]{32})')
 _TITLE, _NO_TITLE = re.compile(rb"[^\n]*\n([^\r\n]{1,255})\r?\n"), "vtk output"
 _BEGINS = {
     ".vtk": re.compile(rb"# vtk DataFile"),
@@ -71,73 +58,36 @@ _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy fil
 
 
 def read_with_vtk(path: Path) -> pv.PolyData:
-    """Read a surface by one of VTK's readers, in a child process."""
+    """Read a surface by one of VTK's readers, in a confined process."""
     suffix = path.suffix.lower()
     with path.open("rb") as file:
-        if not _BEGINS[suffix].match(file.read(1000)):
-            raise MeshError(
-                f"does not begin as a {suffix} file does; it is damaged, or of another format: "
-                "give it the suffix of its format"
-            )
-    if suffix in _PLAIN:
-        data = path.read_bytes()
-        plain = _PLAIN[suffix](data)
-        if plain is not None:
-            return _with_title(_surface(plain, suffix), path)
-        if suffix in _XML:
-            _require_plausible_counts(data)
+        begin = file.read(1000)
+    if not _BEGINS[suffix].match(begin):
+        raise MeshError(
+            f"does not begin as a {suffix} file does; it is damaged, or of another format: "
+            "give it the suffix of its format"
+        )
     try:
-        with _without_ranges_of(path) as source, read_isolated("vtk", source) as folder:
-            pieces = sorted(folder.iterdir(), key=lambda piece: int(piece.stem))
-            for piece in pieces:
-                if (plain := _without_ranges(data := piece.read_bytes())) != data:
-                    piece.write_bytes(plain)
-            parts = [_validated(pv.get_reader(piece).read()) for piece in pieces]
-    except (MeshError, RuntimeError) as error:
+        surfaces = [_surface(each, suffix) for each in data_sets(read_confined("vtk", path))]
+    except MeshError as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
-    surfaces = [_surface(part, suffix) for part in parts]
     if len(surfaces) > 1:  # of several grids nothing is restored
         surfaces = [_without_types(each) for each in surfaces]
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     if suffix == ".vtkhdf":  # it does not store which arrays are active
         _activate_normals(surface)
-    return _with_title(surface, path)
-
-
-def _with_title(surface: pv.PolyData, path: Path) -> pv.PolyData:
-    """Store the title of a legacy file as the field array `HEADER`, unless it is VTK's default."""
-    if path.suffix.lower() == ".vtk":
-        with path.open("rb") as file:
-            found = _TITLE.match(file.read(1000))
-        title = decoded(found[1]).strip() if found else ""
-        is_new = title.isprintable() and title not in ("", _NO_TITLE)
-        if is_new and HEADER not in surface.field_data:
-            set_names(surface, HEADER, [title])
+    elif suffix == ".vtk":
+        _set_title(surface, begin)
     return surface
 
 
-def _without_ranges(data: bytes) -> bytes:
-    """Return a file in XML without the ranges of norms, which VTK computes again when needed.
-
-    VTK computes norms of integers with integers, writes "-nan" where these overflow, and cannot
-    read that.
-    """
-    end = data.find(b"<AppendedData")
-    head, rest = (data, b"") if end < 0 else (data[:end], data[end:])
-    return _NORM_RANGE.sub(b"", head) + rest
-
-
-@contextmanager
-def _without_ranges_of(path: Path) -> Iterator[Path]:
-    """Yield *path*, or that of a copy without ranges of norms if it has some."""
-    data = path.read_bytes() if path.suffix.lower() in _XML else b""
-    if (plain := _without_ranges(data)) == data:
-        yield path
-        return
-    with tempfile.TemporaryDirectory(prefix="segdeform-") as folder:
-        copy = Path(folder) / f"copy{path.suffix}"
-        copy.write_bytes(plain)
-        yield copy
+def _set_title(surface: pv.PolyData, begin: bytes) -> None:
+    """Store the title of a legacy file as the field array `HEADER`, unless it is VTK's default."""
+    found = _TITLE.match(begin)
+    title = decoded(found[1]).strip() if found else ""
+    is_new = title.isprintable() and title not in ("", _NO_TITLE)
+    if is_new and HEADER not in surface.field_data:
+        set_names(surface, HEADER, [title])
 
 
 def _activate_normals(surface: pv.PolyData) -> None:
@@ -146,75 +96,6 @@ def _activate_normals(surface: pv.PolyData) -> None:
         found = normals is not None and normals.shape[1:] == (3,) and normals.dtype.kind == "f"
         if found and attributes.active_normals_name is None:
             attributes.active_normals_name = "Normals"
-
-
-def _validated(data: pv.DataSet) -> pv.DataSet:
-    """Return *data* with its original names; MeshError if cells or arrays do not fit the points.
-
-    VTK's readers do not check this, and its filters would read outside the arrays.
-    """
-    arrays = [data.GetCells()] if isinstance(data, pv.UnstructuredGrid) else _cell_arrays(data)
-    for cells in arrays:
-        starts = pv.convert_array(cells.GetOffsetsArray())
-        corners = pv.convert_array(cells.GetConnectivityArray())
-        ends = (int(starts[0]), int(starts[-1])) if len(starts) else (0, len(corners))
-        if ends != (0, len(corners)) or (np.diff(starts) < 0).any():
-            raise MeshError("its cells overlap or exceed their list of corners")
-        if len(corners) and not 0 <= corners.min() <= corners.max() < data.n_points:
-            raise MeshError(
-                f"cells use vertices {corners.min()} to {corners.max()}, "
-                f"but there are {data.n_points}"
-            )
-    if isinstance(data, pv.UnstructuredGrid) and len(data.celltypes) != data.n_cells:
-        raise MeshError("the numbers of cells and cell types differ")
-    for sort, attributes, count in (
-        ("point", data.GetPointData(), data.n_points),
-        ("cell", data.GetCellData(), data.n_cells),
-        ("field", data.GetFieldData(), 0),
-    ):
-        for k in range(attributes.GetNumberOfArrays()):
-            array = attributes.GetAbstractArray(k)
-            array.SetName(unquote(array.GetName()))
-            for j in range(array.GetNumberOfComponents() * array.HasAComponentName()):
-                array.SetComponentName(j, unquote(array.GetComponentName(j) or ""))
-            if array.GetNumberOfTuples() != count and sort != "field":
-                raise MeshError(
-                    f"its {sort} array {array.GetName()!r} has {array.GetNumberOfTuples()} rows; "
-                    f"must be {count}"
-                )
-    return data
-
-
-def _cell_arrays(data: pv.PolyData) -> list[Any]:
-    return [data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips()]
-
-
-def _require_plausible_counts(data: bytes) -> None:
-    """Raise a MeshError if a file declares more than its bytes can contain.
-
-    VTK's XML readers would allocate that much memory and crash.  Each block of an array, compressed
-    or not, also begins with counts: a few integers in base64.
-    """
-    most = _DENSEST * len(data)
-    for match in _COUNTS.finditer(data):
-        if int(match[2]) > most:
-            raise MeshError(f"declares {match[0].decode()}, too many for {len(data)} bytes")
-    wide = b'header_type="UInt64"' in data[:1000]
-    coded = b"compressor=" in data[:1000]
-    order = ">" if b'byte_order="BigEndian"' in data[:1000] else "<"
-    for match in _BINARY.finditer(data):
-        words = np.frombuffer(_decoded(match[1]), order + ("u8" if wide else "u4"))
-        counts = words[: 3 if coded else 1].astype(float)
-        if (counts > most).any() or (coded and len(counts) > 1 and counts[0] * counts[1] > most):
-            raise MeshError(f"declares an array that is too large for {len(data)} bytes")
-
-
-def _decoded(word: bytes) -> bytes:
-    """Return the first 24 bytes of base64 text; empty if it is invalid."""
-    try:
-        return base64.b64decode(word)[:24]
-    except ValueError:
-        return b""
 
 
 def _surface(data: pv.DataSet, suffix: str) -> pv.PolyData:
@@ -251,7 +132,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()
         writer.Write()
-        path.write_bytes(_without_ranges(writer.GetOutputString().encode()))
+        path.write_bytes(without_ranges(writer.GetOutputString().encode()))
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):

@@ -30,7 +30,7 @@ from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.scene import Phase, Pointer, glide
 
-pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 
 pull_handle = functools.partial(pull_handle_in, moves=2)
 

@@ -17,7 +17,7 @@ from vtk_segdeform.widgets.editor import notices_of
 from vtk_segdeform.widgets.scene.highlights import DOT, LOOP
 from vtk_segdeform.widgets.scene.view import View
 
-pytestmark = pytest.mark.usefixtures("unprepared", "vtk_in_process")
+pytestmark = pytest.mark.usefixtures("unprepared")
 
 LOOP_RGB, DOT_RGB = (np.array(list(bytes.fromhex(c[1:])), int) for c in (LOOP, DOT))
 

@@ -20,7 +20,6 @@ from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import actions, controller, rest, saving
 
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 
 
 @pytest.fixture(scope="module")

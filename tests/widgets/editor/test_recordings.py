@@ -16,7 +16,7 @@ from vtk_segdeform.widgets.editor.editor import Mode
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.region_selector.region_selector import Tool
 
-pytestmark = pytest.mark.usefixtures("unprepared", "bound_once", "vtk_in_process")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 
 
 @pytest.fixture
