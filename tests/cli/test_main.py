@@ -365,9 +365,17 @@ def test_version_says_which_libraries_are_missing_for_full_speed(
     missing, advice, monkeypatch, capsys
 ):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name in missing else name)
+    monkeypatch.setattr("vtk_segdeform.files.landlock.version", lambda: 1)
     assert main(["--version"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines == [f"segdeform {vtk_segdeform.__version__}", *filter(None, [advice])]
+
+
+@pytest.mark.parametrize("known", [0, 3])
+def test_version_says_if_the_reading_of_files_cannot_be_confined(known, monkeypatch, capsys):
+    monkeypatch.setattr("vtk_segdeform.files.landlock.version", lambda: known)
+    assert main(["--version"]) == 0
+    assert ("Landlock" in capsys.readouterr().out) == (not known)
 
 
 def test_version_and_help_end_well(capsys):

@@ -16,7 +16,6 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
 
 
-
 @pytest.fixture(scope="module")
 def given(tmp_path_factory) -> str:
     path = tmp_path_factory.mktemp("pull") / "holed.vtp"

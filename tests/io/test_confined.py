@@ -20,6 +20,7 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow
 
 from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.files import landlock
 from vtk_segdeform.io import confined, meshlab, reading_child
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
@@ -81,7 +82,7 @@ def test_pieces_of_a_file_are_one_surface(tmp_path):
     assert read_polydata(tmp_path / "a.vtkhdf").n_cells == 24
 
 
-LANDLOCK = pytest.mark.skipif(not reading_child.landlock_version(), reason="needs Landlock")
+LANDLOCK = pytest.mark.skipif(not landlock.version(), reason="needs Landlock")
 MESHLAB = pytest.mark.skipif(not meshlab.available(), reason="needs PyMeshLab")
 VERTICES, FACES = CUBE
 POINTS = " ".join(map(str, np.ravel(VERTICES)))
@@ -148,7 +149,10 @@ def hdf(path, **other):
         del group["Points"]
         if "storage" in other:
             group.create_dataset(
-                "Points", points.shape, points.dtype, external=[(other["storage"], 0, points.nbytes)]
+                "Points",
+                points.shape,
+                points.dtype,
+                external=[(other["storage"], 0, points.nbytes)],
             )
         elif "link" in other:
             group["Points"] = h5py.ExternalLink(other["link"], "/Points")
@@ -207,10 +211,10 @@ def test_the_process_can_open_nothing_but_the_file(tmp_path):
     secret.write_text("b")
     code = f"""
 import os, socket, sys
-sys.path.insert(0, {str(Path(reading_child.__file__).parent)!r})
-import reading_child
+sys.path.insert(0, {str(Path(landlock.__file__).parent)!r})
+import landlock
 open({str(secret)!r}).close()
-reading_child._confine({str(allowed)!r})
+landlock.allow_only({str(allowed)!r})
 print(open({str(allowed)!r}).read())
 for act in (
     lambda: open({str(secret)!r}), lambda: open({str(allowed)!r}, "w"),
@@ -271,7 +275,9 @@ compressor="vtkZLibDataCompressor"><PolyData><Piece NumberOfPoints="{n_points}" 
 <Points><DataArray type="Float32" NumberOfComponents="3" format="appended" offset="0"/></Points>
 <Polys><DataArray type="Int64" Name="connectivity" format="ascii">0 1 2</DataArray>
 <DataArray type="Int64" Name="offsets" format="ascii">3</DataArray></Polys></Piece></PolyData>
-<AppendedData encoding="raw">_""".encode() + data + b"</AppendedData></VTKFile>"
+<AppendedData encoding="raw">_""".encode()
+        + data
+        + b"</AppendedData></VTKFile>"
     )
     with pytest.raises(MeshError, match="64 times the memory of the file"):
         read_polydata(tmp_path / "a.vtp")

@@ -52,10 +52,9 @@ GRANTED = {
     "io.grids": VTK,
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
+    "io.reading_child": VTK | {"h5py", "pymeshlab"},
+    "io.vtk_arrays": VTK,
     "io.vtk_formats": VTK,
-    "io.vtk_legacy": VTK,
-    "io.vtk_parts": VTK,
-    "io.vtk_xml": VTK,
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
@@ -85,7 +84,9 @@ GRANTED = {
     "cli.replaying": {"pyvista"},
 }
 
-MAY_PRINT_AND_EXIT = {"cli.main", "__main__", "filters.paraview_plugin", "widgets.web.client"}
+MAY_PRINT_AND_EXIT = {
+    "cli.main", "__main__", "filters.paraview_plugin", "io.reading_child", "widgets.web.client",
+}  # fmt: skip
 LONGEST = 400
 FILES = {
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path

@@ -218,12 +218,13 @@ class _HandleOption(argparse.Action):
 
 
 class _Version(argparse.Action):
-    """--version also names missing libraries that affect speed."""
+    """--version also names missing libraries that affect speed, and weaker protection."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from ..files import landlock
         from ..kernels import advice
 
-        print("\n".join(filter(None, (f"segdeform {__version__}", advice()))))
+        print("\n".join(filter(None, (f"segdeform {__version__}", advice(), landlock.advice()))))
         parser.exit()
 
 

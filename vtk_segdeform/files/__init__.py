@@ -6,8 +6,10 @@ The files, in reading order:
     atomic          write a draft, then rename it over the old file
     lock            lock files, released when their process ends
     regular_file    open regular files only: no pipes, no devices
+    landlock        a process gives up its right to open other files
 """
 
+from . import landlock
 from .atomic import is_draft, replacing, require_place
 from .folders import autosave_folder, cache_folder
 from .lock import hold
@@ -20,6 +22,7 @@ __all__ = [
     "hold",
     "is_draft",
     "is_ours",
+    "landlock",
     "open_regular",
     "replacing",
     "require_place",

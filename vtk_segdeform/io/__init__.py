@@ -13,11 +13,10 @@ The files, in reading order:
     stl                STL
     gltf               glTF: a folder with its own contents
     vtk_formats        other formats, by VTK
-    vtk_xml vtk_legacy plain files of VTK's formats, without VTK
-    vtk_parts          their cells and arrays
+    vtk_arrays         data sets from plain arrays
     grids              unstructured grids as PolyData, and back
-    isolated reading_child
-                       native readers in a child process
+    confined reading_child
+                       VTK's and PyMeshLab's readers, in a process that can open one file only
     array_names        names and arrays that a format cannot store
     referenced_files   files that another file refers to
     repaired           repair of PolyData with its polygons and arrays

@@ -26,11 +26,12 @@ import tempfile
 import threading
 from multiprocessing import spawn
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 
 from ..errors import MeshError
+from ..files import landlock
 from . import reading_child
 
 _log = logging.getLogger(__name__)
@@ -59,7 +60,7 @@ def read_confined(tool: str, path: Path) -> Arrays:
     """
     path = path.absolute()
     size = path.stat().st_size
-    request = {
+    request: dict[str, Any] = {
         "tool": tool,
         "path": str(path),
         "memory": _MEMORY + _PER_BYTE * size,
@@ -100,14 +101,17 @@ class _Child:
 
     def __init__(self, python: str, tool: str) -> None:
         paths = dict.fromkeys(filter(None, map(_folder_of, _PACKAGES[tool])))
+        paths[str(Path(landlock.__file__).parent)] = None
         start = _START.format(path=list(paths), child=reading_child.__file__)
-        with tempfile.TemporaryDirectory(prefix="segdeform-", ignore_cleanup_errors=True) as empty:
-            self._process: subprocess.Popen[bytes] = subprocess.Popen(
-                [python, "-I", "-S", "-X", "utf8", "-c", start],
-                cwd=empty, env=_environment(), start_new_session=True,
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-            )  # fmt: skip
+        self._empty = tempfile.TemporaryDirectory(prefix="segdeform-")
+        self._process: subprocess.Popen[bytes] = subprocess.Popen(
+            [python, "-I", "-S", "-X", "utf8", "-c", start],
+            cwd=self._empty.name, env=_environment(), start_new_session=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )  # fmt: skip
+        if os.name == "posix":  # elsewhere a folder in use cannot be removed
+            self._empty.cleanup()
 
     def read(self, request: dict[str, Any], most: int) -> Arrays:
         """Return the arrays of the reply to *request*; MeshError if there is none."""
@@ -144,6 +148,7 @@ class _Child:
         """End the process, and what it has started."""
         self._kill()
         self._process.wait()
+        self._empty.cleanup()
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 try:
@@ -175,7 +180,7 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_idle.clear)  # the pipes are the parent's
 
 
-def _reply(stream: BinaryIO, most: int) -> Arrays:
+def _reply(stream: IO[bytes], most: int) -> Arrays:
     """Return the arrays of a reply by name; MeshError if they take more than *most* bytes."""
     arrays: Arrays = {}
     while True:
@@ -187,7 +192,7 @@ def _reply(stream: BinaryIO, most: int) -> Arrays:
         arrays[name.tobytes().decode()] = values
 
 
-def _array(stream: BinaryIO, most: int) -> Any:
+def _array(stream: IO[bytes], most: int) -> Any:
     """Return the next array, in numpy's format; MeshError if it is not one of plain numbers.
 
     EOFError if the stream ends before it does.
@@ -205,7 +210,7 @@ def _array(stream: BinaryIO, most: int) -> Any:
     return np.frombuffer(_exactly(stream, size), dtype=kind).reshape(shape)
 
 
-def _exactly(stream: BinaryIO, size: int) -> bytearray:
+def _exactly(stream: IO[bytes], size: int) -> bytearray:
     """Return the next *size* bytes; EOFError if there are fewer."""
     data = bytearray(size)
     rest = memoryview(data)

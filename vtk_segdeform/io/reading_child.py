@@ -17,14 +17,13 @@ values; it ends with an empty name.  The only name of a failed reply is "error".
     k/points  k/verts/offsets  k/verts/corners ... (lines, polys, strips)  k/cells/...  k/types
     k/point/j/name  /values  /lengths (of texts)  /uses  /ids  /components      (cell, field)
 
-This module imports nothing of the package, and numpy only where it must, so that it starts in a
-fraction of a second.
+It imports nothing of the package but `landlock`, from its folder, and numpy only where it must, so
+that it starts in a fraction of a second.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import importlib
 import json
 import os
@@ -56,11 +55,14 @@ _NORM_RANGE = re.compile(  # of bounded length, so that no file takes quadratic 
     rb".{0,1000}?</InformationKey>",
     re.DOTALL,
 )
-_KINDS = {"f": "f", "d": "f", "c": "i", **dict.fromkeys("bhilq", "i"), **dict.fromkeys("BHILQ", "u")}
+_KINDS = {
+    "f": "f",
+    "d": "f",
+    "c": "i",
+    **dict.fromkeys("bhilq", "i"),
+    **dict.fromkeys("BHILQ", "u"),
+}
 _MOST_FILES = 16  # open at a time; a reader opens one or two
-# <linux/landlock.h>: the numbers of its system calls, which are the same for all processors.
-_CREATE, _ADD, _RESTRICT, _VERSION, _BENEATH, _READ_FILE = 444, 445, 446, 1, 1, 1 << 2
-_NO_NEW_PRIVILEGES = 38
 
 
 def main() -> None:
@@ -69,6 +71,7 @@ def main() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # the libraries print
     _set_limits({"RLIMIT_CORE": 0})
+    _module("landlock")
     for line in sys.stdin.buffer:
         request = json.loads(line)
         _import_reader(request["tool"], request["path"])
@@ -85,7 +88,7 @@ def main() -> None:
 
 
 def answer(
-    replies: BinaryIO, tool: str, path: str, memory: int, seconds: int, *, confined: bool = False
+    replies: BinaryIO, *, tool: str, path: str, memory: int, seconds: int, confined: bool = False
 ) -> None:
     """Read the file at *path*, and write its arrays, or the reason of the failure.
 
@@ -113,7 +116,7 @@ def answer(
                     "RLIMIT_NOFILE": _MOST_FILES,
                 }
             )
-            _confine(path)
+            _module("landlock").allow_only(path)
         for name, values in {"vtk": _with_vtk, "meshlab": _with_meshlab}[tool](Path(path)):
             _write(replies, name.encode())
             _write(replies, values)
@@ -123,40 +126,6 @@ def answer(
         _write(replies, reason.encode(errors="replace"))
     _write(replies, b"")
     replies.flush()
-
-
-def landlock_version() -> int:
-    """Return the version of Landlock of this kernel; 0 if it has none."""
-    if sys.platform != "linux":
-        return 0
-    library = ctypes.CDLL(None, use_errno=True)
-    return max(0, int(library.syscall(_CREATE, None, ctypes.c_size_t(0), _VERSION)))
-
-
-def _confine(path: str) -> None:
-    """Make *path* the only file that this process can open, where the kernel supports it."""
-    version = landlock_version()
-    if not version:
-        return
-    library = ctypes.CDLL(None, use_errno=True)
-    # All rights to files that this version knows, to bind and connect TCP, and to signal others.
-    n_rights = 13 + (version >= 2) + (version >= 3) + (version >= 5)
-    rules = [(1 << n_rights) - 1, 3, 3][: 1 + (version >= 4) + (version >= 6)]
-    attributes = (ctypes.c_uint64 * len(rules))(*rules)
-    size = ctypes.c_size_t(ctypes.sizeof(attributes))
-    ruleset = library.syscall(_CREATE, attributes, size, 0)
-    file = os.open(path, os.O_PATH | os.O_CLOEXEC)
-    allowed = _READ_FILE.to_bytes(8, sys.byteorder) + file.to_bytes(4, sys.byteorder)
-    failed = (
-        ruleset < 0
-        or library.syscall(_ADD, ruleset, _BENEATH, allowed, 0)
-        or library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-        or library.syscall(_RESTRICT, ruleset, 0)
-    )
-    if failed:
-        raise OSError(f"the process cannot be confined: {os.strerror(ctypes.get_errno())}")
-    os.close(file)
-    os.close(ruleset)
 
 
 def _memory_in_use() -> int:
@@ -186,7 +155,7 @@ def _write(replies: BinaryIO, values: Any) -> None:
     order = "|" if view.itemsize == 1 else {"little": "<", "big": ">"}[sys.byteorder]
     head = (
         f"{{'descr': '{order}{kind}{view.itemsize}', 'fortran_order': False, "
-        f"'shape': {tuple(view.shape)}, }}"
+        f"'shape': {tuple(view.shape or ())}, }}"
     )
     head += " " * (-(len(head) + 11) % 64) + "\n"
     replies.write(b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode())
@@ -342,7 +311,10 @@ def _arrays_of(piece: Any, core: Any) -> Iterator[tuple[str, Any]]:
     """Yield the arrays of a surface or a grid by name."""
     sort = piece.GetClassName()
     if sort == "vtkPolyData":
-        lists = {name: getattr(piece, f"Get{name.title()}")() for name in ("verts", "lines", "polys", "strips")}
+        lists = {
+            name: getattr(piece, f"Get{name.title()}")()
+            for name in ("verts", "lines", "polys", "strips")
+        }
     elif sort == "vtkUnstructuredGrid":
         lists = {"cells": piece.GetCells()}
         if piece.GetNumberOfCells():
@@ -380,7 +352,9 @@ def _array(array: Any, core: Any) -> Iterator[tuple[str, Any]]:
     if array.IsA("vtkIdTypeArray"):
         yield "ids", b""
     if array.HasAComponentName():
-        names = [_bytes(array.GetComponentName(k) or "") for k in range(array.GetNumberOfComponents())]
+        names = [
+            _bytes(array.GetComponentName(k) or "") for k in range(array.GetNumberOfComponents())
+        ]
         yield "components", b"\0".join(names)
 
 

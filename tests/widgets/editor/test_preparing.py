@@ -21,7 +21,6 @@ from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import actions, controller, rest, saving
 
 
-
 @pytest.fixture(scope="module")
 def prepared():
     """Return a mesh and the preparation of its session; tests do not change them."""
