@@ -261,6 +261,43 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
         History(0)
 
 
+def test_the_oldest_state_is_named_by_the_last_step_that_was_discarded():
+    session = Session(SCENE.mesh, history=2)
+    session.set_fixed([0])
+    session.add_handle([5], "first")
+    assert session.history == ("opened", "set fixed vertices", "set first")
+    session.add_handle([6], "second")
+    assert session.history == ("set fixed vertices", "set first", "set second")
+    session.add_handle([7], "third")
+    assert session.history == ("set first", "set second", "set third")
+    session.undo()
+    session.undo()
+    assert session.history[session.position] == "set first"
+    assert list(session.handles) == ["first"]
+
+
+def test_there_is_nothing_to_redo_during_a_drag_which_goes_on():
+    session = ready()
+    session.move_handle("tip", up(0.1), max_steps=2)
+    session.commit()
+    session.undo()
+    assert session.redo_label == "drag tip"
+    session.move_handle("tip", up(0.2), max_steps=2)
+    dragged, labels = session.vertices, session.history
+    assert not session.can_redo
+    assert session.redo() is None
+    assert session.is_dragging
+    assert session.vertices is dragged
+    assert session.history == labels
+    session.commit()
+    assert session.redo() is None
+    assert session.vertices is dragged
+    session.undo()
+    assert session.vertices is session.mesh.vertices
+    session.redo()
+    assert session.vertices.tobytes() == dragged.tobytes()
+
+
 def test_a_jump_during_a_drag_ends_it_as_one_step():
     session, heard = ready(), []
     count = len(session.history)

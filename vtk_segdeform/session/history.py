@@ -2,7 +2,8 @@
 
 A *step* leads from one committed state to the next and has a label.  A *drag* consists of many
 moves that become one step: the first move starts it, `Timeline.commit` ends it and
-`Timeline.revert` cancels it.  A step, undo, redo or jump during a drag commits the drag first.
+`Timeline.revert` cancels it.  A step, undo or jump during a drag commits the drag first, and
+there is nothing to redo then.
 """
 
 from __future__ import annotations

@@ -222,6 +222,20 @@ def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, t
     assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
 
 
+@pytest.mark.parametrize("end", ["Off", "remove"])
+def test_a_pose_that_settled_when_the_editor_was_turned_off_is_completed(bench, settling, end):  # noqa: F811
+    shown = bench.session.vertices
+    getattr(bench.editor, end)()
+    assert not settling.is_active
+    assert bench.session.solution.status is Status.STEP_LIMIT
+    bench.editor.complete()
+    assert bench.session.solution.status is not Status.STEP_LIMIT
+    completed = bench.session.vertices
+    assert not np.array_equal(completed, shown)
+    bench.editor.complete()
+    assert bench.session.vertices is completed
+
+
 def grabbed(bench, fraction=0.6):  # noqa: F811
     """Pull the surface at a share of the handle's distance, with the hand, and rest."""
     hand, x = bench.hand, bench.session.vertices

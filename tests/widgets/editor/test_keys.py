@@ -66,6 +66,17 @@ def test_shift_counts_with_letters_only_and_modifiers_have_one_order():
     assert key_name("Ctrl++") == event_key("KP_Add", control=True, alt=False, shift=False)
 
 
+@pytest.mark.parametrize(
+    ("symbol", "digit"),
+    [("KP_Insert", 0), ("KP_End", 1), ("KP_Next", 3), ("KP_Page_Down", 3), ("KP_Begin", 5),
+     ("KP_Home", 7)],
+)  # fmt: skip
+def test_the_keypad_is_the_same_without_num_lock(symbol, digit):
+    plain = {"control": False, "alt": False, "shift": False}
+    assert event_key(symbol, **plain) == event_key(f"KP_{digit}", **plain) == f"kp_{digit}"
+    assert event_key(str(digit), **plain) == str(digit)
+
+
 def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
     editor, hand = editor
     editor.keys = {"undo": "j", "next_handle": "Ctrl+J", "paint_handle": "f5", "record_video": []}
