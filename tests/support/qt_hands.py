@@ -36,7 +36,8 @@ if not shutil.which("Xvfb"):
 Qt = QtCore.Qt
 TRIED = "SEGDEFORM_QT_TRIED"  # set once Qt works, for child processes
 ONE_SCREEN = "SEGDEFORM_ONE_SCREEN"  # set if VTK opens windows too, on Qt's screen
-_SPECIAL = {"bracketleft": Qt.Key_BracketLeft, "bracketright": Qt.Key_BracketRight}
+_SPECIAL = {"bracketleft": Qt.Key_BracketLeft, "bracketright": Qt.Key_BracketRight,
+            "page_down": Qt.Key_PageDown}  # fmt: skip
 
 
 @functools.cache

@@ -269,7 +269,7 @@ def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(again):
     assert len(editor.session.fixed) == MESH.n_vertices
     hand.key("7", Qt.KeypadModifier)
     until(lambda: abs(camera.GetDirectionOfProjection()[2]) > 0.99, "the view from the top")
-    hand.key("PageDown", Qt.KeypadModifier)  # 3, without Num Lock
+    hand.key("page_down", Qt.KeypadModifier)  # 3, without Num Lock
     until(lambda: abs(camera.GetDirectionOfProjection()[0]) > 0.99, "the view from the side")
     hand.key("Home", Qt.KeypadModifier)
     until(lambda: abs(camera.GetDirectionOfProjection()[2]) > 0.99, "the view from the top again")
