@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import functools
 import gc
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -24,9 +25,9 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 
 # In the order of imports; the second row is the method, in the order of the paper.
 ROOMS = [
-    "version", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files", "kernels",
-    "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "finish", "deformer", "io", "session", "models", "pictures", "filters",
+    "version", "importing", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files",
+    "kernels", "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy",
+    "solver", "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel", "widgets.hosting",
@@ -34,7 +35,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 360  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 375  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
@@ -363,6 +364,44 @@ def test_public_functions_take_at_most_four_positional_arguments():
                 if len(positional) > 4:
                     offences.append(f"{name}: {node.name}({', '.join(positional)}): use keywords")
     none(offences)
+
+
+# Ctrl+C ends them, and so the process.
+MAY_BE_INTERRUPTED = ("cli", "benchmarks", "io.reading_child")
+
+
+def test_imports_in_functions_are_completed_though_interrupted():
+    """`imported("a.module")` comes before `from a.module import ...`; see importing.py."""
+    found = [name for name in FILES if not name.startswith(MAY_BE_INTERRUPTED)]
+    found = [
+        name for name in found if re.search(r"^ +(from|import) ", FILES[name].read_text(), re.M)
+    ]
+    none(
+        f"{name}: {node.name} imports {ast.unparse(inner)} without `imported`"
+        for name in found
+        for node in nodes_of(name)
+        if isinstance(node, ast.FunctionDef) and "imported(" not in ast.unparse(node)
+        for inner in ast.walk(node)
+        if isinstance(inner, ast.Import | ast.ImportFrom)
+        if ast.unparse(inner) != "from . import WebEditor"  # which its face does
+    )
+    none(
+        f"{name}: {what}: use importing.imported"
+        for name in FILES
+        if not name.startswith((*MAY_BE_INTERRUPTED, "importing"))
+        for what, _ in calls_in(name)
+        if what.endswith("import_module")
+    )
+
+
+def test_scipy_starts_no_threads():
+    """They outlive a query that is interrupted, but not its arrays: use kernels.nearest."""
+    none(
+        f"{name}: {ast.unparse(call)}"
+        for name in FILES
+        for _, call in calls_in(name)
+        if any(each.arg == "workers" for each in call.keywords)
+    )
 
 
 # They write to a draft from their caller, to the growing log of a recording, or to /proc.
