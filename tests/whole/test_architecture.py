@@ -25,9 +25,10 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 
 # In the order of imports; the second row is the method, in the order of the paper.
 ROOMS = [
-    "version", "importing", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files",
-    "kernels", "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy",
-    "solver", "finish", "deformer", "io", "session", "models", "pictures", "filters",
+    "version", "importing", "errors", "interpreter", "sizes", "checks", "arrays", "progress",
+    "freezing", "files", "kernels",
+    "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
+    "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel", "widgets.hosting",
@@ -35,7 +36,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 375  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 380  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
@@ -401,6 +402,28 @@ def test_scipy_starts_no_threads():
         for name in FILES
         for _, call in calls_in(name)
         if any(each.arg == "workers" for each in call.keywords)
+    )
+
+
+# A browser, git, and a command from `interpreter`; io.isolated sets the path of its child itself.
+START_PROCESSES = {
+    "interpreter", "benchmarks.chromium", "benchmarks.history", "io.isolated", "pictures.canvas",
+    "widgets.web.serving.client",
+}  # fmt: skip
+
+
+def test_python_processes_are_started_in_one_way():
+    """Otherwise they import from the working directory."""
+    starts = r"\b(subprocess|get_context|sys\.executable|get_executable|os\.(system|spawn\w+))\b"
+    none(
+        f"{name}: {found[0]}: use interpreter.python_command or spawning"
+        for name in FILES
+        if name not in START_PROCESSES and (found := re.search(starts, FILES[name].read_text()))
+    )
+    none(
+        f"{name}: sys.executable: use interpreter.python_command"
+        for name in FILES
+        if name != "interpreter" and "sys.executable" in FILES[name].read_text()
     )
 
 
