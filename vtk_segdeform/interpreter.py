@@ -5,10 +5,11 @@
     spawning()                  the same for processes that multiprocessing starts
 
 With ``-c`` and ``-m`` Python looks for modules in the working directory first.  That is where the
-user has downloads, and a file ``random.py`` among them would be run.  The option ``-P`` against it
-is new in Python 3.11, and ``-I`` ignores PYTHONHOME, without which some applications with Python
-inside cannot start it.  So the code of a process begins by setting its path to that of this
-process; `sys` is built in, and nothing is imported before.
+user has downloads, and a file ``random.py`` among them would be run.  So the code of a process
+begins by setting its path to that of this process; `sys` is built in.  Before the code, Python 3.13
+imports `linecache`: PYTHONSAFEPATH, which Python 3.10 does not know and does not need, leaves the
+working directory out.  The option ``-I`` would also ignore PYTHONHOME, without which some
+applications with Python inside cannot start it.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def python_environment(**variables: str) -> dict[str, str]:
     others.
     """
     inherited = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    return {**inherited, **variables}
+    return {**inherited, "PYTHONSAFEPATH": "1", **variables}
 
 
 def python_program() -> str | None:
