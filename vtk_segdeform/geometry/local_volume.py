@@ -316,7 +316,8 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     for turn in range(_MOST_SHRINKS):
         centre = x[active] + radius[active, None] * inward[active]
         places = np.hstack([centre, away[active]])
-        distance, touched = (each[:, 0] for each in nearest(tree, places))
+        distances, indices = nearest(tree, places)
+        distance, touched = distances[:, 0], indices[:, 0]
         if not turn:
             opposite = touched
         chord = x[touched] - x[active]
