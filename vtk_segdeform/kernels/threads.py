@@ -232,7 +232,10 @@ class _Batch:
 
 
 def _surely(action: Callable[[], None]) -> None:
-    """Call *action* until it is completed; raise exceptions of signal handlers afterwards."""
+    """Call *action*, which must not fail by itself, until it is completed.
+
+    Exceptions of signal handlers are raised afterwards.
+    """
     raised: BaseException | None = None
     while True:
         try:
