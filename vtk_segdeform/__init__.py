@@ -19,7 +19,6 @@ neither SciPy nor VTK.
 from __future__ import annotations
 
 import sys as _sys
-from importlib import import_module as _import_module
 from pathlib import Path as _Path
 from typing import TYPE_CHECKING as _TYPE_CHECKING
 
@@ -30,6 +29,7 @@ if not (_root / "vtk_segdeform" / "widgets").exists() and (_root / "setup.cfg").
     __path__.append(str(_root))
 del _Path, _root
 
+from .importing import imported as _imported
 from .version import __version__ as __version__
 
 if _TYPE_CHECKING:
@@ -129,9 +129,9 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name in _SUBPACKAGES:
-        return _import_module(f"{__name__}.{name}")
+        return _imported(f"{__name__}.{name}")
     if name in _MODULE_OF:
-        value = getattr(_import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        value = getattr(_imported(f"{__name__}.{_MODULE_OF[name]}"), name)
         globals()[name] = value  # found without this function from now on
         return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
-from concurrent.futures import Future, wait
+from concurrent.futures import wait
 from typing import TypeVar
 
 from .checks import as_callable
+from .importing import in_thread
 
 T = TypeVar("T")
 
@@ -45,15 +45,7 @@ def cancellable(work: Callable[[], T], progress: Progress | None, message: str) 
     """
     if progress is None:
         return work()
-    result: Future[T] = Future()
-
-    def run() -> None:
-        try:
-            result.set_result(work())
-        except BaseException as fault:  # noqa: BLE001 - raised again by the caller's thread
-            result.set_exception(fault)
-
-    threading.Thread(target=run, name="segdeform", daemon=True).start()
+    result = in_thread(work, daemon=True)
     while True:
         tell(progress, 0.0, message)
         if wait([result], timeout=_PERIOD).done:

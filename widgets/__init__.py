@@ -17,8 +17,9 @@ Every name is imported on first use, so that `web.serving` loads no VTK.
 
 from __future__ import annotations
 
-from importlib import import_module as _import_module
 from typing import TYPE_CHECKING as _TYPE_CHECKING
+
+from vtk_segdeform.importing import imported as _imported
 
 if _TYPE_CHECKING:
     from .cage_display import CageDisplay
@@ -66,7 +67,7 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if name in _MODULE_OF:
-        value = getattr(_import_module(f"{__name__}.{_MODULE_OF[name]}"), name)
+        value = getattr(_imported(f"{__name__}.{_MODULE_OF[name]}"), name)
         globals()[name] = value  # found without this function from now on
         return value
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

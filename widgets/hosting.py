@@ -8,6 +8,7 @@ import pyvista as pv
 
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.importing import imported
 from vtk_segdeform.io import Surface
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
@@ -49,6 +50,7 @@ def edited(mesh: Any, session: Session) -> Any:
 
 def add_editor(plotter: pv.BasePlotter, session: Session, *, keys: KeyChoice) -> DeformEditor:
     """Add an editor to the current subplot of *plotter*, aim the camera, and switch it on."""
+    imported("vtk_segdeform.widgets.editor")
     from .editor import DeformEditor
 
     editor = DeformEditor(plotter, session, keys=keys)

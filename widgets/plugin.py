@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 from vtk_segdeform.checks import as_path, as_text, shown
 from vtk_segdeform.deformer import deform
 from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
+from vtk_segdeform.importing import imported
 from vtk_segdeform.io import Surface, repair_surface, triangles_of
 from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
@@ -125,6 +126,7 @@ def edit(
     MissingDependencyError
         If there is no screen.
     """
+    imported("vtk_segdeform.widgets.scene")
     from .scene import set_background, set_lights
 
     session = session_of(mesh)
@@ -219,6 +221,7 @@ class PlotterTools:
 
     def add_volume_overlay(self, session: Session) -> VolumeOverlay:
         """Show the mesh of *session*, coloured by its local volume change, with a colour scale."""
+        imported("vtk_segdeform.widgets.volume_overlay")
         from .volume_overlay import VolumeOverlay
 
         if not isinstance(session, Session):

@@ -5,8 +5,8 @@ import threading
 import numpy as np
 from solids import icosphere, rotation, somewhere
 
-from vtk_segdeform.geometry import kmeans
 from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
+from vtk_segdeform.kernels import threads
 
 
 def test_there_are_about_as_many_clusters_as_asked_for_and_none_is_empty():
@@ -44,7 +44,7 @@ def test_with_as_many_clusters_as_points_each_point_has_its_own():
 def test_small_sets_of_points_are_clustered_without_starting_threads(monkeypatch):
     started = []
     monkeypatch.setattr(threading.Thread, "start", started.append)
-    monkeypatch.setattr(kmeans, "n_threads", lambda: 2)
+    monkeypatch.setattr(threads, "n_threads", lambda: 2)
     parts = np.repeat(np.arange(200), 40)
     clusters = cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
     assert len(np.unique(clusters)) >= 200

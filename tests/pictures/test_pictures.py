@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -152,6 +151,5 @@ def test_a_path_that_cannot_be_written_is_an_error_before_drawing(tmp_path):
 
 def test_without_a_gl_library_the_error_names_the_packages(monkeypatch):
     monkeypatch.setattr(canvas, "_PROBE", "import os; os.abort()")
-    monkeypatch.setattr(canvas.sys, "executable", sys.executable)
     with pytest.raises(MissingDependencyError, match=r"apt-get install .* libegl1 libgl1"):
         canvas.require_offscreen.__wrapped__()  # the answer of others is not kept

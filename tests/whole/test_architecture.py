@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import functools
 import gc
+import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -24,7 +25,8 @@ WIDGETS = ROOT / "widgets"  # installed as vtk_segdeform.widgets
 
 # In the order of imports; the second row is the method, in the order of the paper.
 ROOMS = [
-    "version", "errors", "sizes", "checks", "arrays", "progress", "freezing", "files", "kernels",
+    "version", "importing", "errors", "interpreter", "sizes", "checks", "arrays", "progress",
+    "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
     "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
@@ -34,7 +36,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 360  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 380  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
@@ -364,6 +366,66 @@ def test_public_functions_take_at_most_four_positional_arguments():
                 if len(positional) > 4:
                     offences.append(f"{name}: {node.name}({', '.join(positional)}): use keywords")
     none(offences)
+
+
+# Ctrl+C ends them, and so the process.
+MAY_BE_INTERRUPTED = ("cli", "benchmarks", "io.reading_child")
+
+
+def test_imports_in_functions_are_completed_though_interrupted():
+    """`imported("a.module")` comes before `from a.module import ...`; see importing.py."""
+    found = [name for name in FILES if not name.startswith(MAY_BE_INTERRUPTED)]
+    found = [
+        name for name in found if re.search(r"^ +(from|import) ", FILES[name].read_text(), re.M)
+    ]
+    none(
+        f"{name}: {node.name} imports {ast.unparse(inner)} without `imported`"
+        for name in found
+        for node in nodes_of(name)
+        if isinstance(node, ast.FunctionDef) and "imported(" not in ast.unparse(node)
+        for inner in ast.walk(node)
+        if isinstance(inner, ast.Import | ast.ImportFrom)
+        if ast.unparse(inner) != "from . import WebEditor"  # which its face does
+    )
+    none(
+        f"{name}: {what}: use importing.imported"
+        for name in FILES
+        if not name.startswith((*MAY_BE_INTERRUPTED, "importing"))
+        for what, _ in calls_in(name)
+        if what.endswith("import_module")
+    )
+
+
+def test_scipy_starts_no_threads():
+    """They outlive a query that is interrupted, but not its arrays: use kernels.nearest."""
+    none(
+        f"{name}: {ast.unparse(call)}"
+        for name in FILES
+        for _, call in calls_in(name)
+        if any(each.arg == "workers" for each in call.keywords)
+    )
+
+
+# A browser, git, and a command from `interpreter`; io.isolated sets the path of its child itself.
+START_PROCESSES = {
+    "interpreter", "benchmarks.chromium", "benchmarks.history", "io.isolated", "pictures.canvas",
+    "widgets.web.serving.client",
+}  # fmt: skip
+
+
+def test_python_processes_are_started_in_one_way():
+    """Otherwise they import from the working directory."""
+    starts = r"\b(subprocess|get_context|sys\.executable|get_executable|os\.(system|spawn\w+))\b"
+    none(
+        f"{name}: {found[0]}: use interpreter.python_command or spawning"
+        for name in FILES
+        if name not in START_PROCESSES and (found := re.search(starts, FILES[name].read_text()))
+    )
+    none(
+        f"{name}: sys.executable: use interpreter.python_command"
+        for name in FILES
+        if name != "interpreter" and "sys.executable" in FILES[name].read_text()
+    )
 
 
 # They write to a draft from their caller, to the growing log of a recording, or to /proc.

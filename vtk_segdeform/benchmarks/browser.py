@@ -19,13 +19,14 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
-from multiprocessing import get_context
+from multiprocessing import Pipe
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import MissingDependencyError
+from ..interpreter import spawning
 from ..progress import Progress, tell
 from ..session import Session
 from .chromium import Chromium, ticks
@@ -244,12 +245,12 @@ def _moves(view: Any, start: tuple[float, float]) -> tuple[list[tuple[float, flo
 def _in_browser(size: int, scale: Scale, *, draws: bool) -> Drag:
     """Return the drag in Chromium; with *draws* the page draws, else the server."""
     _require_trame()
-    context = get_context("spawn")
-    ours, theirs = context.Pipe()
-    server = context.Process(target=_serve, args=(size, scale, theirs), daemon=True)
+    ours, theirs = Pipe()
     with contextlib.ExitStack() as stack:
         browser = stack.enter_context(Chromium(_SIZE, webgl=draws))
-        server.start()
+        with spawning() as context:
+            server = context.Process(target=_serve, args=(size, scale, theirs), daemon=True)
+            server.start()
         theirs.close()
         stack.callback(server.kill)
         stack.callback(server.join, 20.0)

@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -23,6 +22,7 @@ import numpy as np
 import scipy
 
 from ..errors import MissingDependencyError
+from ..interpreter import spawning
 from ..kernels import compiled_kernels, n_threads
 from ..version import __version__
 
@@ -112,8 +112,11 @@ def in_own_process(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwarg
         If the process crashed.
     """
     try:
-        with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-            return pool.submit(work, *args, **kwargs).result()
+        with spawning() as context:
+            pool = ProcessPoolExecutor(1, mp_context=context)
+            result = pool.submit(work, *args, **kwargs)
+        with pool:
+            return result.result()
     except BrokenProcessPool:
         raise MissingDependencyError("its process crashed") from None
 

@@ -34,7 +34,7 @@ from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_numbers, is_num
 from ..checks import shown
 from ..errors import ArgumentError, CageError, RegionError
 from ..geometry import decimated
-from ..kernels import n_threads, one_blas_thread
+from ..kernels import nearest, one_blas_thread
 from ..mesh import Mesh, distance_to_surface, inside_points, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
@@ -372,10 +372,10 @@ def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
     x, bound, unit = field.members, np.inf, field.stretch_at(field.members)
     if field.stretch is None and len(x) > _SIEVE * _NEAREST:  # a subset bounds the nearest gaps
-        few, _ = tree.query(x[::_SIEVE], workers=n_threads())
+        few = nearest(tree, x[::_SIEVE])[0][:, 0]
         bound = np.partition(few, _NEAREST)[_NEAREST] * (1.0 + 1e-12)
-    gap, _ = tree.query(x, distance_upper_bound=bound, workers=n_threads())
-    nearest = np.argsort(gap / unit, kind="stable")[:_NEAREST]
-    clearance = distance_to_surface(x[nearest], vertices, faces) / unit[nearest]
+    gap = nearest(tree, x, within=bound)[0][:, 0]
+    closest = np.argsort(gap / unit, kind="stable")[:_NEAREST]
+    clearance = distance_to_surface(x[closest], vertices, faces) / unit[closest]
     clearance = clearance.min() / field.offset
     return float(min(roundness(vertices, faces).min() / _ROUND, clearance / _NEAR))

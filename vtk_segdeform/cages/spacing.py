@@ -33,7 +33,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray
-from ..kernels import n_threads
+from ..kernels import nearest
 from ..mesh import Mesh
 
 _SLOPE = 1.0
@@ -94,7 +94,7 @@ def thickness(mesh: Mesh) -> FloatArray:
     active = np.arange(len(x))
     for _ in range(_SHRINKS):
         centre = x[active] - radius[active, None] * normal[active]
-        _, other = tree.query(centre, workers=n_threads())
+        other = nearest(tree, centre)[1][:, 0]
         chord = x[active] - x[other]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, normal[active])

@@ -19,10 +19,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .. import sizes
 from ..arrays import FloatArray, IntArray, is_whole
 from ..errors import ArgumentError
-from ..kernels import n_threads
+from ..kernels import nearest
 
 _SAMPLE, _SAMPLE_PER_CLUSTER = 8000, 10  # points that centres are computed from, whichever is more
 _EQUAL = 4  # nearest centres that are compared for ties
@@ -121,9 +120,6 @@ def _numbered(labels: IntArray) -> IntArray:
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     """Return the nearest of the *centres* to each position, (n,)."""
     few = min(_EQUAL, len(centres))
-    workers = (
-        n_threads() if len(positions) > sizes.PARALLEL_SEARCH else 1
-    )  # each query starts its threads
-    distance, which = cKDTree(centres).query(positions, k=[*range(1, few + 1)], workers=workers)
+    distance, which = nearest(cKDTree(centres), positions, range(1, few + 1))
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)

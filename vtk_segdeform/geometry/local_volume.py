@@ -35,7 +35,7 @@ from scipy.spatial import cKDTree
 
 from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..kernels import compiled_kernels, in_parallel, inputs, n_threads
+from ..kernels import compiled_kernels, in_parallel, inputs, nearest
 from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
@@ -311,15 +311,15 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     size = float(np.linalg.norm(np.ptp(x, axis=0)))
     away = 4.0 * size * _bodies(x, faces)  # a fourth coordinate keeps searches in one body
     tree = cKDTree(np.hstack([x, away]))
-    workers = n_threads() if len(x) > sizes.PARALLEL_SEARCH else 1
     radius = np.full(len(x), size)
     active = opposite = np.arange(len(x))
     for turn in range(_MOST_SHRINKS):
         centre = x[active] + radius[active, None] * inward[active]
         places = np.hstack([centre, away[active]])
-        distance, touched = map(np.asarray, tree.query(places, workers=workers))
+        distances, indices = nearest(tree, places)
+        distance, touched = distances[:, 0], indices[:, 0]
         if not turn:
-            opposite = touched.astype(np.int64)
+            opposite = touched
         chord = x[touched] - x[active]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, inward[active])

@@ -21,7 +21,6 @@ that are not percentages must be wrapped in its ``PureValue``.
 from __future__ import annotations
 
 import contextlib
-import importlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -32,6 +31,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray, is_whole
 from ..checks import all_of, as_path, require, shown
 from ..errors import ArgumentError, MeshError, MissingDependencyError
+from ..importing import imported
 from ..mesh import Mesh, require_mesh
 from .confined import read_confined
 from .meshlab_layers import (
@@ -244,7 +244,7 @@ def _same_folder() -> Iterator[None]:
 
 def _pymeshlab() -> Any:
     try:
-        return importlib.import_module("pymeshlab")
+        return imported("pymeshlab")
     except ImportError as error:
         raise MissingDependencyError(
             "this needs PyMeshLab: pip install 'vtk-segdeform[meshlab]', and on Debian "

@@ -19,7 +19,7 @@ from .dispatch import (
     scratch,
     writable,
 )
-from .threads import in_parallel, n_threads, one_blas_thread, quick_turns
+from .threads import in_parallel, n_threads, nearest, one_blas_thread, quick_turns
 
 __all__ = [
     "advice",
@@ -32,6 +32,7 @@ __all__ = [
     "load_for",
     "load_late",
     "n_threads",
+    "nearest",
     "one_blas_thread",
     "quick_turns",
     "scratch",

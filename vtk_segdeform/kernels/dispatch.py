@@ -14,7 +14,6 @@ but more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` disables it.
 from __future__ import annotations
 
 import functools
-import importlib
 import importlib.util
 import os
 import sys
@@ -26,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import sizes
+from ..importing import imported
 from .threads import quick_turns
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
@@ -159,6 +159,6 @@ def _kernels() -> Any:
     if os.environ.get("SEGDEFORM_NUMBA", "1") == "0":
         return None
     try:
-        return importlib.import_module(".compiled", __package__)
+        return imported(f"{__package__}.compiled")
     except ImportError:  # numba is missing, or incompatible with this numpy
         return None

@@ -1,6 +1,7 @@
 """Parallel loops over rows, on all cores that this process may use.
 
     in_parallel(work, n, size)        calls work(start, stop) for tasks of about *size* rows
+    nearest(tree, points)             queries a k-d tree
     quick_turns()                     lets the main thread in, while another one works in Python
 
 numpy and the compiled kernels release the GIL, so ordinary threads suffice.  There are two thread
@@ -17,11 +18,19 @@ import functools
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from .. import sizes
+from ..arrays import FloatArray, IntArray
+from ..importing import imported
 from ..progress import Progress
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 _TURN = 1e-4  # seconds
 _finding = threading.Lock()
@@ -64,8 +73,10 @@ def in_parallel(
         return
     with one_blas_thread() if blas else contextlib.nullcontext():
         pool = _pool(threading.current_thread() is threading.main_thread())
-        futures = [pool.submit(work, *task) for task in tasks]
+        batch, futures = _Batch(work), list[Future[None]]()
         try:
+            for task in tasks:
+                futures.append(pool.submit(batch, *task))
             if progress is None:  # waking for each task would take time from the other threads
                 wait(futures, return_when=FIRST_EXCEPTION)
             for task, future in zip(tasks, futures, strict=True):
@@ -73,9 +84,47 @@ def in_parallel(
                 if progress is not None:
                     progress(task[1] / n, message)
         finally:
-            unfinished = [future for future in futures if not future.cancel()]
-            for future in unfinished:  # nothing may write after this function returns
-                future.exception()
+            _surely(batch.end)
+
+
+def nearest(
+    tree: cKDTree, points: FloatArray, k: Sequence[int] = (1,), *, within: float = np.inf
+) -> tuple[FloatArray, IntArray]:
+    """Return the distances to the nearest points of a k-d tree, and their indices.
+
+    The option ``workers`` of SciPy's query is unsafe: if a signal handler raises an exception while
+    SciPy waits for its threads, it frees the arrays that they use, and the process crashes.
+
+    Parameters
+    ----------
+    tree : cKDTree
+        Of m points.
+    points : (n, d) float
+        Where to search.
+    k : sequence of int
+        Which neighbours to return; 1 is the nearest.
+    within : float
+        Upper bound of the distances.
+
+    Returns
+    -------
+    distance : (n, len(k)) float
+        Infinite if there is none within the bound.
+    index : (n, len(k)) int
+        m if there is none.
+    """
+    distance = np.empty((len(points), len(k)))
+    index = np.empty(distance.shape, dtype=np.int64)
+
+    def work(start: int, stop: int) -> None:
+        distance[start:stop], index[start:stop] = tree.query(
+            points[start:stop], k=list(k), distance_upper_bound=within
+        )
+
+    in_parallel(
+        work, len(points), max(sizes.PARALLEL_SEARCH, -(-len(points) // n_threads())), blas=False
+    )
+    return distance, index
 
 
 @contextlib.contextmanager
@@ -95,12 +144,13 @@ def one_blas_thread() -> Iterator[None]:
     if limit is None:
         yield
         return
+    caller = object()
     with limit.of_each_thread.limit(limits=1):
-        limit.enter()
         try:
+            limit.enter(caller)
             yield
         finally:
-            limit.leave()
+            _surely(lambda: limit.leave(caller))
 
 
 @contextlib.contextmanager
@@ -135,22 +185,66 @@ class _BlasLimit:
         # then no other thread can set any.
         self.of_each_thread = controller.select(threading_layer="openmp")
         self._lock = threading.Lock()
-        self._within = 0
+        self._inside: set[object] = set()
         self._before: Any = None
 
-    def enter(self) -> None:
+    def enter(self, caller: object) -> None:
         """Limit BLAS, unless it is limited already."""
         with self._lock:
-            if self._within == 0:
+            self._inside.add(caller)
+            if self._before is None:
                 self._before = self._controller.limit(limits=1, user_api="blas")
-            self._within += 1
 
-    def leave(self) -> None:
-        """Restore the previous numbers of threads, unless another thread is still inside."""
+    def leave(self, caller: object) -> None:
+        """Restore the previous numbers of threads, unless another caller is still inside."""
         with self._lock:
-            self._within -= 1
-            if self._within == 0:
+            self._inside.discard(caller)
+            if not self._inside and self._before is not None:
                 self._before.restore_original_limits()
+                self._before = None
+
+
+class _Batch:
+    """The tasks of one `in_parallel`; after `end` none of them runs, nor will."""
+
+    def __init__(self, work: Callable[[int, int], None]) -> None:
+        self._work = work
+        self._running, self._is_over = 0, False
+        self._changed = threading.Condition()
+
+    def __call__(self, start: int, stop: int) -> None:
+        with self._changed:
+            if self._is_over:
+                return
+            self._running += 1
+        try:
+            self._work(start, stop)
+        finally:
+            with self._changed:
+                self._running -= 1
+                self._changed.notify_all()
+
+    def end(self) -> None:
+        """Skip tasks that have not begun, and wait for the others."""
+        with self._changed:
+            self._is_over = True
+            self._changed.wait_for(lambda: not self._running)
+
+
+def _surely(action: Callable[[], None]) -> None:
+    """Call *action*, which must not fail by itself, until it is completed.
+
+    Exceptions of signal handlers are raised afterwards.
+    """
+    raised: BaseException | None = None
+    while True:
+        try:
+            action()
+            break
+        except BaseException as fault:  # noqa: BLE001 - raised again below
+            raised = fault
+    if raised is not None:
+        raise raised
 
 
 def _blas_limit() -> _BlasLimit | None:
@@ -163,10 +257,10 @@ def _blas_limit() -> _BlasLimit | None:
 @functools.cache
 def _found_blas_limit() -> _BlasLimit | None:
     try:
-        from threadpoolctl import ThreadpoolController
+        library = imported("threadpoolctl")
     except ImportError:
         return None
-    return _BlasLimit(ThreadpoolController())
+    return _BlasLimit(library.ThreadpoolController())
 
 
 @functools.cache

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import functools
 import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from ..arrays import FloatArray
 from ..checks import as_path
 from ..errors import MeshError, MissingDependencyError
 from ..files import replacing, require_place
+from ..interpreter import python_command, python_environment, python_program
 from .palette import INK, PAPER
 
 # In quotes: importing plotters, and matplotlib with them, takes most of a second.
@@ -50,13 +50,18 @@ def require_offscreen() -> None:
     """Check once, in a separate process, that pictures can be rendered.
 
     Without a GL library VTK ends the process at the first rendering, which no ``try`` can catch.
+    An application that has no Python interpreter to start renders without this check.
 
     Raises
     ------
     MissingDependencyError
         If rendering fails; the message names the Debian packages that it needs.
     """
-    probe = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False)
+    if python_program() is None:
+        return
+    probe = subprocess.run(
+        python_command(_PROBE), env=python_environment(), capture_output=True, check=False
+    )
     if probe.returncode != 0:
         raise MissingDependencyError(
             "pictures cannot be rendered: VTK finds no OpenGL library. On Debian or Ubuntu: "

@@ -44,6 +44,7 @@ from ..deformer import (
 )
 from ..errors import CageError, RegionError, SessionError
 from ..geometry import Lids, local_volume_change, rigid_fit
+from ..importing import imported
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
@@ -183,13 +184,15 @@ class Session(Timeline):
         """
         if self._surface is not None:
             return self._surface.moved(self.vertices)
-        from ..io import to_polydata  # imports pyvista
+        imported("vtk_segdeform.io")  # imports pyvista
+        from ..io import to_polydata
 
         return to_polydata(self.mesh.with_vertices(self.vertices))
 
     def write_deformed(self, path: str | Path) -> None:
         """Write `deformed` to a mesh file, as `write_mesh` does."""
-        from ..io import write_mesh  # imports pyvista
+        imported("vtk_segdeform.io")  # imports pyvista
+        from ..io import write_mesh
 
         if self._surface is not None:
             self._surface.write(path, self.vertices)
@@ -329,7 +332,8 @@ class Session(Timeline):
         region of each vertex as "quality", unless it has a quality.  "local volume change" is the
         same surface with that as its quality, if there is a pose.  "cage 1", "cage 2" ... follow.
         """
-        from ..io import polydata_of  # imports pyvista
+        imported("vtk_segdeform.io")  # imports pyvista
+        from ..io import polydata_of
 
         mesh = self.deformed.copy(deep=False)
         layers = {"mesh": mesh}
@@ -1094,7 +1098,8 @@ def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
 
 
 def _surface(surface: Any) -> Surface:
-    from ..io import Surface  # imports pyvista
+    imported("vtk_segdeform.io")  # imports pyvista
+    from ..io import Surface
 
     if not isinstance(surface, Surface):
         require_mesh(surface)

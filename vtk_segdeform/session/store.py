@@ -43,6 +43,7 @@ from ..cages import Cage
 from ..checks import as_flag, as_path, require
 from ..errors import SessionError
 from ..files import open_regular, replacing
+from ..importing import imported
 from ..mesh import Mesh
 from ..regions import Regions
 from .archive import Archive, write_archive
@@ -200,7 +201,8 @@ def _write(
     if state.pivots:
         header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
     if given is not None:
-        from .surface_store import surface_parts  # imports pyvista
+        imported("vtk_segdeform.session.surface_store")  # imports pyvista
+        from .surface_store import surface_parts
 
         header["surface"], more = surface_parts(given)
         arrays |= more
@@ -269,7 +271,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:
         return mesh, state
-    from .surface_store import read_surface  # imports pyvista
+    imported("vtk_segdeform.session.surface_store")  # imports pyvista
+    from .surface_store import read_surface
 
     return read_surface(archive, header["surface"], mesh), state
 

@@ -34,7 +34,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import functools
-import importlib
 import logging
 import os
 import sys
@@ -48,6 +47,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..errors import SegDeformError
+from ..importing import imported
 from .subspace import Subspace, row_pieces
 
 GPUArray = Any  # of cupy, torch or numpy
@@ -290,11 +290,11 @@ def _driver_has_a_gpu() -> bool:
 
 
 def _cupy() -> Any:
-    return importlib.import_module("cupy")
+    return imported("cupy")
 
 
 def _torch() -> Any:
-    torch = importlib.import_module("torch")
+    torch: Any = imported("torch")
     if not torch.cuda.is_available():
         raise GPUError("this torch has no CUDA")
     return TorchArrays(torch, "cuda")

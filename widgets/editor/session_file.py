@@ -10,6 +10,7 @@ from zipfile import is_zipfile
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry import VertexNormals
+from vtk_segdeform.importing import imported
 from vtk_segdeform.kernels import load_early
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
@@ -85,7 +86,8 @@ class SessionFile:
 
 def is_mesh(path: Path) -> bool:
     """Return whether the name of a file is that of a mesh, not of a session."""
-    from vtk_segdeform.io import is_mesh_file  # which imports pyvista
+    imported("vtk_segdeform.io")  # imports pyvista
+    from vtk_segdeform.io import is_mesh_file
 
     return is_mesh_file(path)
 
@@ -104,7 +106,8 @@ def read_session(path: Path, progress: Progress) -> Session:
         load_early()
     may_be_session = path.suffix.lower() == _SUFFIX or not os.path.isfile(path)
     if is_mesh(path) or not (may_be_session or is_zipfile(path)):
-        from vtk_segdeform.io import Surface, read_polydata  # which import pyvista
+        imported("vtk_segdeform.io")  # imports pyvista
+        from vtk_segdeform.io import Surface, read_polydata
 
         progress(0.0, "Reading mesh")
         polydata = read_polydata(path)

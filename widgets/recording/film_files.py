@@ -6,7 +6,6 @@ dependency of pyvista.  MP4s require imageio[ffmpeg].
 
 from __future__ import annotations
 
-import importlib
 import os
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,6 +17,7 @@ from vtk_segdeform.arrays import is_number
 from vtk_segdeform.checks import as_path, shown
 from vtk_segdeform.errors import MissingDependencyError, SessionError
 from vtk_segdeform.files import replacing, require_place
+from vtk_segdeform.importing import imported
 from vtk_segdeform.pictures import png_of
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
@@ -105,7 +105,7 @@ def _write_folder(path: Path, pictures: Pictures, fps: float) -> None:
 def _library(suffix: str) -> Any:
     name, package = _LIBRARIES[suffix]
     try:
-        return importlib.import_module(name)
+        return imported(name)
     except ImportError as fault:
         raise MissingDependencyError(
             f"writing {suffix} files requires a library: pip install {package}.  Or give a name "

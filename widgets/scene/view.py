@@ -33,6 +33,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import as_callable, as_text, shown
 from vtk_segdeform.errors import ArgumentError, ConstraintError
+from vtk_segdeform.importing import imported
 
 from .foreground import Foreground
 from .gestures import Phase, Pointer
@@ -189,6 +190,7 @@ class View(Projection):
         """
         if self._widget is None:
             return lambda: None
+        imported(f"{__package__}.qt_events")  # imports Qt
         from .qt_events import EventFilter
 
         return EventFilter(self._widget).remove

@@ -26,6 +26,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.importing import imported
 
 if TYPE_CHECKING:
     from .notebook import add_to_notebook, edit_in_notebook, shows_in_notebook
@@ -37,17 +38,14 @@ __all__ = ["WebEditor", "add_to_notebook", "edit_in_notebook", "shows_in_noteboo
 def __getattr__(name: str) -> Any:
     """Import a name when it is first used: trame is optional, and `serving` loads no VTK."""
     if name in {"add_to_notebook", "edit_in_notebook", "shows_in_notebook"}:
-        from . import notebook
-
-        return getattr(notebook, name)
+        return getattr(imported(f"{__name__}.notebook"), name)
     if name != "WebEditor":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        from .web_editor import WebEditor
+        return imported(f"{__name__}.web_editor").WebEditor
     except ModuleNotFoundError as fault:
         if (fault.name or "").startswith("vtk_segdeform"):
             raise
         raise MissingDependencyError(
             f"The editor in a browser needs {fault.name}: pip install 'vtk-segdeform[web]'"
         ) from None
-    return WebEditor

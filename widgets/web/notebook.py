@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 import pyvista as pv
 
 from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.importing import imported
 from vtk_segdeform.pictures import require_offscreen
 from vtk_segdeform.session import Session
 
@@ -137,6 +138,7 @@ class NotebookEditor:
             return f"{image}<p>{html.escape(self.note)}</p>"
         if not self.is_live:
             return "<p>This editor is closed. Run the cell again to edit.</p>"
+        imported(f"{__package__}.pictures")
         from .pictures import Pictures
 
         theme = pv.global_theme.trame
@@ -195,6 +197,7 @@ class _Show:
         return_viewer: bool = False,
         **keywords: Any,
     ) -> Any:
+        imported("IPython.display")
         from IPython.display import HTML, display
 
         backend = (jupyter_backend or _backend(self._plotter.theme)).lower()
@@ -252,7 +255,7 @@ def _encoded(pictures: Pictures) -> str:
 
 def _picture_of(session: Session) -> str:
     """Return a picture of *session* as an editor shows it first."""
-    from ..hosting import add_editor
+    imported(f"{__package__}.pictures")
     from ..scene import set_background, set_lights
     from .pictures import Pictures
 

@@ -3,13 +3,18 @@
 numba caches compiled code in ``NUMBA_CACHE_DIR``, beside the source or, if that is read-only, in
 the user's cache folder.  Without any writable folder numba raises an error; the kernels are then
 compiled again in every process.
+
+numba cannot be interrupted while it compiles or loads a kernel: its tables would stay incomplete.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numba
+
+from ...importing import completed
 
 
 def kernel(**options: Any) -> Any:
@@ -19,8 +24,11 @@ def kernel(**options: Any) -> Any:
 
     def compiled(function: Any) -> Any:
         try:
-            return numba.njit(cache=True, **options)(function)
+            made = numba.njit(cache=True, **options)(function)
         except RuntimeError:  # no writable cache folder
-            return numba.njit(**options)(function)
+            made = numba.njit(**options)(function)
+        compile_for = made._compile_for_args  # called for each new list of types
+        made._compile_for_args = lambda *args: completed(partial(compile_for, *args))
+        return made
 
     return compiled

@@ -17,12 +17,12 @@ import os
 import secrets
 import shutil
 import signal
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.interpreter import python_command, python_environment
 
 from .limits import Limits
 
@@ -32,20 +32,15 @@ _MOMENT = 1.0  # seconds
 _RELOAD = 5.0  # seconds
 _LAST_WORDS = 4000  # bytes of the error output that are kept
 _RUN = (
-    "import runpy, sys; sys.path[:] = {path!r}; "
+    "import runpy; "
     "runpy.run_module('vtk_segdeform.widgets.web.client', run_name='__main__', alter_sys=True)"
 )
 
 
 def client_command(file: Path | None) -> list[str]:
-    """Return the command that runs a client process with *file* open.
-
-    Its module path is that of this process: with ``python -m``, the working directory would be the
-    first place to import from, and uploads are there.
-    """
-    path = [os.path.abspath(entry) for entry in sys.path if entry]
+    """Return the command that runs a client process with *file* open, in a folder with uploads."""
     given = [] if file is None else [str(file.absolute())]
-    return [sys.executable, "-c", _RUN.format(path=path), *given]
+    return python_command(_RUN, *given)
 
 
 class Client:
@@ -209,14 +204,13 @@ class Client:
             *self._command, "--port", "0", "--folder", str(files),
             "--upload-limit", str(self._limits.upload),
             stdin=pipe, stdout=pipe, stderr=pipe, cwd=files, start_new_session=True,
-            env={
-                **os.environ,
+            env=python_environment(
                 **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary)),
-                "WSLINK_READY_MSG": "",
-                "WSLINK_HEART_BEAT": "0",  # the server watches the page
-                "WSLINK_WS_COMPRESS": "0",
-                "WSLINK_MAX_MSG_SIZE": str(self._limits.message // 2),
-            },
+                WSLINK_READY_MSG="",
+                WSLINK_HEART_BEAT="0",  # the server watches the page
+                WSLINK_WS_COMPRESS="0",
+                WSLINK_MAX_MSG_SIZE=str(self._limits.message // 2),
+            ),
         )  # fmt: skip
 
 
