@@ -406,9 +406,9 @@ def test_scipy_starts_no_threads():
     )
 
 
-# A browser, git, and a command from `interpreter`; io.isolated sets the path of its child itself.
+# A browser, git, and a command from `interpreter`; io.confined sets the path of its child itself.
 START_PROCESSES = {
-    "interpreter", "benchmarks.chromium", "benchmarks.history", "io.isolated", "pictures.canvas",
+    "interpreter", "benchmarks.chromium", "benchmarks.history", "io.confined", "pictures.canvas",
     "widgets.web.serving.client",
 }  # fmt: skip
 

@@ -21,10 +21,8 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
-from multiprocessing import spawn
 from pathlib import Path
 from typing import IO, Any
 
@@ -32,6 +30,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..files import landlock
+from ..interpreter import python_program
 from . import reading_child
 
 _log = logging.getLogger(__name__)
@@ -67,7 +66,7 @@ def read_confined(tool: str, path: Path) -> Arrays:
         "seconds": math.ceil(_SECONDS + _PER_MEGABYTE * size / 1e6),
     }
     most = _REPLY + _PER_BYTE * size
-    python = _python()
+    python = python_program()
     if python is None:
         _log.warning("%s is read without protection: no Python interpreter was found", path)
         reply = io.BytesIO()
@@ -236,12 +235,3 @@ def _environment() -> dict[str, str]:
         kept["PATH"] = os.environ["PATH"]
     threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     return kept | dict.fromkeys(threads, "1")
-
-
-def _python() -> str | None:
-    """Return the path of the Python interpreter, or None if there is none to start."""
-    program = spawn.get_executable()
-    if getattr(sys, "frozen", False) or not program:
-        return None
-    name = os.fsdecode(program)
-    return name if Path(name).stem.lower().startswith(("python", "pypy", "pvpython")) else None
