@@ -44,6 +44,7 @@ from .array_names import (
     warn_left_out,
     warn_renamed,
 )
+from .groups import GROUP, MATERIAL, OBJECT, groups_of, names_key, set_groups, whole_numbers
 from .moving import CORNER_NORMALS
 from .number_lines import Lines
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
@@ -55,7 +56,7 @@ _OF_CORNERS = {
     "normal": ("Normals", CORNER_NORMALS),
 }
 _WORDS = ("v", "vt", "vn", "f")
-_NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
+_NAMED = {"o": OBJECT, "g": GROUP, "usemtl": MATERIAL}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _MOST = 2**62  # an index
 # By statement: the first point, line and face it applies to, and its value.
@@ -246,9 +247,8 @@ def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
         texts = [text or "default" for text in texts]
         names = dict.fromkeys(t for t, n in zip(texts, lengths, strict=True) if n)
         numbers = {name: k for k, name in enumerate(names)}
-        key = _NAMED[word]
-        surface.cell_data[key] = np.array([numbers.get(text, 0) for text in texts])[which]
-        set_names(surface, f"{key}Names", names)
+        of_texts = np.array([numbers.get(text, 0) for text in texts])
+        set_groups(surface, _NAMED[word], of_texts[which], names)
 
 
 def _smoothing_group(text: str) -> int:
@@ -373,16 +373,15 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
     """
     lines: list[list[str]] = []  # per statement and face
     for word, key in _NAMED.items():
-        names = get_names(surface, f"{key}Names")
-        numbers = _whole_numbers(surface.cell_data.get(key), len(names))
-        if numbers is None:
+        if (found := groups_of(surface, key)) is None:
             continue
+        numbers, names = found
         written = plain_names(names)
         warn_renamed(key.lower(), written)
         lines.append([f"{word} {written[names[k]]}\n" for k in numbers[cells].tolist()])
         kept["cell"].append(key)
-        kept["field"].append(f"{key}Names")
-    groups = _whole_numbers(surface.cell_data.get(_SMOOTHING), 10**9)
+        kept["field"].append(names_key(key))
+    groups = whole_numbers(surface.cell_data.get(_SMOOTHING), 10**9)
     if groups is not None:
         lines.append([f"s {k or 'off'}\n" for k in groups[cells].tolist()])
         kept["cell"].append(_SMOOTHING)
@@ -395,13 +394,3 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
             pairs = zip(now, before, strict=True)
             tags[k] = "".join(line for line, old in pairs if repeat or line != old)
     return tags
-
-
-def _whole_numbers(values: Any, end: int) -> Any:
-    """Return *values* as integers in 0..*end* - 1, (m,); None if they are anything else."""
-    array = np.asarray(values)
-    if array.ndim != 1 or array.dtype.kind not in "biuf" or not len(array):
-        return None
-    if not ((array >= 0) & (array < end) & (array == np.rint(array))).all():
-        return None
-    return array.astype(np.int64)
