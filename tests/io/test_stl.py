@@ -150,7 +150,7 @@ def patches():
     surface = to_polydata(Mesh(*OCTAHEDRON))
     low = surface.cell_centers().points[:, 2] < 0
     surface.cell_data["Group"] = np.where(low, 1, 0)
-    set_names(surface, "GroupNames", ["inlet", "Außen wand"])
+    set_names(surface, "GroupNames", ["inlet", "outer wall"])
     return surface
 
 
@@ -180,7 +180,7 @@ def save_solids(path, surface):
 def test_named_solids_are_groups_of_one_welded_mesh_and_keep_their_names(tmp_path, way):
     save_solids(tmp_path / "a.stl", patches())
     given = read_polydata(tmp_path / "a.stl")
-    assert names_of(given) == 4 * ["inlet"] + 4 * ["Außen wand"]
+    assert names_of(given) == 4 * ["inlet"] + 4 * ["outer wall"]
     assert np.sign(given.cell_centers().points[:, 2]).tolist() == 4 * [1] + 4 * [-1]
     surface = Surface(given)
     assert surface.mesh.is_closed
@@ -194,12 +194,12 @@ def test_named_solids_are_groups_of_one_welded_mesh_and_keep_their_names(tmp_pat
     assert names_of(again) == names_of(given)
     text = (tmp_path / f"{len(way) - 1}.stl").read_text(encoding="utf-8")
     lines = [line for line in text.split("\n") if "solid" in line]
-    assert lines == ["solid inlet", "endsolid inlet", "solid Außen wand", "endsolid Außen wand"]
+    assert lines == ["solid inlet", "endsolid inlet", "solid outer wall", "endsolid outer wall"]
     assert len(pv.read(tmp_path / f"{len(way) - 1}.stl").points) == 6
     if ".obj" in way:
         text = (tmp_path / f"{way.index('.obj')}.obj").read_text(encoding="utf-8")
         assert [line for line in text.split("\n") if line[:1] == "g"] == [
-            "g inlet", "g Außen wand",
+            "g inlet", "g outer wall",
         ]  # fmt: skip
 
 
@@ -208,13 +208,14 @@ def test_text_has_all_digits_and_the_order_of_the_triangles(tmp_path):
     surface = to_polydata(Mesh(vertices * np.array([1e-7, 1.0, 3e8]), faces))
     write_mesh(tmp_path / "a.stl", surface)
     binary = read_polydata(tmp_path / "a.stl")
-    surface.cell_data["Group"] = np.random.default_rng(1).integers(0, 3, len(faces))
-    set_names(surface, "GroupNames", ["a", "b\nsolid c", "b_solid c"])
+    surface.cell_data["Group"] = np.random.default_rng(1).integers(0, 5, len(faces))
+    set_names(surface, "GroupNames", ["a", "b\nsolid c", "b_solid c", "Größe", "Gr__e"])
     write_mesh(tmp_path / "a.stl", surface)
     again = read_polydata(tmp_path / "a.stl")
     assert_array_equal(again.points, binary.points)
     assert_array_equal(again.faces, binary.faces)
-    written = {"a": "a", "b\nsolid c": "b_solid c_1", "b_solid c": "b_solid c"}
+    written = {"a": "a", "b\nsolid c": "b_solid c_1", "b_solid c": "b_solid c",
+               "Größe": "Gr__e_1", "Gr__e": "Gr__e"}  # fmt: skip
     assert names_of(again) == [written[name] for name in names_of(surface)]
 
 
@@ -225,28 +226,36 @@ def test_objects_become_solids_and_arrays_of_binary_files_are_told(tmp_path, cap
     surface.cell_data["Attribute"] = np.arange(8, dtype=np.uint16)
     write_mesh(tmp_path / "a.stl", surface)
     assert "a text STL cannot store cell array 'Object', cell array 'Attribute'" in caplog.text
-    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"inlet", "Außen wand"}
+    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"inlet", "outer wall"}
     del surface.cell_data["Group"]
     write_mesh(tmp_path / "a.stl", surface)
     assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"above", "below"}
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_names_that_are_not_ascii_are_read(tmp_path, encoding):
+    save_solids(tmp_path / "a.stl", patches())
+    text = (tmp_path / "a.stl").read_text(encoding="utf-8").replace("outer wall", "Außenwand")
+    (tmp_path / "a.stl").write_text(text, encoding=encoding)
+    assert get_names(read_polydata(tmp_path / "a.stl"), "GroupNames") == ["inlet", "Außenwand"]
+
+
 def test_solids_without_names_are_numbered_and_those_of_one_name_are_one_group(tmp_path):
     save_solids(tmp_path / "a.stl", patches())
     text = (tmp_path / "a.stl").read_text(encoding="utf-8")
-    (tmp_path / "a.stl").write_text(text.replace(" inlet", "").replace(" Außen wand", ""))
+    (tmp_path / "a.stl").write_text(text.replace(" inlet", "").replace(" outer wall", ""))
     surface = read_polydata(tmp_path / "a.stl")
     assert names_of(surface) == 4 * ["solid 1"] + 4 * ["solid 2"]
-    (tmp_path / "a.stl").write_text(text.replace("Außen wand", "inlet"))
+    (tmp_path / "a.stl").write_text(text.replace("outer wall", "inlet"))
     assert names_of(read_polydata(tmp_path / "a.stl")) == 8 * ["inlet"]
     (tmp_path / "a.stl").write_text("solid nothing\nendsolid\n" + text)
-    assert get_names(read_polydata(tmp_path / "a.stl"), "GroupNames") == ["inlet", "Außen wand"]
+    assert get_names(read_polydata(tmp_path / "a.stl"), "GroupNames") == ["inlet", "outer wall"]
 
 
 def test_a_solid_that_is_cut_off_is_an_error_or_told(tmp_path, caplog):
     save_solids(tmp_path / "a.stl", patches())
     lines = (tmp_path / "a.stl").read_text(encoding="utf-8").split("\n")
-    middle = lines.index("solid Außen wand")
+    middle = lines.index("solid outer wall")
     for cut in (lines[:10] + lines[12:], lines[:10] + lines[middle:], lines[: middle + 10]):
         (tmp_path / "a.stl").write_text("\n".join(cut))
         with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
@@ -259,7 +268,7 @@ def test_a_solid_that_is_cut_off_is_an_error_or_told(tmp_path, caplog):
         assert f"there is no endsolid; the file may be truncated after {n_cells} tri" in caplog.text
     without_ends = [line for line in lines if not line.startswith("endsolid i")]
     (tmp_path / "a.stl").write_text("\n".join(without_ends))
-    assert names_of(read_polydata(tmp_path / "a.stl")) == 4 * ["inlet"] + 4 * ["Außen wand"]
+    assert names_of(read_polydata(tmp_path / "a.stl")) == 4 * ["inlet"] + 4 * ["outer wall"]
 
 
 def test_positions_beyond_single_precision_are_refused(tmp_path):

@@ -11,7 +11,7 @@ array "Group" and the field array "GroupNames", as the groups of OBJ.
 
 Only text has several names, so a surface with groups, or else objects, is written as text, any
 other one as a binary file.  Triangles remain in their order: a solid is begun, as a group of OBJ
-is, wherever the group changes.
+is, wherever the group changes.  Names are written in ASCII.
 
 A text without its last "endsolid" is read with a warning if its last triangle is complete.
 """
@@ -200,12 +200,13 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
 
 def _write_text(path: Path, rows: Any, group: IntArray, names: list[str]) -> None:
     """Write triangles of `_ROW` as text; a solid ends where the *group* (m,) changes."""
-    written = plain_names(names)
+    # MeshLab takes a file with other letters for a binary one.
+    written = plain_names(names, refused="".join(c for c in "".join(names) if not c.isascii()))
     warn_renamed("group", written)
     values = np.column_stack([rows["normal"], rows["corners"].reshape(-1, 9)])
     ends = [*(np.flatnonzero(np.diff(group)) + 1).tolist(), len(rows)]
     begin = 0
-    with path.open("w", encoding="utf-8", newline="\n") as file:
+    with path.open("w", encoding="ascii", newline="\n") as file:
         for end in ends:
             name = written[names[group[begin]]]
             file.write(f"solid {name}\n")

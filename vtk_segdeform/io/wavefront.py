@@ -3,7 +3,7 @@
 VTK's reader creates one point per corner at texture seams, which opens a closed mesh and renumbers
 its vertices.  Here vertices remain as in the file:
 
-    v  x y z [r g b]    positions; colours become the point array "RGB"
+    v  x y z [r g b]    positions; colours, fractions or bytes, become the point array "RGB"
     vt u v              one per vertex: point array "TextureCoordinates".  Else, with seams, cell
                         array "TextureCorners": (u, v) per corner in sequence, NaN if it has none
     vn x y z            likewise: point array "Normals", or cell array "NormalCorners"
@@ -46,7 +46,7 @@ from .array_names import (
 )
 from .groups import GROUP, MATERIAL, OBJECT, groups_of, names_key, set_groups, whole_numbers
 from .moving import CORNER_NORMALS
-from .number_lines import Lines
+from .number_lines import Lines, colour_bytes
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
 _log = logging.getLogger(__name__)
@@ -104,8 +104,7 @@ def read_obj(path: Path) -> pv.PolyData:
         )
     surface = polydata_of(table[:, :3], counts, corners)
     if table.shape[1] >= 6:
-        colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
-        surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
+        surface.point_data["RGB"] = colour_bytes(table[:, 3:6])
     for name, rows in (("verts", cells["p"]), ("lines", cells["l"])):
         if rows:
             setattr(surface, name, [n for row in rows for n in (len(row), *row)])
@@ -179,6 +178,8 @@ def _table(what: str, lines: Lines, word: str, widths: tuple[int, ...]) -> Float
     if word == "vt":
         rows = [(row + ["0", "0"])[:2] for row in rows]
     if len({len(row) for row in rows}) > 1 or len(rows[0]) not in widths:
+        if word == "v" and any(len(row) in widths[2:] for row in rows):
+            _log.warning("only some vertices have a colour: the colours are not read")
         rows = [row[: min(widths)] for row in rows]
     try:
         table = np.array(rows, dtype=float)
