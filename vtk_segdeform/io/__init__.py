@@ -18,6 +18,8 @@ The files, in reading order:
     grids              unstructured grids as PolyData, and back
     isolated reading_child
                        native readers in a child process
+    groups             named groups of cells
+    other_meshes       surfaces given as other objects of VTK
     array_names        names and arrays that a format cannot store
     referenced_files   files that another file refers to
     repaired           repair of PolyData with its polygons and arrays
@@ -39,12 +41,14 @@ from .convert import (
 )
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
+from .other_meshes import as_polydata
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .surface import Surface, read_mesh
 
 __all__ = [
     "Surface",
+    "as_polydata",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",

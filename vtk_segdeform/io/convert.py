@@ -35,6 +35,7 @@ from . import meshlab
 from .gltf import read_gltf, write_gltf
 from .moving import MovingSurface
 from .off import read_off, write_off
+from .other_meshes import as_polydata
 from .ply import read_ply, write_ply
 from .polygons import polydata_of, triangles_of
 from .stl import read_stl, write_stl
@@ -145,9 +146,9 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         the disk is full.
     """
     path = as_path(path)
-    require(mesh, (Mesh, pv.PolyData), "mesh")
+    is_mesh = isinstance(mesh, Mesh)
+    surface = to_polydata(mesh) if is_mesh else as_polydata(mesh, "mesh", "a Mesh or a PolyData")
     require_writable(path)
-    surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
@@ -156,7 +157,7 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
             elif suffix in _VTK_WRITES:
                 write_with_vtk(draft, surface)
             else:
-                _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+                _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
@@ -212,7 +213,7 @@ def from_polydata(polydata: pv.PolyData) -> Mesh:
     MeshError
         If the surface cannot be a `Mesh` as it is.
     """
-    require(polydata, pv.PolyData, "polydata")
+    polydata = as_polydata(polydata, "polydata")
     faces = triangles_of(polydata)
     if len(faces) != polydata.n_cells:
         _log.info("%d cells were cut into %d triangles", polydata.n_cells, len(faces))
@@ -232,7 +233,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     vertices : (n, 3) float
         One position per point, in the order of ``polydata.points``.
     """
-    require(polydata, pv.PolyData, "polydata")
+    polydata = as_polydata(polydata, "polydata")
     points = as_points(vertices, "vertices", polydata.n_points)
     return MovingSurface(polydata).at(points)
 
