@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
 
 
-def session_of(mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session) -> Session:
+def session_of(
+    mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface | Mesh | Session,
+) -> Session:
     """Return a session over *mesh*; a session is returned itself.
 
     The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface, and

@@ -349,6 +349,7 @@ def test_whatever_shares_bytes_with_positions_that_move_does_not_change(tmp_path
 BESIDE = {  # first byte of others after that of the positions, type, stride; rows of 12 in 16
     "between": (12, "SCALAR", 16, True),
     "the last number": (8, "SCALAR", 16, False),
+    "the last row": (16 * (len(BALL) - 1), "SCALAR", 16, False),
     "between and the next row": (12, "VEC2", 16, False),
     "between and later in rows": (12, "SCALAR", 24, False),
     "between two, then in a row": (12, "SCALAR", 20, False),

@@ -19,9 +19,7 @@ The files, in reading order:
     isolated reading_child
                        native readers in a child process
     groups             named groups of cells
-    other_meshes       surfaces given as other objects of VTK
     array_names        names and arrays that a format cannot store
-    referenced_files   files that another file refers to
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
@@ -30,6 +28,7 @@ The files, in reading order:
 """
 
 from .convert import (
+    as_polydata,
     from_polydata,
     is_mesh_file,
     read_polydata,
@@ -41,7 +40,6 @@ from .convert import (
 )
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
-from .other_meshes import as_polydata
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .surface import Surface, read_mesh

@@ -141,7 +141,7 @@ def colour_bytes(colours: FloatArray) -> NDArray[np.uint8]:
     """
     numbers = np.nan_to_num(colours, posinf=0.0, neginf=0.0)
     scale = 1.0 if numbers.max(initial=0.0) >= _LEAST_BYTE else 255.0
-    return np.rint((scale * numbers).clip(0.0, 255.0)).astype(np.uint8)
+    return np.asarray(np.rint((scale * numbers).clip(0.0, 255.0)), dtype=np.uint8)
 
 
 def colour_numbers(colours: Any) -> Any:

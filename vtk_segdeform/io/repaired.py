@@ -27,7 +27,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import counted, normals
 from ..mesh_repair import Repair, repair
 from ..progress import Progress, part, tell
-from .other_meshes import as_polydata
+from .convert import as_polydata
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _CORNERS = "TextureCorners"

@@ -22,9 +22,8 @@ from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import require
 from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
-from .convert import read_polydata, write_mesh
+from .convert import as_polydata, read_polydata, write_mesh
 from .moving import MovingSurface
-from .other_meshes import as_polydata
 from .polygons import triangles_of
 
 

@@ -115,8 +115,7 @@ def _owners(head: dict[str, Any]) -> dict[int, set[Any]]:
             attributes = object_(primitive, "attributes", f"mesh {number}")
             for name, index in attributes.items():
                 key = repr(sorted(attributes.items()))
-                moves = name in ("POSITION", "NORMAL", "TANGENT")
-                _use(owners, index, (number, key, name) if moves else "other")
+                _use(owners, index, (number, key, name))
             _use(owners, primitive.get("indices"), "other")
             for target in objects(primitive, "targets", f"mesh {number}"):
                 for index in target.values():
