@@ -382,6 +382,65 @@ def test_numbers_between_the_rows_of_positions_do_not_share_their_bytes(tmp_path
     assert (len(new.json["bufferViews"]) == len(old.json["bufferViews"])) == is_apart
 
 
+def sparse_alone(document, common):
+    where = document.view(np.array([5], "<u2").tobytes())
+    values = document.view((1.5 * BALL[5:6]).astype("<f4").tobytes())
+    common["sparse"] = {"count": 1, "values": {"bufferView": values},
+                        "indices": {"bufferView": where, "componentType": 5123}}  # fmt: skip
+
+
+def of_compressed_view(document, common):
+    place = {"buffer": 0, "byteOffset": 0, "byteLength": 8}
+    view = document.head["bufferViews"][common["bufferView"]]
+    view["extensions"] = {"EXT_meshopt_compression": place}
+
+
+def of_nothing(document, common):
+    """Let all positions be zeros that are replaced one by one."""
+    del common["bufferView"]
+    common["sparse"] = {"count": len(BALL), "values": {"bufferView": 1},
+                        "indices": {"bufferView": 2, "componentType": 5123}}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", [sparse_alone, of_compressed_view, of_nothing])
+def test_positions_that_are_not_plain_bytes_become_new_ones(tmp_path, change):
+    document = Gltf()
+    document.view(bytes(8))
+    view = document.view(BALL.astype("<f4").tobytes())
+    document.view(np.arange(len(BALL), dtype="<u2").tobytes())
+    common = {"bufferView": view, "componentType": 5126, "count": len(BALL), "type": "VEC3"}
+    change(document, common)
+    primitive = {"attributes": {"POSITION": document.add("accessors", **common)}}
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive]))
+    document.view(b"odd")
+    path, out = document.save(tmp_path / "a.glb"), tmp_path / "b.glb"
+    require_moved(*moved_file(path, out, lambda x: bent(x) + 0.3))
+    old, new = (Document(each.read_bytes()) for each in (path, out))
+    assert new.buffer(0)[: len(document.blob)] == old.buffer(0)[: len(document.blob)]
+    assert len(new.json["bufferViews"]) == len(old.json["bufferViews"]) + 1
+    assert new.json["bufferViews"][-1]["byteOffset"] % 4 == 0
+    accessor = new.json["accessors"][0]
+    assert "sparse" not in accessor
+    assert "extensions" not in new.json["bufferViews"][accessor["bufferView"]]
+
+
+@pytest.mark.parametrize("moves", [(0,), (1,), (0, 1)])
+def test_of_two_nodes_with_one_mesh_each_shows_its_own_positions(tmp_path, moves):
+    document = octahedron(*OCTAHEDRON)
+    document.head["nodes"] = [{"mesh": 0}, {"mesh": 0, "translation": [4, 0, 0]}]
+    document.head["scenes"][0]["nodes"] = [0, 1]
+    path = document.save(tmp_path / "a.glb")
+
+    def move(vertices):
+        moved = vertices.copy()
+        for k in moves:
+            moved[6 * k : 6 * k + 6] *= [1.0, 2.0 + k, 3.0]
+        return moved
+
+    require_moved(*moved_file(path, tmp_path / "b.glb", move))
+
+
 def test_positions_that_are_also_the_normals_are_moved_apart(tmp_path):
     document = Gltf()
     position = document.array(BALL)

@@ -98,7 +98,7 @@ class Accessors:
         accessor = self._head["accessors"][number]
         if "sparse" in accessor or accessor.get("componentType") != _FLOAT:
             return False
-        if accessor.get("normalized") or self._ranges[number] is None:
+        if self._ranges[number] is None:
             return False
         view = self._head["bufferViews"][accessor["bufferView"]]
         if view.get("extensions"):  # compressed as well
