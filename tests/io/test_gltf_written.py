@@ -425,6 +425,17 @@ def test_positions_that_are_not_plain_bytes_become_new_ones(tmp_path, change):
     assert "extensions" not in new.json["bufferViews"][accessor["bufferView"]]
 
 
+def test_positions_that_are_zero_and_of_no_bytes_become_new_ones(tmp_path):
+    document = Gltf()
+    position = document.add("accessors", componentType=5126, count=len(BALL), type="VEC3")
+    primitive = {"attributes": {"POSITION": position}}
+    primitive["targets"] = [{"POSITION": document.array(BALL)}]
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive], weights=[1.0]))
+    path = document.save(tmp_path / "a.glb")
+    require_moved(*moved_file(path, tmp_path / "b.glb"))
+
+
 @pytest.mark.parametrize("moves", [(0,), (1,), (0, 1)])
 def test_of_two_nodes_with_one_mesh_each_shows_its_own_positions(tmp_path, moves):
     document = octahedron(*OCTAHEDRON)

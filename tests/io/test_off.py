@@ -81,6 +81,9 @@ def test_colours_of_0_and_1_are_fractions_and_one_over_1_is_clipped(tmp_path):
     surface = read_polydata(save(tmp_path / "a.off", header="COFF", columns=columns))
     expected = [[255, 0, 0], [0, 255, 0], [0, 0, 0], [255, 255, 0]]
     assert surface.point_data["RGB"].tolist() == expected
+    columns[0][1] = "2"  # which is no fraction
+    surface = read_polydata(save(tmp_path / "a.off", header="COFF", columns=columns))
+    assert surface.point_data["RGB"].tolist() == [[1, 2, 0], [0, 1, 0], [0, 0, 0], [1, 1, 0]]
 
 
 NORMAL, COLOUR, TEXTURE = ["0.6", "0.8", "0.0"], ["255", "7", "9", "200"], ["0.25", "0.5"]
@@ -185,3 +188,28 @@ def test_numbers_that_are_not_read_are_told(tmp_path, header, columns, colours, 
     assert told in caplog.text
     assert surface.array_names == []
     assert_array_equal(surface.points, VERTICES)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("4 4 6", "4", "declares '4' vertices and faces; must be two whole"),
+        ("4 4 6", "-4 4 6", "declares '-4 4' vertices and faces; must be two whole"),
+        ("4 4 6", "4 4.5 6", "declares '4 4.5' vertices and faces"),
+        ("4 4 6", "4 9 6", "declares 4 vertices and 9 faces, but ends after 8 lines"),
+        ("0.3333333333333333", "0.333x", "vertex 0 is '0.333x .*'; must be 3 numbers"),
+        ("0.3333333333333333 ", "", "vertex 0 is '.*'; must be 3 numbers"),
+        ("3 0 1 2", "3 0 x 2", "face 0 is '3 0 x 2'; must be whole numbers"),
+        ("3 0 1 2", "3 0 1.5 2", "face 0 is '3 0 1.5 2'; must be whole numbers"),
+        ("3 0 1 2", "3 0 99999999999999999999 2", "faces use vertices 0 to .*, but there are 4"),
+        ("3 0 1 2", "4 0 1 2", "the line of face 0 ends before its last corner"),
+        ("3 0 1 2", "-3 0 1 2", "the line of face 0 ends before its last corner"),
+    ],
+)
+def test_a_wrong_line_is_named(tmp_path, old, new, told):
+    path = save(tmp_path / "a.off")
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(MeshError, match=rf"a\.off: {told}"):
+        read_polydata(path)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import pyvista as pv
@@ -94,6 +96,15 @@ def test_truncated_text_is_an_error(tmp_path):
         path.write_bytes(text)
         with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
             read_polydata(path)
+
+
+def test_a_vertex_that_is_not_numbers_is_named(tmp_path):
+    path, data = octahedron(tmp_path, binary=False)
+    path.write_bytes(re.sub(rb"vertex (\S+) (\S+)", rb"vertex \1 x\2", data, count=1))
+    with pytest.raises(
+        MeshError, match=r"a\.stl: has the vertex '\S+ x\S+ \S+'; must be 3 numbers"
+    ):
+        read_polydata(path)
 
 
 def test_text_without_its_last_line_is_read_with_a_warning(tmp_path, caplog):

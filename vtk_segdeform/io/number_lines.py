@@ -8,7 +8,7 @@ None for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -128,6 +128,16 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
         return None
     return numbers if len(numbers) == count else None
+
+
+def are_numbers(words: Sequence[str | bytes]) -> bool:
+    """Return whether all *words* are numbers."""
+    try:
+        for word in words:
+            float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def colour_bytes(colours: FloatArray) -> NDArray[np.uint8]:

@@ -26,7 +26,7 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import text_of, warn_left_out
-from .number_lines import colour_bytes, colour_numbers, numbers_of, words_per_line
+from .number_lines import are_numbers, colour_bytes, colour_numbers, numbers_of, words_per_line
 from .polygons import cells_of, polydata_of, polygons_of, rows
 
 _log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ _WIDTHS_OF_COLOURS = (3, 4)
 
 # Positions and more of vertices, numbers and indices of corners, colours of faces (none: no row)
 _Tables: TypeAlias = tuple[FloatArray, IntArray, IntArray, FloatArray]
-_NO_COLOURS = np.empty((0, 3))
+_NO_COLOURS, _NO_CORNERS = np.empty((0, 3)), np.empty(0, dtype=np.int64)
 
 
 def read_off(path: Path) -> pv.PolyData:
@@ -131,15 +131,24 @@ def _tables(text: str) -> _Tables:
     of faces if all have one.
     """
     lines = [line for line in text.split("\n") if line.strip()]
-    n, m = (int(word) for word in lines[0].split()[:2])
-    if n < 0 or m < 0:
-        raise MeshError(f"declares {n} vertices and {m} faces")
+    sizes = lines[0].split()[:2] if lines else []
+    if len(sizes) < 2 or not all(word.isdecimal() and len(word) < 16 for word in sizes):
+        raise MeshError(
+            f"declares {' '.join(sizes)[:40]!r} vertices and faces; must be two whole numbers"
+        )
+    n, m = map(int, sizes)
     if len(lines) < 1 + n + m:
         raise MeshError(
             f"declares {n} vertices and {m} faces, but ends after {len(lines) - 1} lines"
         )
     words = [line.split() for line in lines[1 : 1 + n]]
-    table = np.array(words, dtype=float).reshape(n, -1 if n else 3)
+    width = len(words[0]) if n else 3
+    for k, row in enumerate(words):
+        if len(row) != width or width < 3 or not are_numbers(row):
+            raise MeshError(
+                f"vertex {k} is {' '.join(row)[:60]!r}; must be {max(width, 3)} numbers"
+            )
+    table = np.array(words, dtype=float).reshape(n, width)
     of_faces = lines[1 + n : 1 + n + m]
     counts, corners = _polygons(of_faces)
     return table, counts, corners, _colours_of_faces(of_faces, counts)
@@ -213,11 +222,16 @@ def _colour(attributes: Any) -> tuple[str, Any]:
 
 
 def _polygons(lines: list[str]) -> tuple[IntArray, IntArray]:
-    words = [line.split() for line in lines]
-    counts = np.array([int(row[0]) for row in words], dtype=np.int64)
-    if any(len(row) <= int(row[0]) for row in words):
-        raise MeshError("a face line ends before its last corner")
-    corners = [
-        int(word) for row, k in zip(words, counts.tolist(), strict=True) for word in row[1 : k + 1]
-    ]
-    return counts, np.array(corners, dtype=np.int64)
+    counts, corners = [], []
+    for k, line in enumerate(lines):
+        words = line.split()
+        try:
+            count = int(words[0])
+            row = np.array(words[1 : max(count, 0) + 1], dtype=np.int64)
+        except (ValueError, OverflowError):
+            raise MeshError(f"face {k} is {line[:60]!r}; must be whole numbers") from None
+        if len(row) != count:
+            raise MeshError(f"the line of face {k} ends before its last corner")
+        counts.append(count)
+        corners.append(row)
+    return np.array(counts, dtype=np.int64), np.concatenate([_NO_CORNERS, *corners])

@@ -42,6 +42,7 @@ from .array_names import (
     warn_renamed,
 )
 from .groups import GROUP, OBJECT, groups_of, names_key, set_groups
+from .number_lines import are_numbers
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _SHORTEST = len("vertex 0 0 0")
@@ -124,6 +125,11 @@ def _read_text(path: Path, text: bytes) -> pv.PolyData:
         if len(rows) != 3 * facets or not (has_end or facets == ends):
             raise MeshError("is truncated, or has a facet without three vertices")
         if facets:
+            if not (isinstance(rows, np.ndarray) or all(map(are_numbers, rows))):
+                wrong = next(row for row in rows if not are_numbers(row))
+                raise MeshError(
+                    f"has the vertex {decoded(b' '.join(wrong))[:60]!r}; must be 3 numbers"
+                )
             with np.errstate(over="ignore"):
                 parts.append(np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32))
             number = names.setdefault(name or f"solid {solid}", len(names))

@@ -46,7 +46,7 @@ from .array_names import (
 )
 from .groups import GROUP, MATERIAL, OBJECT, groups_of, names_key, set_groups, whole_numbers
 from .moving import CORNER_NORMALS
-from .number_lines import Lines, colour_bytes
+from .number_lines import Lines, are_numbers, colour_bytes
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
 _log = logging.getLogger(__name__)
@@ -187,16 +187,10 @@ def _table(what: str, lines: Lines, word: str, widths: tuple[int, ...]) -> Float
             raise ValueError
         return table
     except ValueError:
-        number = next(k for k, row in enumerate(rows, 1) if not _are_numbers(row, min(widths)))
+        sound = (len(row) >= min(widths) and are_numbers(row) for row in rows)
+        number = list(sound).index(False) + 1
         row = " ".join(rows[number - 1])[:60]
         raise MeshError(f"{what} {number} is {row!r}; must be {min(widths)} numbers") from None
-
-
-def _are_numbers(words: list[str], least: int) -> bool:
-    try:
-        return len([float(word) for word in words]) >= least
-    except ValueError:
-        return False
 
 
 def _keep_corners(

@@ -188,8 +188,12 @@ class Document:
             kind, comma, payload = uri.partition(",")
             if not comma:
                 raise MeshError(f"buffer {number} has a data: URI without data")
-            coded = kind.endswith(";base64")
-            return base64.b64decode(payload) if coded else unquote_to_bytes(payload)
+            if not kind.endswith(";base64"):
+                return unquote_to_bytes(payload)
+            try:
+                return base64.b64decode(payload)
+            except ValueError:
+                raise MeshError(f"buffer {number} is not valid base64: it was cut off") from None
         file = self.file_of(uri)
         if file is None:
             raise MeshError(
