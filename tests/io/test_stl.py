@@ -216,6 +216,7 @@ def test_named_solids_are_groups_of_one_welded_mesh_and_keep_their_names(tmp_pat
 
 def test_text_has_all_digits_and_the_order_of_the_triangles(tmp_path):
     vertices, faces = icosphere(2)
+    vertices = vertices * (1.0 + 0.1 * np.random.default_rng(2).random((len(vertices), 1)))
     surface = to_polydata(Mesh(vertices * np.array([1e-7, 1.0, 3e8]), faces))
     write_mesh(tmp_path / "a.stl", surface)
     binary = read_polydata(tmp_path / "a.stl")

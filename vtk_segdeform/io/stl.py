@@ -81,19 +81,13 @@ def read_stl(path: Path) -> pv.PolyData:
 def _text_of(data: bytes) -> bytes | None:
     """Return the text of a file, without blanks before it; None if the file is binary.
 
-    The title of a binary file may begin with "solid" as well.  It is binary if it has all the
-    triangles that it then declares, which no text has: four letters are a number of over 150
-    million triangles.  One that was cut off has a zero byte in its first triangle or before it.
+    The title of a binary file may begin with "solid" as well.  But text has no zero bytes, and a
+    binary file has one in the number of its triangles, if these are fewer than 2^24, or else in
+    its title or its first triangle.
     """
     text = data.removeprefix(codecs.BOM_UTF8).lstrip()
-    is_whole = len(data) >= _START and len(data) >= _START + _SIZE * _declared(data)
-    if text[:5].lower() != b"solid" or is_whole or b"\0" in data[: _START + _SIZE]:
-        return None
-    return text
-
-
-def _declared(data: bytes) -> int:
-    return int.from_bytes(data[80:_START], "little")
+    is_binary = text[:5].lower() != b"solid" or b"\0" in data[: _START + _SIZE]
+    return None if is_binary else text
 
 
 def _of_bytes(data: bytes) -> Any:
@@ -106,7 +100,7 @@ def _of_bytes(data: bytes) -> Any:
         raise MeshError("is UTF-16 text; save it as UTF-8 or ASCII text")
     if len(data) < _START:
         raise MeshError(f"ends after {len(data)} bytes, in its header: it was cut off")
-    count, stored = _declared(data), (len(data) - _START) // _SIZE
+    count, stored = int.from_bytes(data[80:_START], "little"), (len(data) - _START) // _SIZE
     if stored < count or (stored > count and data[_START + _SIZE * count :].strip(_BLANKS)):
         why = "it was cut off" if stored < count else "its header is wrong"
         raise MeshError(
@@ -125,13 +119,8 @@ def _read_text(path: Path, text: bytes) -> pv.PolyData:
         if len(rows) != 3 * facets or not (has_end or facets == ends):
             raise MeshError("is truncated, or has a facet without three vertices")
         if facets:
-            if not (isinstance(rows, np.ndarray) or all(map(are_numbers, rows))):
-                wrong = next(row for row in rows if not are_numbers(row))
-                raise MeshError(
-                    f"has the vertex {decoded(b' '.join(wrong))[:60]!r}; must be 3 numbers"
-                )
             with np.errstate(over="ignore"):
-                parts.append(np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32))
+                parts.append(_numbers_of(rows).reshape(-1, 3).astype(np.float32))
             number = names.setdefault(name or f"solid {solid}", len(names))
             numbers.append(np.full(facets, number))
             is_named |= bool(name) or len(names) > 1
@@ -146,6 +135,14 @@ def _read_text(path: Path, text: bytes) -> pv.PolyData:
     if is_named:
         set_groups(surface, GROUP, np.concatenate(numbers), names)
     return surface
+
+
+def _numbers_of(rows: Any) -> Any:
+    try:
+        return np.array(rows, dtype=float)
+    except ValueError:
+        wrong = decoded(b" ".join(next(row for row in rows if not are_numbers(row))))
+        raise MeshError(f"has the vertex {wrong[:60]!r}; must be 3 numbers") from None
 
 
 def _solids(text: bytes) -> Iterator[tuple[int, str, bytes]]:
