@@ -244,7 +244,7 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     return MovingSurface(polydata).at(points)
 
 
-def as_polydata(mesh: object, name: str, expected: str = "a PolyData") -> pv.PolyData:
+def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") -> pv.PolyData:
     """Return the surface that *mesh* is; a PolyData is returned itself.
 
     Other objects of VTK are accepted as well: an UnstructuredGrid of triangles, polygons, strips,

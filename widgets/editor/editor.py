@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, shown
-from vtk_segdeform.errors import ArgumentError, SessionError
+from vtk_segdeform.errors import ArgumentError, MeshError, SessionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -44,6 +44,14 @@ _BEFORE_CAMERA = 0.5  # priority: that of the camera is 0.25
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
 
 
+def _new_session(mesh: Any) -> Session:
+    try:
+        return Session(mesh)
+    except MeshError as error:
+        expected = "session must be a Session, a Surface or a Mesh"
+        raise ArgumentError(f"{expected}; got {shown(mesh)}: {error}") from None
+
+
 class DeformEditor:
     """The whole editor in one view; off until `On`.
 
@@ -60,7 +68,7 @@ class DeformEditor:
     def __init__(
         self, view: Any, session: Session | Surface | Mesh, *, keys: KeyChoice | Keys = "pyvista"
     ) -> None:
-        session = session if isinstance(session, Session) else Session(session)
+        session = session if isinstance(session, Session) else _new_session(session)
         table = keys_of(keys)
         self.view = View.of(view)
         has_camera = _is_aimed(self.view.renderer)
