@@ -6,10 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pyvista as pv
 
-from vtk_segdeform.checks import shown
-from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import Surface
+from vtk_segdeform.io import Surface, as_polydata
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
@@ -17,26 +15,20 @@ if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
 
 
-def session_of(mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session) -> Session:
+def session_of(
+    mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface | Mesh | Session,
+) -> Session:
     """Return a session over *mesh*; a session is returned itself.
 
-    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface.
+    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface, and
+    so do the cells of an UnstructuredGrid.
     """
     if isinstance(mesh, Session):
         return mesh
     if isinstance(mesh, Mesh | Surface):
         return Session(mesh)
-    if isinstance(mesh, pv.PolyData):
-        return Session(Surface(mesh))
-    blocks = list(mesh.recursive_iterator()) if isinstance(mesh, pv.MultiBlock) else []
-    surfaces = [block for block in blocks if block is not None]
-    if surfaces and all(isinstance(block, pv.PolyData) for block in surfaces):
-        first, *others = surfaces
-        return Session(Surface(first.append_polydata(*others)))
-    raise ArgumentError(
-        "mesh must be a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session; "
-        f"got {shown(mesh)}"
-    )
+    expected = "a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session"
+    return Session(Surface(as_polydata(mesh, "mesh", expected)))
 
 
 def edited(mesh: Any, session: Session) -> Any:

@@ -75,7 +75,7 @@ def edit(
 ) -> Session: ...
 @overload
 def edit(
-    mesh: pv.PolyData | pv.MultiBlock | Surface,
+    mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface,
     *,
     path: _Path = None,
     title: str = ...,
@@ -101,7 +101,8 @@ def edit(
     Parameters
     ----------
     mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
-        Any surface, or a session to continue.  The surfaces of a MultiBlock are edited as one.
+        Any surface, or a session to continue.  The surfaces of a MultiBlock are edited as one, and
+        an UnstructuredGrid of triangles and polygons as a PolyData.
     path : path, optional
         The file that the editor's keys save and open.  In a notebook only its name is shown: the
         page downloads.
@@ -116,8 +117,9 @@ def edit(
     -------
     deformed : of the type of *mesh*, or NotebookEditor
         A deformed copy.  Of a PolyData or a Surface it is what was given, apart from coordinates
-        and normals; of a MultiBlock it is one PolyData.  A session is returned itself, unless
-        another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at once.
+        and normals; of a MultiBlock or a grid it is one PolyData.  A session is returned itself,
+        unless another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes
+        at once.
 
     Raises
     ------
@@ -181,7 +183,7 @@ class PlotterTools:
 
     def edit(
         self,
-        mesh: pv.PolyData | pv.MultiBlock | Surface | Mesh | Session,
+        mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface | Mesh | Session,
         *,
         path: _Path = None,
         keys: KeyChoice = "pyvista",
@@ -205,7 +207,7 @@ class PlotterTools:
         """
         session = session_of(mesh)
         path = None if path is None else as_path(path)
-        if isinstance(mesh, pv.PolyData):
+        if isinstance(mesh, pv.DataSet):
             for actor in self._plotter.renderer.actors.values():
                 if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
                     actor.visibility = False

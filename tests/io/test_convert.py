@@ -169,14 +169,6 @@ def test_text_and_both_byte_orders_of_ply_are_the_same_mesh(tmp_path):
         assert surface.point_data["red"].dtype == np.uint8
 
 
-def test_off_with_colours_comments_and_counts_on_the_first_line(tmp_path):
-    text = "COFF 4 4 0 # four\n\n0 0 0 255 0 0 255\n1 0 0 0 9 0 255\n0 1 0 1 2 3 4\n0 0 1 5 6 7 8\n"
-    (tmp_path / "a.off").write_text(text + "3 0 2 1\n3 0 1 3 255 0 0\n3 0 3 2\n3 1 2 3\n")
-    surface = read_polydata(tmp_path / "a.off")
-    assert from_polydata(surface).n_faces == 4
-    assert surface.point_data["RGBA"].tolist()[1] == [0, 9, 0, 255]
-
-
 def test_an_stl_soup_is_merged_into_a_closed_mesh(tmp_path):
     mesh = Mesh(*icosphere(2))
     write_mesh(tmp_path / "a.stl", mesh)

@@ -197,6 +197,271 @@ def test_positions_that_are_interleaved_sparse_or_shared_are_moved(tmp_path):
     assert_array_equal(new.array(texture, "VEC2"), rows["t"])
 
 
+BALL, TRIANGLES = icosphere(1)
+MARGIN = 16  # bytes before and after the positions
+
+
+def animated(document, position, key="output"):
+    """Let an animation use an accessor; return what gets it."""
+    sampler = {"input": document.array(np.arange(3.0)), "output": document.array(np.ones((3, 3)))}
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    document.add("animations", samplers=[sampler | {key: position}], channels=[channel])
+    return lambda new: new.array(
+        new.json["animations"][0]["samplers"][0][key], "VEC3", "VEC2", "SCALAR"
+    )
+
+
+def part(document, position, first, count, type_="VEC3", **more):
+    """Let an animation use numbers from byte *first* of the positions, by a view of their own."""
+    view = document.head["bufferViews"][document.head["accessors"][position]["bufferView"]]
+    width = {"VEC3": 12, "VEC2": 8, "SCALAR": 4}[type_]
+    start = view["byteOffset"] + MARGIN + first
+    stride = more.get("byteStride", width)
+    of_part = document.add("bufferViews", buffer=0, byteOffset=start,
+                           byteLength=(count - 1) * stride + width, **more)  # fmt: skip
+    same = {"componentType": 5126, "count": count, "type": type_}
+    return animated(document, document.add("accessors", bufferView=of_part, **same))
+
+
+def skinned(document, position):
+    """Let the matrices of a skin be bytes of the positions."""
+    view = document.head["accessors"][position]["bufferView"]
+    matrices = document.add("accessors", bufferView=view, byteOffset=MARGIN + 64, count=2,
+                            componentType=5126, type="MAT4")  # fmt: skip
+    document.add("skins", joints=[0], inverseBindMatrices=matrices)
+    return lambda new: new.array(new.json["skins"][0]["inverseBindMatrices"], "MAT4")
+
+
+def sparse(document, position):
+    """Let the values that a sparse accessor replaces be bytes of the positions."""
+    where = document.view(np.array([1, 4], "<u2").tobytes())
+    values = {"bufferView": document.head["accessors"][position]["bufferView"], "byteOffset": 16}
+    indices = {"bufferView": where, "componentType": 5123}
+    replaced = {"count": 2, "indices": indices, "values": values}
+    number = document.add("accessors", componentType=5126, count=9, type="VEC3", sparse=replaced)
+    return animated(document, number)
+
+
+def pictured(document, position):
+    """Let an image be bytes of the positions."""
+    document.add("images", bufferView=document.head["accessors"][position]["bufferView"],
+                 mimeType="image/png")  # fmt: skip
+
+    def image(new):
+        view = new.json["bufferViews"][new.json["images"][0]["bufferView"]]
+        start = view["byteOffset"]
+        return np.frombuffer(new.buffer(0)[start : start + view["byteLength"]], "u1")
+
+    return image
+
+
+def compressed(document, position):
+    """Let the compressed data of an unused view be bytes of the positions."""
+    view = document.head["bufferViews"][document.head["accessors"][position]["bufferView"]]
+    place = {key: view[key] for key in ("buffer", "byteOffset", "byteLength")}
+    other = document.view(bytes(8), extensions={"EXT_meshopt_compression": place})
+
+    def data(new):
+        there = new.json["bufferViews"][other]["extensions"]["EXT_meshopt_compression"]
+        start = there["byteOffset"]
+        return np.frombuffer(new.buffer(0)[start : start + there["byteLength"]], "u1")
+
+    return data
+
+
+def attribute(document, position, name):
+    document.head["meshes"][0]["primitives"][0]["attributes"][name] = position
+    return lambda new: new.array(new.json["meshes"][0]["primitives"][0]["attributes"][name], "VEC3")
+
+
+def morphed(document, position):
+    primitive = document.head["meshes"][0]["primitives"][0]
+    primitive["targets"] = [{"POSITION": document.array(0 * BALL)}, {"POSITION": position}]
+    return lambda new: new.array(
+        new.json["meshes"][0]["primitives"][0]["targets"][1]["POSITION"], "VEC3"
+    )
+
+
+def second_mesh(document, position):
+    """Let a second mesh, which no node shows, have the same positions."""
+    number = document.add("meshes", primitives=[{"attributes": {"POSITION": position}}])
+    return lambda new: new.array(
+        new.json["meshes"][number]["primitives"][0]["attributes"]["POSITION"], "VEC3"
+    )
+
+
+def instanced(document, position):
+    """Let an extension of a node use the positions."""
+    key = "EXT_mesh_gpu_instancing"
+    document.head["nodes"][0]["extensions"] = {key: {"attributes": {"TRANSLATION": position}}}
+    return lambda new: new.array(
+        new.json["nodes"][0]["extensions"][key]["attributes"]["TRANSLATION"], "VEC3"
+    )
+
+
+LAST = 12 * (len(BALL) - 1)
+SHARED = {
+    "output of an animation": animated,
+    "input of an animation": lambda document, position: animated(document, position, "input"),
+    "all bytes": lambda *given: part(*given, 0, len(BALL)),
+    "from the second row": lambda *given: part(*given, 12, 5),
+    "the last row": lambda *given: part(*given, LAST, 1),
+    "across the last row": lambda *given: part(*given, LAST + 8, 2),
+    "across the first row": lambda *given: part(*given, -8, 1),
+    "the last number": lambda *given: part(*given, LAST + 8, 1, "SCALAR"),
+    "the first number": lambda *given: part(*given, 0, 1, "SCALAR"),
+    "every second row": lambda *given: part(*given, 12, 9, byteStride=24),
+    "x and y of rows": lambda *given: part(*given, 12, 9, "VEC2", byteStride=12),
+    "a skin": skinned,
+    "a sparse accessor": sparse,
+    "an image": pictured,
+    "compressed data": compressed,
+    "a colour": lambda *given: attribute(*given, "COLOR_0"),
+    "any attribute": lambda *given: attribute(*given, "_PLACE"),
+    "a morph target": morphed,
+    "another mesh": second_mesh,
+    "an extension": instanced,
+}
+
+
+@pytest.mark.parametrize("how", list(SHARED))
+def test_whatever_shares_bytes_with_positions_that_move_does_not_change(tmp_path, how):
+    document = Gltf()
+    data = np.arange(4.0, dtype="<f4").tobytes()  # of MARGIN bytes
+    view = document.view(data + BALL.astype("<f4").tobytes() + data)
+    position = document.add("accessors", bufferView=view, byteOffset=MARGIN, componentType=5126,
+                            count=len(BALL), type="VEC3", min=[-1] * 3, max=[1] * 3)  # fmt: skip
+    indices = document.array(TRIANGLES.ravel(), "u2")
+    primitive = {"attributes": {"POSITION": position}, "indices": indices}
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive]))
+    got = SHARED[how](document, position)
+    path, out = document.save(tmp_path / "a.glb"), tmp_path / "b.glb"
+    expected, found = moved_file(path, out, lambda x: bent(x) + 0.3)  # each number of each vertex
+    assert_allclose(found.points, expected.points, atol=3e-6)
+    old, new = (Document(each.read_bytes()) for each in (path, out))
+    assert_array_equal(got(new), got(old))
+    assert len(new.json["accessors"]) - len(old.json["accessors"]) in (0, 1)
+    before = old.buffer(0)
+    place = document.head["bufferViews"][view]["byteOffset"]
+    assert new.buffer(0)[place : place + MARGIN] == before[place : place + MARGIN]
+
+
+BESIDE = {  # first byte of others after that of the positions, type, stride; rows of 12 in 16
+    "between": (12, "SCALAR", 16, True),
+    "the last number": (8, "SCALAR", 16, False),
+    "the last row": (16 * (len(BALL) - 1), "SCALAR", 16, False),
+    "between and the next row": (12, "VEC2", 16, False),
+    "between and later in rows": (12, "SCALAR", 24, False),
+    "between two, then in a row": (12, "SCALAR", 20, False),
+}
+
+
+@pytest.mark.parametrize("how", list(BESIDE))
+def test_numbers_between_the_rows_of_positions_do_not_share_their_bytes(tmp_path, how):
+    first, type_, stride, is_apart = BESIDE[how]
+    document = Gltf()
+    rows = np.zeros(len(BALL), [("p", "<f4", 3), ("h", "<f4")])
+    rows["p"], rows["h"] = BALL, np.arange(len(BALL))
+    view = document.view(rows.tobytes() + bytes(8), byteStride=16)
+    same = {"componentType": 5126, "type": "VEC3", "count": len(BALL)}
+    position = document.add("accessors", bufferView=view, **same)
+    primitive = {"attributes": {"POSITION": position}}
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive]))
+    start = document.head["bufferViews"][view]["byteOffset"] + first
+    length = 16 * len(BALL) + 8 - first
+    other = document.add("bufferViews", buffer=0, byteOffset=start, byteLength=length,
+                         byteStride=stride)  # fmt: skip
+    same |= {"type": type_, "count": length // stride}
+    got = animated(document, document.add("accessors", bufferView=other, **same))
+    path, out = document.save(tmp_path / "a.glb"), tmp_path / "b.glb"
+    expected, found = moved_file(path, out, lambda x: bent(x) + 0.3)
+    assert_allclose(found.points, expected.points, atol=3e-6)
+    old, new = (Document(each.read_bytes()) for each in (path, out))
+    assert_array_equal(got(new), got(old))
+    assert (len(new.json["bufferViews"]) == len(old.json["bufferViews"])) == is_apart
+
+
+def sparse_alone(document, common):
+    where = document.view(np.array([5], "<u2").tobytes())
+    values = document.view((1.5 * BALL[5:6]).astype("<f4").tobytes())
+    common["sparse"] = {"count": 1, "values": {"bufferView": values},
+                        "indices": {"bufferView": where, "componentType": 5123}}  # fmt: skip
+
+
+def of_compressed_view(document, common):
+    place = {"buffer": 0, "byteOffset": 0, "byteLength": 8}
+    view = document.head["bufferViews"][common["bufferView"]]
+    view["extensions"] = {"EXT_meshopt_compression": place}
+
+
+def of_nothing(document, common):
+    """Let all positions be zeros that are replaced one by one."""
+    del common["bufferView"]
+    common["sparse"] = {"count": len(BALL), "values": {"bufferView": 1},
+                        "indices": {"bufferView": 2, "componentType": 5123}}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", [sparse_alone, of_compressed_view, of_nothing])
+def test_positions_that_are_not_plain_bytes_become_new_ones(tmp_path, change):
+    document = Gltf()
+    document.view(bytes(8))
+    view = document.view(BALL.astype("<f4").tobytes())
+    document.view(np.arange(len(BALL), dtype="<u2").tobytes())
+    common = {"bufferView": view, "componentType": 5126, "count": len(BALL), "type": "VEC3"}
+    change(document, common)
+    primitive = {"attributes": {"POSITION": document.add("accessors", **common)}}
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive]))
+    document.view(b"odd")
+    path, out = document.save(tmp_path / "a.glb"), tmp_path / "b.glb"
+    require_moved(*moved_file(path, out, lambda x: bent(x) + 0.3))
+    old, new = (Document(each.read_bytes()) for each in (path, out))
+    assert new.buffer(0)[: len(document.blob)] == old.buffer(0)[: len(document.blob)]
+    assert len(new.json["bufferViews"]) == len(old.json["bufferViews"]) + 1
+    assert new.json["bufferViews"][-1]["byteOffset"] % 4 == 0
+    accessor = new.json["accessors"][0]
+    assert "sparse" not in accessor
+    assert "extensions" not in new.json["bufferViews"][accessor["bufferView"]]
+
+
+def test_positions_that_are_zero_and_of_no_bytes_become_new_ones(tmp_path):
+    document = Gltf()
+    position = document.add("accessors", componentType=5126, count=len(BALL), type="VEC3")
+    primitive = {"attributes": {"POSITION": position}}
+    primitive["targets"] = [{"POSITION": document.array(BALL)}]
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive], weights=[1.0]))
+    path = document.save(tmp_path / "a.glb")
+    require_moved(*moved_file(path, tmp_path / "b.glb"))
+
+
+@pytest.mark.parametrize("moves", [(0,), (1,), (0, 1)])
+def test_of_two_nodes_with_one_mesh_each_shows_its_own_positions(tmp_path, moves):
+    document = octahedron(*OCTAHEDRON)
+    document.head["nodes"] = [{"mesh": 0}, {"mesh": 0, "translation": [4, 0, 0]}]
+    document.head["scenes"][0]["nodes"] = [0, 1]
+    path = document.save(tmp_path / "a.glb")
+
+    def move(vertices):
+        moved = vertices.copy()
+        for k in moves:
+            moved[6 * k : 6 * k + 6] *= [1.0, 2.0 + k, 3.0]
+        return moved
+
+    require_moved(*moved_file(path, tmp_path / "b.glb", move))
+
+
+def test_positions_that_are_also_the_normals_are_moved_apart(tmp_path):
+    document = Gltf()
+    position = document.array(BALL)
+    attributes = {"POSITION": position, "NORMAL": position}
+    primitive = {"attributes": attributes, "indices": document.array(TRIANGLES.ravel(), "u2")}
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive]))
+    path = document.save(tmp_path / "a.glb")
+    require_moved(*moved_file(path, tmp_path / "b.glb", lambda x: x * [1, 2, 3]))
+
+
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
 def test_skins_and_morph_targets_show_the_new_positions(tmp_path, suffix, caplog):
     document = Gltf()

@@ -6,6 +6,7 @@ The table in docs/files.rst is made here; with SEGDEFORM_TABLES=1 it is written 
 from __future__ import annotations
 
 import os
+import re
 from functools import cache
 from pathlib import Path
 
@@ -215,7 +216,10 @@ def materials(read):
     made, again, *_ = read("body")
     kept = []
     for key in ("Material", "Group"):
-        names, others = (get_names(each, f"{key}Names") for each in (made, again))
+        names, others = (
+            [re.sub("[^ -~]", "_", name) for name in get_names(each, f"{key}Names")]  # as in STL
+            for each in (made, again)
+        )
         if others and sorted(others) == sorted(names):
             kept.append({"Material": "materials", "Group": "groups"}[key])
     return ", ".join(kept) or "no"

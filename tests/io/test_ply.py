@@ -317,3 +317,17 @@ end_header
     lines = (tmp_path / "b.ply").read_bytes().split(b"\n")[2:5]
     assert lines == [b"comment made by hand", b"obj_info num_cols 2", b"obj_info num_rows 2"]
     assert caplog.text == ""
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("length", ["-1", "2.5", "-0.7", "0.7", "nan", "inf", "1e300"])
+def test_a_length_that_is_not_whole_is_an_error(tmp_path, monkeypatch, length, compiled):
+    if compiled:
+        for name in ("COMPILED_CHECKS", "COMPILED_LATE"):
+            monkeypatch.setattr(f"vtk_segdeform.sizes.{name}", 0)
+    faces = [f"3 {a} {b} {c}" for a, b, c in TETRAHEDRON[1]]
+    for row in range(5):
+        rows = [*faces[:row], length, *faces[row:]]
+        (tmp_path / "a.ply").write_text(text(TETRAHEDRON[0], rows, FACES.format(m=5)))
+        with pytest.raises(MeshError, match=r"a\.ply: a list of 'face' has the length|end.* row"):
+            read_polydata(tmp_path / "a.ply")

@@ -294,3 +294,36 @@ def test_a_plane_is_no_surface_in_space(tmp_path):
     (tmp_path / "a.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3")
     with pytest.raises(MeshError, match="vertex 1 is '0 0'; must be 3 numbers"):
         read_polydata(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize(
+    ("colours", "expected"),
+    [
+        (["255 0 7", "0 128 0", "2 0 1", "40 50 60"], "255 0 7 0 128 0 2 0 1 40 50 60"),
+        (["255.0 0 7.4", "0 127.6 0", "2 0 1", "40 50 60"], "255 0 7 0 128 0 2 0 1 40 50 60"),
+        (["2 0 1", "0 0 0", "0 0 0", "1 1 1"], "2 0 1 0 0 0 0 0 0 1 1 1"),
+        (["1 0 0", "0 1 0", "0 0 1", "1 1 1"], "255 0 0 0 255 0 0 0 255 255 255 255"),
+        (["0.2 0 1", "0 1.0000001 0", "0 0 1", "1 1 1"], "51 0 255 0 255 0 0 0 255 255 255 255"),
+        (["0.5 nan inf", "0 0 0", "0 0 0", "1e-3 0 0"], "128 0 0 0 0 0 0 0 0 0 0 0"),
+    ],
+)
+def test_colours_are_fractions_or_bytes(tmp_path, colours, expected):
+    lines = [f"v {x} {y} {z} {c}" for (x, y, z), c in zip(TETRAHEDRON[0], colours, strict=True)]
+    lines += [f"f {a} {b} {c}" for a, b, c in TETRAHEDRON[1] + 1]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    surface = read_polydata(tmp_path / "a.obj")
+    assert surface.point_data["RGB"].ravel().tolist() == list(map(int, expected.split()))
+    assert_array_equal(surface.points, TETRAHEDRON[0])
+    write_mesh(tmp_path / "b.obj", surface)
+    again = read_polydata(tmp_path / "b.obj")
+    assert_array_equal(again.point_data["RGB"], surface.point_data["RGB"])
+
+
+def test_colours_of_some_vertices_are_not_read_and_told(tmp_path, caplog):
+    lines = [f"v {x} {y} {z}" for x, y, z in TETRAHEDRON[0]]
+    lines += [f"f {a} {b} {c}" for a, b, c in TETRAHEDRON[1] + 1]
+    (tmp_path / "a.obj").write_text("\n".join([lines[0] + " 255 0 0", *lines[1:]]))
+    surface = read_polydata(tmp_path / "a.obj")
+    assert surface.array_names == []
+    assert_array_equal(surface.points, TETRAHEDRON[0])
+    assert "only some vertices have a colour: the colours are not read" in caplog.text

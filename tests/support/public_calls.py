@@ -138,6 +138,9 @@ def _calls_of_class(cls: type) -> Iterator[Call]:
             yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
 
 
+ALSO_NEEDED = {"Mesh.faces"}  # without which the error says how to make one
+
+
 def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
     signature = inspect.signature(signed)
     plain = [
@@ -146,7 +149,9 @@ def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
         if p.name != "self" and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
     ]
     names = tuple(p.name for p in plain)
-    needed = tuple(p.name for p in plain if p.default is p.empty)
+    needed = tuple(
+        p.name for p in plain if p.default is p.empty or f"{label}.{p.name}" in ALSO_NEEDED
+    )
     if label in EXTRA:  # passed on as keywords
         names += EXTRA[label]
     return Call(label, bound, names, needed)
@@ -494,6 +499,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.split_region.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
+    "as_polydata.expected": lambda: "a PolyData",
+    "as_polydata.mesh": lambda: given().given,
     "Mesh.of.search": lambda: Search(*as_soup(mesh().vertices, mesh().faces)),
     "Mesh.of_components.which": lambda: [0],
     "Surface.moved.vertices": lambda: given().mesh.vertices,

@@ -2,23 +2,26 @@
 
 The files, in reading order:
 
-    folders         folders of the current user for caches and unsaved work
-    atomic          write a draft, then rename it over the old file
-    lock            lock files, released when their process ends
-    regular_file    open regular files only: no pipes, no devices
-    landlock        a process gives up its right to open other files
+    folders             folders of the current user for caches and unsaved work
+    atomic              write a draft, then rename it over the old file
+    lock                lock files, released when their process ends
+    regular_file        open regular files only: no pipes, no devices
+    landlock            a process gives up its right to open other files
+    referenced_files    files that another file refers to
 """
 
 from . import landlock
 from .atomic import is_draft, replacing, require_place
 from .folders import autosave_folder, cache_folder
 from .lock import hold
+from .referenced_files import file_inside
 from .regular_file import fault_of, is_ours, open_regular
 
 __all__ = [
     "autosave_folder",
     "cache_folder",
     "fault_of",
+    "file_inside",
     "hold",
     "is_draft",
     "is_ours",

@@ -17,8 +17,8 @@ The files, in reading order:
     grids              unstructured grids as PolyData, and back
     confined reading_child
                        VTK's and PyMeshLab's readers, in a process that can open one file only
+    groups             named groups of cells
     array_names        names and arrays that a format cannot store
-    referenced_files   files that another file refers to
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
@@ -27,6 +27,7 @@ The files, in reading order:
 """
 
 from .convert import (
+    as_polydata,
     from_polydata,
     is_mesh_file,
     read_polydata,
@@ -44,6 +45,7 @@ from .surface import Surface, read_mesh
 
 __all__ = [
     "Surface",
+    "as_polydata",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",

@@ -4,6 +4,7 @@
     file  <---write_mesh----  PolyData  <--with_vertices--  new positions (n, 3)
 
 `surface.Surface` does both for any surface; `from_polydata` takes only what a `Mesh` may be.
+All of them take other objects of VTK, too (`as_polydata`).
 
 The order and number of vertices and faces and all digits of coordinates are preserved.  OBJ, OFF
 and PLY are read and written by this package, because VTK's readers round to seven digits (PLY),
@@ -27,12 +28,15 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_points
 from ..cages import Cage
-from ..checks import as_flag, as_path, require
-from ..errors import MeshError
+from ..checks import as_flag, as_path, require, shown
+from ..errors import ArgumentError, MeshError
 from ..files import fault_of, replacing, require_place
-from ..mesh import Mesh
+from ..mesh import Mesh, conversion_of
 from . import meshlab
+from .array_names import set_names
 from .gltf import read_gltf, write_gltf
+from .grids import surface_of_grid
+from .groups import GROUP, names_key
 from .moving import MovingSurface
 from .off import read_off, write_off
 from .ply import read_ply, write_ply
@@ -122,7 +126,9 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     return surface
 
 
-def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
+def write_mesh(
+    path: str | Path, mesh: Mesh | pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock
+) -> None:
     """Write a mesh to a file, atomically: after an error an existing file is unchanged.
 
     The new file has the mode of the old one; symbolic links are followed.
@@ -132,8 +138,9 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     path : str or Path
         .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab .3ds, .dae,
         .x3d, .wrl, .ctm.  All formats except .stl, .glb, .gltf and those of PyMeshLab store every
-        digit; .vtk, .vtp, .vtu and .vtkhdf store every array.  A warning is logged for each array
-        that is left out or renamed.
+        digit; .vtk, .vtp, .vtu and .vtkhdf store every array.  An .stl is text, with named solids,
+        if its cells have groups, and binary otherwise.  A warning is logged for each array that is
+        left out or renamed.
     mesh : Mesh or pyvista.PolyData
         The mesh to write.  A surface that was read from glTF is written to glTF with the nodes,
         materials and textures of that file.
@@ -145,9 +152,9 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
         the disk is full.
     """
     path = as_path(path)
-    require(mesh, (Mesh, pv.PolyData), "mesh")
+    is_mesh = isinstance(mesh, Mesh)
+    surface = to_polydata(mesh) if is_mesh else as_polydata(mesh, "mesh", "a Mesh or a PolyData")
     require_writable(path)
-    surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
@@ -156,7 +163,7 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
             elif suffix in _VTK_WRITES:
                 write_with_vtk(draft, surface)
             else:
-                _write_with_meshlab(draft, mesh if isinstance(mesh, Mesh) else from_polydata(mesh))
+                _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
@@ -212,7 +219,7 @@ def from_polydata(polydata: pv.PolyData) -> Mesh:
     MeshError
         If the surface cannot be a `Mesh` as it is.
     """
-    require(polydata, pv.PolyData, "polydata")
+    polydata = as_polydata(polydata, "polydata")
     faces = triangles_of(polydata)
     if len(faces) != polydata.n_cells:
         _log.info("%d cells were cut into %d triangles", polydata.n_cells, len(faces))
@@ -232,9 +239,73 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
     vertices : (n, 3) float
         One position per point, in the order of ``polydata.points``.
     """
-    require(polydata, pv.PolyData, "polydata")
+    polydata = as_polydata(polydata, "polydata")
     points = as_points(vertices, "vertices", polydata.n_points)
     return MovingSurface(polydata).at(points)
+
+
+def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") -> pv.PolyData:
+    """Return the surface that *mesh* is; a PolyData is returned itself.
+
+    Other objects of VTK are accepted as well: an UnstructuredGrid of triangles, polygons, strips,
+    lines and vertices, and a MultiBlock, whose blocks become one surface, and their names groups of
+    its cells.
+
+    Parameters
+    ----------
+    mesh : object
+        What a caller has passed.
+    name, expected : str
+        For the message of an error: the name of the argument, and what it must be.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no surface; the message has the line that converts it, if there is one.
+    MeshError
+        If a grid has cells that are not of a surface.
+    """
+    if isinstance(mesh, pv.PolyData):
+        return mesh
+    line = conversion_of(mesh)
+    data = pv.wrap(mesh) if line == "Surface(mesh)" else None
+    if isinstance(data, pv.PolyData):
+        return data
+    if isinstance(data, pv.UnstructuredGrid):
+        try:
+            return surface_of_grid(data, only_as_grid=False)
+        except MeshError:
+            line = "Surface(mesh.extract_surface(algorithm=None))"
+            raise MeshError(f"{name} has cells that are not of a surface: {line}") from None
+    blocks = []
+    if isinstance(data, pv.MultiBlock):
+        items = data.recursive_iterator("items")
+        blocks = [(key, block) for key, block in items if block is not None]
+    if not blocks:
+        how = f". Convert it: {line}" if data is None and line else ""
+        raise ArgumentError(f"{name} must be {expected}; got {shown(mesh)}{how}")
+    of_block = f"{expected}; of a MultiBlock all blocks must be surfaces"
+    return _joined([(key, as_polydata(block, name, of_block)) for key, block in blocks])
+
+
+def _joined(blocks: list[tuple[str | None, pv.PolyData]]) -> pv.PolyData:
+    """Return blocks as one surface, in which each is a group, unless they have groups already."""
+    surfaces = [surface.copy(deep=False) for _, surface in blocks]
+    if len(surfaces) == 1:
+        return surfaces[0]
+    names = [key or f"block {k}" for k, (key, _) in enumerate(blocks)]
+    is_named = not any(GROUP in surface.cell_data for surface in surfaces)
+    if is_named:
+        for k, surface in enumerate(surfaces):
+            surface.cell_data[GROUP] = np.full(surface.n_cells, k)
+    joined = surfaces[0].append_polydata(*surfaces[1:])
+    for sort in ("point", "cell"):
+        given = {key for each in surfaces for key in getattr(each, f"{sort}_data")}
+        if lost := sorted(given - set(getattr(joined, f"{sort}_data"))):
+            _log.warning("only some blocks have the %s arrays %s: left out", sort, ", ".join(lost))
+    if is_named:
+        set_names(joined, names_key(GROUP), names)
+    return joined
 
 
 def _files(suffix: str) -> str:

@@ -32,11 +32,10 @@ import pyvista as pv
 from ..arrays import FloatArray
 from ..checks import as_path
 from ..errors import MeshError
-from ..files import open_regular, replacing, require_place
+from ..files import file_inside, open_regular, replacing, require_place
 from .convert import read_polydata, with_vertices, write_mesh
 from .meshlab_layers import HasLayers, Layer, as_layers, free_name
 from .meshlab_shown import coloured, is_cage, wires_of
-from .referenced_files import file_inside
 
 _SELECTED = 0x20  # of MeshLab's flags
 _GENERATED = re.compile(r"\d+-[0-9a-f]{12}(-wires)?\.ply")

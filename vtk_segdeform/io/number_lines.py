@@ -8,10 +8,11 @@ None for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_checks, in_parallel, inputs
@@ -20,6 +21,7 @@ from .array_names import decoded
 _LINE_FEED, _SPACE, _TAB, _SLASH = b"\n \t/"
 _LONGEST = 2  # letters of a word that lines are grouped by
 _MOST = 10**17  # an index
+_LEAST_BYTE = 2  # of a colour, that is no fraction
 _PIECE, _PIECE_LINES = 1 << 19, 1 << 14  # bytes, or lines, that a thread parses at a time
 
 
@@ -126,6 +128,36 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
         return None
     return numbers if len(numbers) == count else None
+
+
+def are_numbers(words: Sequence[str | bytes]) -> bool:
+    """Return whether all *words* are numbers."""
+    try:
+        for word in words:
+            float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def colour_bytes(colours: FloatArray) -> NDArray[np.uint8]:
+    """Return *colours* of text as bytes: they are fractions unless one of them is 2 or more.
+
+    1 may be either, so that colours of 0 and 1 alone are fractions.  A fraction between 1 and 2
+    has been rounded or computed; it is clipped.
+
+    >>> colour_bytes(np.array([0.0, 1.0, 0.2])), colour_bytes(np.array([0.0, 1.0, 200.0]))
+    (array([  0, 255,  51], dtype=uint8), array([  0,   1, 200], dtype=uint8))
+    """
+    numbers = np.nan_to_num(colours, posinf=0.0, neginf=0.0)
+    scale = 1.0 if numbers.max(initial=0.0) >= _LEAST_BYTE else 255.0
+    return np.asarray(np.rint((scale * numbers).clip(0.0, 255.0)), dtype=np.uint8)
+
+
+def colour_numbers(colours: Any) -> Any:
+    """Return the numbers that `colour_bytes` reads as *colours*, which are bytes."""
+    values = np.asarray(colours)
+    return values if values.max(initial=0) >= _LEAST_BYTE else values / 255.0
 
 
 def _plain_numbers(kernels: Any, text: bytes, whole: bool) -> FloatArray | None:

@@ -21,7 +21,7 @@ from ..arrays import IntArray
 from ..errors import MeshError
 from ..kernels import compiled_checks, inputs
 from .array_names import decoded
-from .number_lines import numbers_of
+from .number_lines import are_numbers, numbers_of
 
 TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
@@ -138,18 +138,10 @@ def _doubles(text: bytes) -> Any:
     try:
         return np.array(words, dtype=np.float64)
     except ValueError:
-        wrong = next(word for word in words if not _is_number(word))
+        wrong = next(word for word in words if not are_numbers([word]))
         raise MeshError(
             f"the PLY file has {decoded(wrong)[:40]!r} where a number is expected; export it again"
         ) from None
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _as_doubles(element: _Element) -> _Element:
@@ -205,6 +197,7 @@ def _table_of_lists(data: bytes, start: int, element: _Element, order: str) -> t
     if end < 0:  # a row is wrong: say how
         for _ in range(element.count):
             _, start = _row(data, start, element, order)
+        raise MeshError(f"the rows of {element.name!r} cannot be read; export the file again")
     columns: Table = {}
     letters = np.frombuffer(data, np.uint8)[start:end]
     for k, each in enumerate(element.properties):
@@ -246,7 +239,8 @@ def _walk(
             if word.itemsize:
                 if at + word.itemsize > len(data):
                     return -1
-                n = int(np.frombuffer(data, order + word.str[1:], 1, at)[0])
+                length = np.frombuffer(data, order + word.str[1:], 1, at)
+                n = _whole(length)
                 at += word.itemsize
             if n < 0 or at + size * n > len(data):
                 return -1
@@ -262,12 +256,20 @@ def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[A
         n = 1
         if each.length:
             length = _numbers(data, start, element, (order + each.length, 1))
-            n, start = int(length[0]), start + length.itemsize
-        if n < 0:
-            raise MeshError(f"a list of {element.name!r} has the length {n}; export the file again")
+            n, start = _whole(length), start + length.itemsize
+            if n < 0:
+                raise MeshError(
+                    f"a list of {element.name!r} has the length {length[0]:g}; export the file "
+                    "again"
+                )
         row.append(_numbers(data, start, element, (order + each.kind, n)))
         start += row[-1].nbytes
     return row, start
+
+
+def _whole(length: Any) -> int:
+    """Return the only number of *length*; -1 if it is not whole, as a damaged text may have it."""
+    return int(length[0]) if np.isfinite(length[0]) and length[0] == np.rint(length[0]) else -1
 
 
 def _numbers(data: bytes, start: int, element: _Element, what: tuple[str, int]) -> Any:

@@ -24,10 +24,10 @@ import numpy as np
 import pyvista as pv
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..checks import require
 from ..mesh import counted, normals
 from ..mesh_repair import Repair, repair
 from ..progress import Progress, part, tell
+from .convert import as_polydata
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _CORNERS = "TextureCorners"
@@ -63,7 +63,8 @@ def repair_surface(
     MeshError
         As in `repair`.
     """
-    counts, corners = polygons_of(require(surface, pv.PolyData, "surface"))
+    surface = as_polydata(surface, "surface")
+    counts, corners = polygons_of(surface)
     points = np.asarray(surface.points, dtype=np.float64)
     triangles, polygon = cut_into_triangles(points, counts, corners)
     done = repair(

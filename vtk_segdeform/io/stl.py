@@ -1,35 +1,61 @@
-"""STL, a triangle soup in single precision, text or binary: reader and writer of binary files.
+"""STL, a triangle soup in single precision, binary or text: reader and writer.
 
     binary   80 bytes, the number of triangles, and 50 bytes each: normal, corners, 2 more
     text     solid ... facet normal ... outer loop, vertex x y z three times, endloop ... endsolid
 
-Equal corners are merged; vertices are numbered in the order of their first corner.  All triangles
-are kept, in their order.  Normals are ignored and computed again.  The 2 bytes are the cell array
-"Attribute" unless all are 0, the name or the 80 bytes the field array "Header".
+Equal corners are merged, also those of different solids; vertices are numbered in the order of
+their first corner.  All triangles are kept, in their order.  Normals are ignored and computed
+again.  Of a binary file, the 2 bytes are the cell array "Attribute" unless all are 0, the 80 bytes
+the field array "Header".  The named solids of a text, of which there may be several, are the cell
+array "Group" and the field array "GroupNames", as the groups of OBJ.
 
-A text without "endsolid" is read with a warning if its last triangle is complete.
+Only text has several names, so a surface with groups, or else objects, is written as text, any
+other one as a binary file.  Triangles remain in their order: a solid is begun, as a group of OBJ
+is, wherever the group changes.  Names are written in ASCII.
+
+A text without its last "endsolid" is read with a warning if its last triangle is complete.
 """
 
 from __future__ import annotations
 
+import codecs
 import logging
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
 
+from ..arrays import IntArray
 from ..errors import MeshError
 from ..kernels import compiled_checks, inputs
 from ..mesh import first_equal_row
-from .array_names import HEADER, decoded, get_names, set_names, warn_left_out
+from .array_names import (
+    HEADER,
+    decoded,
+    get_names,
+    plain_names,
+    set_names,
+    warn_left_out,
+    warn_renamed,
+)
+from .groups import GROUP, OBJECT, groups_of, names_key, set_groups
+from .number_lines import are_numbers
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _SHORTEST = len("vertex 0 0 0")
 _START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
+_BLANKS = b"\0\t\n\r\x1a "  # that may fill up a file
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-_NAME = re.compile(rb"solid[ \t]*([^\r\n]*)", re.I)
+_FORMAT = (
+    "facet normal %.9g %.9g %.9g\nouter loop\n"
+    + 3 * "vertex %.9g %.9g %.9g\n"
+    + "endloop\nendfacet\n"
+)
+_PIECE = 10_000  # triangles that are written at a time
+_SOLID = re.compile(rb"\n[ \t]*[sS][oO][lL][iI][dD](?=\s|\Z)[ \t]*([^\n]*)")
 _VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
 _END = re.compile(rb"^[ \t]*endsolid\b", re.MULTILINE | re.I)
@@ -40,42 +66,130 @@ _log = logging.getLogger(__name__)
 def read_stl(path: Path) -> pv.PolyData:
     """Read the triangles of an STL file, with equal corners merged."""
     data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    text = data.lstrip()[:5].lower() == b"solid" and len(data) != _START + _SIZE * count
-    attributes: Any = np.empty(0)
-    if text:
-        corners, name = _of_text(path, data), _NAME.match(data.lstrip())
-        header = name[1] if name else b""
-    else:
-        rows = _of_bytes(data, count)
-        corners, attributes = rows["corners"].reshape(-1, 3), rows["more"]
-        header = data[:80].partition(b"\0")[0]
-    with np.errstate(invalid="ignore"):  # NaN is reported when the mesh is checked
-        corners = corners + np.float32(0.0)  # -0 becomes 0
-    points, numbers = _merged(corners)
-    surface = polydata_of(points, np.full(len(corners) // 3, 3), numbers)
-    if attributes.any():
-        surface.cell_data["Attribute"] = attributes
-    if title := decoded(header).strip():
+    text = _text_of(data)
+    if text is not None:
+        return _read_text(path, text)
+    rows = _of_bytes(data)
+    surface = _surface(rows["corners"].reshape(-1, 3))
+    if rows["more"].any():
+        surface.cell_data["Attribute"] = rows["more"]
+    if title := decoded(data[:80].partition(b"\0")[0]).strip():
         set_names(surface, HEADER, [title])
     return surface
 
 
+def _text_of(data: bytes) -> bytes | None:
+    """Return the text of a file, without blanks before it; None if the file is binary.
+
+    The title of a binary file may begin with "solid" as well.  But text has no zero bytes, and a
+    binary file has one in the number of its triangles, if these are fewer than 2^24, or else in
+    its title or its first triangle.
+    """
+    text = data.removeprefix(codecs.BOM_UTF8).lstrip()
+    is_binary = text[:5].lower() != b"solid" or b"\0" in data[: _START + _SIZE]
+    return None if is_binary else text
+
+
+def _of_bytes(data: bytes) -> Any:
+    """Return the triangles of a binary file, (m,) of `_ROW`.
+
+    Blanks may follow them, or a part of a triangle.  More than that is an error, since either the
+    number is wrong or the rest is, and both could be wrong without a trace.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) and b"s\0o\0l\0" in data[:99]:
+        raise MeshError("is UTF-16 text; save it as UTF-8 or ASCII text")
+    if len(data) < _START:
+        raise MeshError(f"ends after {len(data)} bytes, in its header: it was cut off")
+    count, stored = int.from_bytes(data[80:_START], "little"), (len(data) - _START) // _SIZE
+    if stored < count or (stored > count and data[_START + _SIZE * count :].strip(_BLANKS)):
+        why = "it was cut off" if stored < count else "its header is wrong"
+        raise MeshError(
+            f"declares {count} triangles, but its {len(data)} bytes contain {stored}: {why}, "
+            "export it again"
+        )
+    return np.frombuffer(data, _ROW, count, _START)
+
+
+def _read_text(path: Path, text: bytes) -> pv.PolyData:
+    """Return the surface of a text, with the names of its solids."""
+    names, parts, numbers = dict[str, int](), list[Any](), list[IntArray]()
+    has_end = is_named = False
+    for solid, name, piece in _solids(text.replace(b"\r", b"\n")):
+        rows, facets, ends, has_end = _rows_of_text(piece)
+        if len(rows) != 3 * facets or not (has_end or facets == ends):
+            raise MeshError("is truncated, or has a facet without three vertices")
+        if facets:
+            with np.errstate(over="ignore"):
+                parts.append(_numbers_of(rows).reshape(-1, 3).astype(np.float32))
+            number = names.setdefault(name or f"solid {solid}", len(names))
+            numbers.append(np.full(facets, number))
+            is_named |= bool(name) or len(names) > 1
+    if not (parts or has_end):
+        raise MeshError("is truncated: it has no facet")
+    surface = _surface(np.concatenate([np.empty((0, 3), np.float32), *parts]))
+    if not has_end:
+        _log.warning(
+            "%s: there is no endsolid; the file may be truncated after %d triangles",
+            path, surface.n_cells,
+        )  # fmt: skip
+    if is_named:
+        set_groups(surface, GROUP, np.concatenate(numbers), names)
+    return surface
+
+
+def _numbers_of(rows: Any) -> Any:
+    try:
+        return np.array(rows, dtype=float)
+    except ValueError:
+        wrong = decoded(b" ".join(next(row for row in rows if not are_numbers(row))))
+        raise MeshError(f"has the vertex {wrong[:60]!r}; must be 3 numbers") from None
+
+
+def _solids(text: bytes) -> Iterator[tuple[int, str, bytes]]:
+    """Yield the number from 1, the name, and the lines of each solid."""
+    text = b"\n" + text
+    found = list(_SOLID.finditer(text))
+    ends = [match.start() for match in found[1:]] + [len(text)]
+    if not found:
+        yield 1, "", text
+    for number, (match, end) in enumerate(zip(found, ends, strict=True), 1):
+        yield number, decoded(match[1]).strip(), text[match.end() : end]
+
+
+def _surface(corners: Any) -> pv.PolyData:
+    with np.errstate(invalid="ignore"):  # NaN is reported when the mesh is checked
+        corners = corners + np.float32(0.0)  # -0 becomes 0
+    points, numbers = _merged(corners)
+    return polydata_of(points, np.full(len(corners) // 3, 3), numbers)
+
+
 def write_stl(path: Path, surface: pv.PolyData) -> None:
-    """Write the triangles, in their order, to a binary STL file; polygons are cut."""
+    """Write the triangles, in their order, to an STL file; polygons are cut.
+
+    It is text, with several solids, if the surface has groups or objects, and binary otherwise.
+    """
     counts, corners = polygons_of(surface)
     faces, polygon = cut_into_triangles(np.asarray(surface.points, float), counts, corners)
     kept: dict[str, list[str]] = {"cell": [], "field": []}
     rows = np.zeros(len(faces), _ROW)
-    rows["corners"] = surface.points[faces]
-    a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
     with np.errstate(invalid="ignore", over="ignore"):
+        rows["corners"] = surface.points[faces]
+        a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         rows["normal"] = normals / np.where(length > 0, length, 1.0)
+    if np.isinf(rows["corners"]).any():
+        raise MeshError("has positions that STL cannot store: infinite or over 3e38")
+    cells = cells_of(surface)[polygon]
+    for key in (GROUP, OBJECT):
+        if len(rows) and (found := groups_of(surface, key)) is not None:
+            kept = {"cell": [key], "field": [names_key(key)]}
+            warn_left_out("a text STL", surface, kept)
+            _write_text(path, rows, found[0][cells], found[1])
+            return
     attributes = surface.cell_data.get("Attribute")
     if attributes is not None and attributes.dtype == np.uint16 and attributes.ndim == 1:
-        rows["more"] = np.asarray(attributes)[cells_of(surface)][polygon]
+        rows["more"] = np.asarray(attributes)[cells]
         kept["cell"].append("Attribute")
     header = " ".join(get_names(surface, HEADER)).encode("utf-8")[:80]
     if header.lower().startswith(b"solid"):  # which would be text
@@ -87,25 +201,23 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
         file.write(rows.tobytes())
 
 
-def _of_bytes(data: bytes, count: int) -> Any:
-    if len(data) < _START:
-        raise MeshError(f"ends after {len(data)} bytes, in its header: it was cut off")
-    if (stored := (len(data) - _START) // _SIZE) != count:
-        raise MeshError(f"declares {count} triangles, but its {len(data)} bytes contain {stored}")
-    return np.frombuffer(data, _ROW, count, _START)
-
-
-def _of_text(path: Path, data: bytes) -> Any:
-    rows, facets, ends, has_end = _rows_of_text(data.replace(b"\r", b"\n"))
-    is_complete = has_end or facets == ends > 0
-    if len(rows) != 3 * facets or not is_complete:
-        raise MeshError("is truncated, or has a facet without three vertices")
-    if not has_end:
-        _log.warning(
-            "%s: there is no endsolid; the file may be truncated after %d triangles", path, facets
-        )
-    with np.errstate(over="ignore"):
-        return np.array(rows, dtype=float).reshape(-1, 3).astype(np.float32)
+def _write_text(path: Path, rows: Any, group: IntArray, names: list[str]) -> None:
+    """Write triangles of `_ROW` as text; a solid ends where the *group* (m,) changes."""
+    # MeshLab takes a file with other letters for a binary one.
+    written = plain_names(names, refused="".join(c for c in "".join(names) if not c.isascii()))
+    warn_renamed("group", written)
+    values = np.column_stack([rows["normal"], rows["corners"].reshape(-1, 9)])
+    ends = [*(np.flatnonzero(np.diff(group)) + 1).tolist(), len(rows)]
+    begin = 0
+    with path.open("w", encoding="ascii", newline="\n") as file:
+        for end in ends:
+            name = written[names[group[begin]]]
+            file.write(f"solid {name}\n")
+            for at in range(begin, end, _PIECE):
+                piece = values[at : min(at + _PIECE, end)]
+                file.write(len(piece) * _FORMAT % tuple(piece.ravel().tolist()))
+            file.write(f"endsolid {name}\n")
+            begin = end
 
 
 def _rows_of_text(data: bytes) -> tuple[Any, int, int, bool]:

@@ -22,7 +22,7 @@ from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import require
 from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
-from .convert import read_polydata, write_mesh
+from .convert import as_polydata, read_polydata, write_mesh
 from .moving import MovingSurface
 from .polygons import triangles_of
 
@@ -59,10 +59,14 @@ class Surface:
     ----------
     polydata : pyvista.PolyData
         Not changed.  It needs one face that is not flat, and finite coordinates of its faces.
-        Polygons may have any shape; lines and vertex cells follow the faces.
+        Polygons may have any shape; lines and vertex cells follow the faces.  An UnstructuredGrid
+        of such cells and a MultiBlock of such surfaces become one PolyData; the names of blocks
+        become the groups of its cells.
 
     Raises
     ------
+    ArgumentError
+        If it is something else; the message has the line that converts it, if there is one.
     MeshError
         If it has no faces, only flat ones, or points of faces that are not finite, do not exist,
         or are too far or too near for computing volumes.
@@ -77,8 +81,8 @@ class Surface:
     24
     """
 
-    def __init__(self, polydata: pv.PolyData) -> None:
-        self._given = require(polydata, pv.PolyData, "polydata").copy(deep=False)
+    def __init__(self, polydata: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock) -> None:
+        self._given = as_polydata(polydata, "polydata").copy(deep=False)
         points = np.asarray(self._given.points, dtype=np.float64)
         self._soup = mesh_of(points, triangles_of(self._given))
 

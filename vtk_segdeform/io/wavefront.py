@@ -3,7 +3,7 @@
 VTK's reader creates one point per corner at texture seams, which opens a closed mesh and renumbers
 its vertices.  Here vertices remain as in the file:
 
-    v  x y z [r g b]    positions; colours become the point array "RGB"
+    v  x y z [r g b]    positions; colours, fractions or bytes, become the point array "RGB"
     vt u v              one per vertex: point array "TextureCoordinates".  Else, with seams, cell
                         array "TextureCorners": (u, v) per corner in sequence, NaN if it has none
     vn x y z            likewise: point array "Normals", or cell array "NormalCorners"
@@ -44,8 +44,9 @@ from .array_names import (
     warn_left_out,
     warn_renamed,
 )
+from .groups import GROUP, MATERIAL, OBJECT, groups_of, names_key, set_groups, whole_numbers
 from .moving import CORNER_NORMALS
-from .number_lines import Lines
+from .number_lines import Lines, are_numbers, colour_bytes
 from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
 
 _log = logging.getLogger(__name__)
@@ -55,7 +56,7 @@ _OF_CORNERS = {
     "normal": ("Normals", CORNER_NORMALS),
 }
 _WORDS = ("v", "vt", "vn", "f")
-_NAMED = {"o": "Object", "g": "Group", "usemtl": "Material"}
+_NAMED = {"o": OBJECT, "g": GROUP, "usemtl": MATERIAL}
 _SMOOTHING, _LIBRARY = "Smoothing", "MaterialLibrary"
 _MOST = 2**62  # an index
 # By statement: the first point, line and face it applies to, and its value.
@@ -103,8 +104,7 @@ def read_obj(path: Path) -> pv.PolyData:
         )
     surface = polydata_of(table[:, :3], counts, corners)
     if table.shape[1] >= 6:
-        colour = np.nan_to_num(table[:, 3:6]).clip(0.0, 1.0)
-        surface.point_data["RGB"] = np.round(255.0 * colour).astype(np.uint8)
+        surface.point_data["RGB"] = colour_bytes(table[:, 3:6])
     for name, rows in (("verts", cells["p"]), ("lines", cells["l"])):
         if rows:
             setattr(surface, name, [n for row in rows for n in (len(row), *row)])
@@ -178,6 +178,8 @@ def _table(what: str, lines: Lines, word: str, widths: tuple[int, ...]) -> Float
     if word == "vt":
         rows = [(row + ["0", "0"])[:2] for row in rows]
     if len({len(row) for row in rows}) > 1 or len(rows[0]) not in widths:
+        if word == "v" and any(len(row) in widths[2:] for row in rows):
+            _log.warning("only some vertices have a colour: the colours are not read")
         rows = [row[: min(widths)] for row in rows]
     try:
         table = np.array(rows, dtype=float)
@@ -185,16 +187,10 @@ def _table(what: str, lines: Lines, word: str, widths: tuple[int, ...]) -> Float
             raise ValueError
         return table
     except ValueError:
-        number = next(k for k, row in enumerate(rows, 1) if not _are_numbers(row, min(widths)))
+        sound = (len(row) >= min(widths) and are_numbers(row) for row in rows)
+        number = list(sound).index(False) + 1
         row = " ".join(rows[number - 1])[:60]
         raise MeshError(f"{what} {number} is {row!r}; must be {min(widths)} numbers") from None
-
-
-def _are_numbers(words: list[str], least: int) -> bool:
-    try:
-        return len([float(word) for word in words]) >= least
-    except ValueError:
-        return False
 
 
 def _keep_corners(
@@ -246,9 +242,8 @@ def _keep_runs(surface: pv.PolyData, runs: _Runs) -> None:
         texts = [text or "default" for text in texts]
         names = dict.fromkeys(t for t, n in zip(texts, lengths, strict=True) if n)
         numbers = {name: k for k, name in enumerate(names)}
-        key = _NAMED[word]
-        surface.cell_data[key] = np.array([numbers.get(text, 0) for text in texts])[which]
-        set_names(surface, f"{key}Names", names)
+        of_texts = np.array([numbers.get(text, 0) for text in texts])
+        set_groups(surface, _NAMED[word], of_texts[which], names)
 
 
 def _smoothing_group(text: str) -> int:
@@ -373,16 +368,15 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
     """
     lines: list[list[str]] = []  # per statement and face
     for word, key in _NAMED.items():
-        names = get_names(surface, f"{key}Names")
-        numbers = _whole_numbers(surface.cell_data.get(key), len(names))
-        if numbers is None:
+        if (found := groups_of(surface, key)) is None:
             continue
+        numbers, names = found
         written = plain_names(names)
         warn_renamed(key.lower(), written)
         lines.append([f"{word} {written[names[k]]}\n" for k in numbers[cells].tolist()])
         kept["cell"].append(key)
-        kept["field"].append(f"{key}Names")
-    groups = _whole_numbers(surface.cell_data.get(_SMOOTHING), 10**9)
+        kept["field"].append(names_key(key))
+    groups = whole_numbers(surface.cell_data.get(_SMOOTHING), 10**9)
     if groups is not None:
         lines.append([f"s {k or 'off'}\n" for k in groups[cells].tolist()])
         kept["cell"].append(_SMOOTHING)
@@ -395,13 +389,3 @@ def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> 
             pairs = zip(now, before, strict=True)
             tags[k] = "".join(line for line, old in pairs if repeat or line != old)
     return tags
-
-
-def _whole_numbers(values: Any, end: int) -> Any:
-    """Return *values* as integers in 0..*end* - 1, (m,); None if they are anything else."""
-    array = np.asarray(values)
-    if array.ndim != 1 or array.dtype.kind not in "biuf" or not len(array):
-        return None
-    if not ((array >= 0) & (array < end) & (array == np.rint(array))).all():
-        return None
-    return array.astype(np.int64)

@@ -37,7 +37,7 @@ from .intersections import (
     new_crossings,
     self_intersections,
 )
-from .mesh import Mesh, require_mesh
+from .mesh import Mesh, conversion_of, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
@@ -57,6 +57,7 @@ __all__ = [
     "components",
     "connected",
     "connectivity_faults",
+    "conversion_of",
     "corner_angles",
     "counted",
     "cross_rows",

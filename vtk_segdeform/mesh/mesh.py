@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, as_ids, as_points, bounds_of, frozen
-from ..checks import require
-from ..errors import MeshError
+from ..checks import require, shown
+from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import components, edge_keys
@@ -31,6 +31,7 @@ from .triangles import corner_columns, cross, norm
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
 _LARGE_PIECE = 200_000  # faces per task of compiled kernels
+_OF_VTK = {"vtkPolyData", "vtkUnstructuredGrid", "vtkMultiBlockDataSet"}
 _BITS = 32  # of the second vertex in the number of an edge
 
 
@@ -71,7 +72,10 @@ class Mesh(Frozen):
     vertices: FloatArray
     faces: IntArray
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike) -> None:
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
+        if faces is None:
+            line = _made_with(vertices)
+            raise ArgumentError(f"a Mesh needs vertices and faces; got {shown(vertices)}. {line}")
         self._set(Search(*as_soup(vertices, faces)))
 
     @classmethod
@@ -259,7 +263,35 @@ class Mesh(Frozen):
 def require_mesh(mesh: object) -> None:
     """Raise a MeshError that says how to make a `Mesh` unless *mesh* is one."""
     if not isinstance(mesh, Mesh):
-        raise MeshError(
-            f"mesh must be a Mesh; got {type(mesh).__name__}. Make one with Mesh(vertices, faces), "
-            "read_mesh(path) or Surface(polydata).mesh"
-        )
+        kind = type(mesh).__name__
+        if kind == Mesh.__name__:
+            kind = f"{type(mesh).__module__.partition('.')[0]}.{kind}"
+        raise MeshError(f"mesh must be a Mesh; got {kind}. {_made_with(mesh)}")
+
+
+def _made_with(mesh: object) -> str:
+    line = conversion_of(mesh)
+    if line in ("", "Surface(mesh)"):
+        return "Make one with Mesh(vertices, faces), read_mesh(path) or Surface(polydata).mesh"
+    return f"Make one with {line}.mesh"
+
+
+def conversion_of(mesh: object) -> str:
+    """Return the line that makes a `Surface` of a *mesh* of another library; "" if none does.
+
+    Its class is recognised by name, so that no library is imported.
+
+    >>> class Trimesh:
+    ...     __module__ = "trimesh.base"
+    >>> conversion_of(Trimesh())
+    'Surface(pyvista.wrap(mesh))'
+    """
+    kinds = {each.__name__ for each in type(mesh).__mro__}
+    library = str(type(mesh).__module__).partition(".")[0]
+    if kinds & _OF_VTK:
+        return "Surface(mesh)"
+    if "vtkDataSet" in kinds:
+        return "Surface(pyvista.wrap(mesh).extract_surface(algorithm=None))"
+    if library == "trimesh" and "Scene" in kinds:
+        return "Surface(pyvista.wrap(mesh.to_mesh()))"
+    return "Surface(pyvista.wrap(mesh))" if library in ("trimesh", "meshio") else ""

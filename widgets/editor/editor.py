@@ -20,10 +20,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, require, shown
-from vtk_segdeform.errors import ArgumentError, SessionError
+from vtk_segdeform.checks import as_callable, as_flag, as_path, as_switch, shown
+from vtk_segdeform.errors import ArgumentError, MeshError, SessionError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -36,9 +36,20 @@ from .controller import Controller
 from .keys import Keys, key_cap, pressed_key
 from .widget_set import Mode, WidgetSet
 
+if TYPE_CHECKING:
+    from vtk_segdeform.io import Surface
+
 _REPEAT = 50  # milliseconds between release and press of a key that is held and repeats, at most
 _BEFORE_CAMERA = 0.5  # priority: that of the camera is 0.25
 _AFTER_WIDGETS = 0.75  # priority: our widgets have 1, VTK's own 0.5, pyvista and camera styles 0
+
+
+def _new_session(mesh: Any) -> Session:
+    try:
+        return Session(mesh)
+    except MeshError as error:
+        expected = "session must be a Session, a Surface or a Mesh"
+        raise ArgumentError(f"{expected}; got {shown(mesh)}: {error}") from None
 
 
 class DeformEditor:
@@ -48,20 +59,19 @@ class DeformEditor:
     ----------
     view : View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         Where it is drawn.  Call `remove` before its window closes.
-    session : Session or Mesh
-        What to edit; a new session is created for a mesh.
+    session : Session, Surface or Mesh
+        What to edit; a new session is created for a surface or a mesh.
     keys : str or mapping of str to str or sequence of str
         "pyvista", "Blender" or the keys of some actions; see `keys_of`.
     """
 
     def __init__(
-        self, view: Any, session: Session | Mesh, *, keys: KeyChoice | Keys = "pyvista"
+        self, view: Any, session: Session | Surface | Mesh, *, keys: KeyChoice | Keys = "pyvista"
     ) -> None:
-        require(session, (Session, Mesh), "session")
+        session = session if isinstance(session, Session) else _new_session(session)
         table = keys_of(keys)
         self.view = View.of(view)
         has_camera = _is_aimed(self.view.renderer)
-        session = session if isinstance(session, Session) else Session(session)
         self._controller = Controller(self.view, session, table)
         self._controller.camera.begin(is_aimed=has_camera)
         self._took_key = False

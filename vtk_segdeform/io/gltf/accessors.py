@@ -17,7 +17,8 @@ from .buffers import object_, objects, whole
 _FLOAT, _TYPES = 5126, {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_Owner = tuple[int | None, str]
+_WITH_RANGES = ("buffers", "bufferViews", "accessors")
+_Owner = tuple[int | None, str, str]
 
 
 class Accessors:
@@ -34,7 +35,7 @@ class Accessors:
     def __init__(self, head: dict[str, Any], binary: bytes) -> None:
         self._head, self._binary = head, bytearray(binary)
         self._owners = _owners(head)
-        self._ranges = _ranges(head)
+        self._ranges, self._others = _ranges(head), _other_ranges(head)
 
     def replace(self, number: int, values: FloatArray, owner: _Owner) -> int:
         """Give accessor *number* new values (n, k); return its number, which may be a new one.
@@ -46,7 +47,7 @@ class Accessors:
         values : (n, k) float
             As many as before.
         owner : tuple
-            Number of the mesh, None for a copy, and the key of the attributes that use it.
+            Number of the mesh, None for a copy, the key of its attributes, and which one it is.
         """
         numbers = np.ascontiguousarray(values, dtype="<f4")
         accessor = self._head["accessors"][number]
@@ -97,15 +98,13 @@ class Accessors:
         accessor = self._head["accessors"][number]
         if "sparse" in accessor or accessor.get("componentType") != _FLOAT:
             return False
-        if accessor.get("normalized") or self._ranges[number] is None:
+        if self._ranges[number] is None:
             return False
         view = self._head["bufferViews"][accessor["bufferView"]]
         if view.get("extensions"):  # compressed as well
             return False
-        return all(
-            other is None or k == number or _are_apart(self._ranges[number], other)
-            for k, other in enumerate(self._ranges)
-        )
+        others = [each for k, each in enumerate(self._ranges) if k != number and each is not None]
+        return all(_are_apart(self._ranges[number], each) for each in [*others, *self._others])
 
 
 def _owners(head: dict[str, Any]) -> dict[int, set[Any]]:
@@ -116,8 +115,7 @@ def _owners(head: dict[str, Any]) -> dict[int, set[Any]]:
             attributes = object_(primitive, "attributes", f"mesh {number}")
             for name, index in attributes.items():
                 key = repr(sorted(attributes.items()))
-                moves = name in ("POSITION", "NORMAL", "TANGENT")
-                _use(owners, index, (number, key) if moves else "other")
+                _use(owners, index, (number, key, name))
             _use(owners, primitive.get("indices"), "other")
             for target in objects(primitive, "targets", f"mesh {number}"):
                 for index in target.values():
@@ -159,6 +157,28 @@ def _ranges(head: dict[str, Any]) -> list[Any]:
         start += whole(accessor, "byteOffset", name, default=0)
         stride = whole(view, "byteStride", name, default=row, least=1)
         ranges.append((start, stride, (row, (count - 1) * stride + row)))
+    return ranges
+
+
+def _other_ranges(head: dict[str, Any]) -> list[Any]:
+    """Return the ranges of images, sparse accessors, compressed data ..., as `_ranges` does."""
+    views = objects(head, "bufferViews", "the file")
+    ranges: list[Any] = []
+    pending: list[Any] = [value for key, value in head.items() if key not in _WITH_RANGES]
+    for each in (*views, *objects(head, "accessors", "the file")):
+        pending += each.values()  # but not their own ranges
+    while pending:
+        value = pending.pop()
+        if isinstance(value, list):
+            pending += value
+        elif isinstance(value, dict):
+            pending += value.values()
+            number = value.get("bufferView", -1)
+            known = isinstance(number, int) and 0 <= number < len(views)
+            place = views[number] if known else value
+            start, length = place.get("byteOffset", 0), place.get("byteLength")
+            if isinstance(start, int | float) and isinstance(length, int | float):
+                ranges.append((start, 1, (1, length)))
     return ranges
 
 

@@ -25,7 +25,7 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 
 from ...errors import MeshError
-from ..referenced_files import file_inside
+from ...files import file_inside
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -188,8 +188,12 @@ class Document:
             kind, comma, payload = uri.partition(",")
             if not comma:
                 raise MeshError(f"buffer {number} has a data: URI without data")
-            coded = kind.endswith(";base64")
-            return base64.b64decode(payload) if coded else unquote_to_bytes(payload)
+            if not kind.endswith(";base64"):
+                return unquote_to_bytes(payload)
+            try:
+                return base64.b64decode(payload)
+            except ValueError:
+                raise MeshError(f"buffer {number} is not valid base64: it was cut off") from None
         file = self.file_of(uri)
         if file is None:
             raise MeshError(

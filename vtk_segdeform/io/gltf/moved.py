@@ -198,11 +198,11 @@ def _change(mesh: dict[str, Any], change: _Change, accessors: Accessors, owner: 
         key = _key(object_(primitive, "attributes", "a mesh"))
         if key not in change or primitive.get("mode", 4) < 4:
             continue
-        attributes = primitive["attributes"] = dict(primitive["attributes"])
+        attributes = primitive["attributes"]
         for name, values in change[key].items():
             if (key, name) not in done:
                 number = int(attributes[name])
-                done[key, name] = accessors.replace(number, values, (owner, key))
+                done[key, name] = accessors.replace(number, values, (owner, key, name))
             attributes[name] = done[key, name]
         for extension in COMPRESSED:  # with the old positions
             if extension in object_(primitive, "extensions", "a mesh"):

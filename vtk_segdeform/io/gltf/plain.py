@@ -16,7 +16,8 @@ import pyvista as pv
 
 from ...arrays import IntArray
 from ...errors import MeshError
-from ..array_names import get_names, warn_left_out
+from ..array_names import warn_left_out
+from ..groups import MATERIAL, groups_of, names_key
 from ..moving import CORNER_NORMALS
 from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of
 from .reading import DOCUMENT
@@ -116,14 +117,11 @@ def _point_arrays(surface: pv.PolyData, kept: list[str]) -> dict[str, Any]:
 
 def _materials(surface: pv.PolyData, kept: dict[str, list[str]]) -> tuple[Any, list[str]]:
     """Return the material of each cell, and the names; none if there are no materials."""
-    names, values = get_names(surface, "MaterialNames"), surface.cell_data.get("Material")
-    if not names or values is None or values.ndim != 1 or values.dtype.kind not in "iu":
+    if (found := groups_of(surface, MATERIAL)) is None:
         return None, []
-    if len(values) and not 0 <= values.min() <= values.max() < len(names):
-        return None, []
-    kept["cell"].append("Material")
-    kept["field"].append("MaterialNames")
-    return np.asarray(values), names
+    kept["cell"].append(MATERIAL)
+    kept["field"].append(names_key(MATERIAL))
+    return found
 
 
 class _Document:

@@ -20,7 +20,7 @@ import numpy as np
 import pyvista as pv
 
 from ...errors import MeshError
-from ..array_names import set_names
+from ..groups import MATERIAL, OBJECT, set_groups
 from ..polygons import polydata_of
 from .buffers import Document
 from .contained import self_contained
@@ -123,17 +123,15 @@ def _name_cells(
     ]
     if any(piece.material is not None for piece in pieces):
         numbers = [len(materials) if p.material is None else p.material for p in pieces]
-        surface.cell_data["Material"] = np.repeat(numbers, lengths)
         plain = ["default"] if len(materials) in numbers else []
-        set_names(surface, "MaterialNames", [*materials, *plain])
+        set_groups(surface, MATERIAL, np.repeat(numbers, lengths), [*materials, *plain])
     shown = dict.fromkeys(block.node for block in blocks)
     if len(shown) > 1:
         nodes = document.items("nodes")
         places = {node: k for k, node in enumerate(shown)}
         numbers = [places[blocks[piece.block].node] for piece in pieces]
-        surface.cell_data["Object"] = np.repeat(numbers, lengths)
         named = [f"mesh {k}" if k is None else _named(nodes[k], f"node {k}") for k in shown]
-        set_names(surface, "ObjectNames", named)
+        set_groups(surface, OBJECT, np.repeat(numbers, lengths), named)
 
 
 def _named(item: dict[str, Any], default: str) -> str:

@@ -270,6 +270,8 @@ def rows_of_lists(begins, lengths, at, swapped, letters, numbers, sizes, word_si
                 if not 0.0 <= length < _EXACT:
                     return -1
                 n = np.int64(length)
+                if n != length:
+                    return -1
             elif size:
                 n = np.int64(0)
                 for b in range(size):
