@@ -46,14 +46,15 @@ from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
 from ..errors import ArgumentError, Cancelled, ConstraintError
-from ..finish import CellEnergy, Finisher
+from ..finish import CellEnergy, Finisher, Unbalanced
 from ..freezing import read_only
-from ..geometry import Lids, lids_of
+from ..geometry import Lids, lids_of, turned_over
 from ..kernels import compiled_kernels, one_blas_thread
 from ..mesh import Mesh, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import (
+    CONVERGED,
     LONGEST_MOVE,
     Anchors,
     Barrier,
@@ -124,6 +125,7 @@ _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contact
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
+_UNMOVED = 0.1 * CONVERGED  # diagonals: a finish that moves less has come to its end
 _PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -213,6 +215,7 @@ class _Constraints:
     solver: GaussNewton  # with the initial weights
     contact: Contact | None  # one of its terms
     pulled: _PulledPoints
+    unmoved: tuple[IntArray, ...]  # `Solution.unmoved`
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
     def places(self, targets: FloatArray) -> FloatArray:
@@ -729,30 +732,54 @@ class Deformer:
         volumes = self.preserved_volumes
         given = self._rest_pose, self._cell_energy, held, volumes, progress
         finisher = Finisher(*given, avoid_contact=self._avoid_contact)
-        found = finisher.run(start, places[held], progress)
+        found = finisher.run(start, places[held], progress, further=solution.is_finished)
         if shares is not None and found.vertices is not start:
             ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)
-            better = next((x for x in ways if finisher.is_better(start, x)), None)
-            if better is None:
-                return solution
+            better = next((x for x in ways if finisher.is_better(start, x)), start)
             found = replace(found, vertices=better)
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
-        if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:
-            return solution
-        x = frame.in_scene(found.vertices)
+        if max(off, default=0.0) > _VOLUME_KEPT:
+            found = replace(found, vertices=start)
         is_there = solution.targets is None
-        errors = partial(self._errors, self._targets) if is_there else solution.errors
-        return replace(
+        measured = replace(
             solution,
-            vertices=x,
-            steps=solution.steps + found.steps,
-            status=Status.MISSED if max(errors(x)) > _MET else Status.CONVERGED,
-            merits=found.merits,
-            errors=errors,
+            errors=partial(self._errors, self._targets) if is_there else solution.errors,
             volume=partial(self._total_volume.relative, found.vertices),
             region_volumes=self._region_volume_changes,
         )
+        is_start = found.vertices is start
+        if is_start and not solution.is_finished:
+            return measured
+        remaining = self._remaining_of_finish(finisher.unbalanced(found.vertices), shares)
+        status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
+        moved = _largest(found.vertices - start) / self.mesh.diagonal
+        if status is Status.STEP_LIMIT and moved <= _UNMOVED:
+            status = Status.STALLED
+        finished = replace(
+            measured,
+            vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
+            steps=solution.steps + found.steps,
+            merits=found.merits,
+            is_finished=True,
+            remaining=remaining,
+        )
+        return replace(finished, status=_or_missed(status, finished))
+
+    def _remaining_of_finish(self, off: Unbalanced, shares: FloatArray | None) -> float:
+        """Return the estimate `Solution.remaining` of a finished pose, of which *shares* move.
+
+        The steps of the finish hardly see the smooth motions that are left at its end.  These are
+        motions of the cages, so it is the larger of the next step and Newton's step of the cages
+        against the same forces, with the Hessian of their own energy.  That is scaled to the energy
+        of the finish: both are the same for a pose that is collapsed to a point.
+        """
+        solver, size = self._continuation.solver, self._frame.size
+        scale = self._binding.energy.constant / self._cell_energy.constant * size
+        forces = [each if shares is None else shares * each for each in (off.slope, *off.rows)]
+        slope, *rows = self.subspace.adjoints(forces)
+        step = self.subspace.map(solver.response(self._p, scale * slope, rows)) * size
+        return max(_largest(step), _largest(off.step)) / self.mesh.diagonal
 
     def _near_pulled_vertices(self) -> FloatArray:
         """Return 1 within the spread of pulled vertices, 0 beyond twice the spread, (n,) float.
@@ -833,7 +860,22 @@ class Deformer:
                 break
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)
-        return self._solution(result, x, steps)
+        solution = self._solution(result, x, steps)
+        return solution if is_live else self._with_remaining(solution, goal)
+
+    def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
+        """Return the *solution* for *goal* (k, 3) with its estimate, and the status by that."""
+        solver, p = self._continuation.solver, self._continuation.p
+        if not solver.has_newton_steps:
+            return solution
+        places = self._constraints.pulled.moved(self._constraints.places(goal))
+        remaining = solver.remaining(p, places) * self._frame.size / self.mesh.diagonal
+        status = solution.status
+        if remaining <= CONVERGED:
+            status = _or_missed(Status.CONVERGED, solution)
+        elif status is Status.CONVERGED:
+            status = Status.STEP_LIMIT
+        return replace(solution, remaining=remaining, status=status)
 
     def _is_from_elsewhere(self, goal: FloatArray) -> bool:
         """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
@@ -1128,6 +1170,7 @@ class Deformer:
             solver=GaussNewton(binding.energy, positions, volumes, terms=tuple(terms)),
             contact=contact,
             pulled=_PulledPoints(),
+            unmoved=self._unmoved_parts(),
         )
         self.reset()
 
@@ -1155,6 +1198,17 @@ class Deformer:
         weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
         rows = samples.rows[loose]
         return np.asarray(quadratic + (rows.T * weight) @ rows)
+
+    def _unmoved_parts(self) -> tuple[IntArray, ...]:
+        """Return `Solution.unmoved`."""
+        ids, component = np.concatenate([self.handle, self.fixed]), self.mesh.components
+        of_component, _ = self._linked_parts
+        stays = ~np.isin(of_component, of_component[component[ids]])
+        if not len(ids) or not stays.any():
+            return ()
+        vertices = np.flatnonzero(stays[component])
+        vertices = vertices[np.argsort(component[vertices], kind="stable")]
+        return tuple(np.split(vertices, np.flatnonzero(np.diff(component[vertices])) + 1))
 
     @cached_property
     def _linked_parts(self) -> tuple[IntArray, IntArray]:
@@ -1216,25 +1270,33 @@ class Deformer:
     def _solution(self, result: SolverResult, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._frame.size
         x = self._frame.in_scene(x)
-        errors = partial(self._errors, self._targets)
-        status = result.status
-        if status is Status.CONVERGED and max(errors(x)) > _MET:
-            status = Status.MISSED
-        return Solution(
+        surface = {"rest": self.mesh.vertices, "faces": self.mesh.faces}
+        solution = Solution(
             vertices=x,
             cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
             steps=steps,
-            status=status,
+            status=result.status,
             merits=result.merits,
-            errors=errors,
+            errors=partial(self._errors, self._targets),
             volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
-            crossed=partial(new_crossings, rest=self.mesh.vertices, faces=self.mesh.faces),
+            crossed=partial(new_crossings, **surface),
+            folded=partial(turned_over, **surface),
+            remaining=0.0 if result.status is Status.CONVERGED else np.inf,
+            unmoved=self._constraints.unmoved,
         )
+        return replace(solution, status=_or_missed(result.status, solution))
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
         places = self._frame.outward(targets), self._constraints.fixed_at
         return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
+
+
+def _or_missed(status: Status, solution: Solution) -> Status:
+    """Return *status*, or `MISSED` of a converged *solution* with handles off their targets."""
+    if status is not Status.CONVERGED:
+        return status
+    return Status.MISSED if max(solution.handle_error, solution.fixed_error) > _MET else status
 
 
 def _largest(vectors: FloatArray) -> float:

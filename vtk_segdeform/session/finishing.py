@@ -19,7 +19,8 @@ offset.  If too few vertices are free for that, handles are moved as well, and f
 vertices: as in the solve for the cages, the volume takes precedence.
 
 The finish of a pull starts from the mesh that is shown, because it keeps the surface beyond the
-reach; any other starts from W~ p, so that the way to it makes no difference.
+reach, and so does that of a pose that is finished further; any other starts from W~ p, so that the
+way to it makes no difference.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
+from ..geometry import turned_over
 from ..mesh import Mesh, new_crossings
 from ..progress import Progress
 from ..solver import Solution, Status, VolumeConstraint, moved_along, steps_to_volume
@@ -70,6 +72,8 @@ class Finish:
     """(n, 3) float, as `Finished.shifted`, if the pose was finished before."""
     start: FloatArray
     """(n, 3) float: the mesh that the finish starts from."""
+    is_further: bool
+    """Whether this mesh is a finished pose."""
 
     def __call__(self, progress: Progress | None = None, /) -> FinishedPose:
         """Finish the pose."""
@@ -85,6 +89,8 @@ class Finish:
             volume=lambda: 0.0,
             region_volumes=lambda _: np.empty(0),
             crossed=partial(new_crossings, rest=mesh.vertices, faces=mesh.faces),
+            folded=partial(turned_over, rest=mesh.vertices, faces=mesh.faces),
+            is_finished=self.is_further,
         )
         solution = deformer.finish(start, progress=progress)
         held = np.union1d(deformer.fixed, deformer.handle)

@@ -263,12 +263,15 @@ class PoseSolver:
         shift = self._shift(state)
         is_shifted = shift is not None and bool(shift[state.fixed].any())
         deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
-        x = self._surface(state, pose.cage_vertices)
+        is_local, is_further = state.locality is not None, pose.is_finished
+        own = self.vertices(state, pose) if is_local or is_further else None
+        x = self._surface(state, pose.cage_vertices) if own is None else own
         if state.locality is not None:
-            x = self.vertices(state, pose)
             at_press = self._known_surface(state, state.locality)
             deformer = localised(deformer, state.locality, at_press)
-        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
+        return Finish(
+            self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x, is_further
+        )
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""

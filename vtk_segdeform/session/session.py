@@ -319,7 +319,8 @@ class Session(Timeline):
         if self.solution is None or self.solution.status is Status.CONVERGED:
             return "drag a handle"
         if self.solution.status is Status.STEP_LIMIT:
-            return "not fully converged: keep dragging, or refine the pose"
+            further = "refine the pose" if self.is_unsettled else "finish it again"
+            return f"not fully converged: keep dragging, or {further}"
         return str(self.solution.status)
 
     def layers(self) -> dict[str, pv.PolyData]:
@@ -875,7 +876,8 @@ class Session(Timeline):
         # Converged already: keep the same pose object.  But even without a step, the final pose can
         # have other weights of handles than the one before.
         if solution.steps == 0 and (here is None or self._is_same_place(here, pose)):
-            self._solution = None if here is None else (here, solution)
+            if self.solution is None or not self.solution.is_finished:  # of which it tells nothing
+                self._solution = None if here is None else (here, solution)
             return solution
         self._solution = pose, solution
         self._set_state(replace(self._state, pose=pose), Change(0))
@@ -886,7 +888,7 @@ class Session(Timeline):
 
         Triangles are less distorted, joints bend in less space, and handles and fixed vertices are
         exact.  The next drag continues from the finished pose.  The pose of a pull is finished
-        within its reach.
+        within its reach.  A finished pose is finished further.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
 
@@ -901,7 +903,7 @@ class Session(Timeline):
             If there is no pose, or nothing is fixed or in a handle.
         """
         begun = 0.0
-        if self.solution is not None and self.solution.status is Status.STEP_LIMIT:
+        if self.is_unsettled:
             begun = 0.5
             self.refine(progress=part(progress, 0.0, begun))
         result = self.finishing()(part(progress, begun, 1.0))
@@ -911,7 +913,26 @@ class Session(Timeline):
     @property
     def can_finish(self) -> bool:
         """Whether there is a pose that `finish` can finish, and it is not finished yet."""
-        return not self._reason_not_to_finish() and not self._is_finished
+        return not self._reason_not_to_finish() and not self.is_finished
+
+    @property
+    def can_finish_further(self) -> bool:
+        """Whether the pose was finished, and `finish` would still move it."""
+        solution = self.solution
+        is_finished = solution is not None and solution.is_finished
+        return is_finished and solution.status is Status.STEP_LIMIT
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the pose was finished on the mesh, and not moved since then."""
+        return self._state.pose is not None and self._state.pose.is_finished
+
+    @property
+    def is_unsettled(self) -> bool:
+        """Whether the cages of the pose have not converged, so that `refine` would move it."""
+        solution = self.solution
+        is_limited = solution is not None and solution.status is Status.STEP_LIMIT
+        return is_limited and not self.can_finish_further
 
     def finishing(self) -> Finish:
         """Return a function that finishes the current pose, ``finishing(progress)``.
@@ -934,13 +955,6 @@ class Session(Timeline):
         self._solution = pose, solution
         self._set_state(replace(self._state, pose=pose), Change(0))
         return True
-
-    @property
-    def _is_finished(self) -> bool:
-        pose = self._state.pose
-        if pose is None or pose.finished is None:
-            return False
-        return pose.finished.cage_vertices is pose.cage_vertices  # it was not moved since then
 
     def _reason_not_to_finish(self) -> str:
         """Return why the pose cannot be finished, or ""."""
