@@ -215,7 +215,7 @@ class _Constraints:
     solver: GaussNewton  # with the initial weights
     contact: Contact | None  # one of its terms
     pulled: _PulledPoints
-    unmoved: tuple[IntArray, ...]  # `Solution.unmoved`
+    unmoved: IntArray  # `Solution.unmoved`
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
     def places(self, targets: FloatArray) -> FloatArray:
@@ -747,6 +747,7 @@ class Deformer:
             errors=partial(self._errors, self._targets) if is_there else solution.errors,
             volume=partial(self._total_volume.relative, found.vertices),
             region_volumes=self._region_volume_changes,
+            unmoved=self._constraints.unmoved,
         )
         is_start = found.vertices is start
         if is_start and not solution.is_finished:
@@ -1199,16 +1200,13 @@ class Deformer:
         rows = samples.rows[loose]
         return np.asarray(quadratic + (rows.T * weight) @ rows)
 
-    def _unmoved_parts(self) -> tuple[IntArray, ...]:
+    def _unmoved_parts(self) -> IntArray:
         """Return `Solution.unmoved`."""
-        ids, component = np.concatenate([self.handle, self.fixed]), self.mesh.components
+        ids = np.concatenate([self.handle, self.fixed])
+        if not len(ids):
+            return _NONE
         of_component, _ = self._linked_parts
-        stays = ~np.isin(of_component, of_component[component[ids]])
-        if not len(ids) or not stays.any():
-            return ()
-        vertices = np.flatnonzero(stays[component])
-        vertices = vertices[np.argsort(component[vertices], kind="stable")]
-        return tuple(np.split(vertices, np.flatnonzero(np.diff(component[vertices])) + 1))
+        return np.flatnonzero(~np.isin(of_component, of_component[self.mesh.components[ids]]))
 
     @cached_property
     def _linked_parts(self) -> tuple[IntArray, IntArray]:

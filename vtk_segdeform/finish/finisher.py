@@ -295,7 +295,7 @@ class Finisher:
         return landed if is_near else x
 
     def _descend(self, begin: FloatArray, progress: Progress | None, *, further: bool) -> Finish:
-        """Return *begin* after as many steps as it takes, or `_STEPS`; if *further*, after these."""
+        """Return *begin* after as many steps as it takes, or `_STEPS`; *further*, after these."""
         here, free = self._evaluated(begin), self._free
         merits, anderson, age = [here.value], Anderson(_WINDOW), _Z_STEPS
         directions: list[FloatArray] = []

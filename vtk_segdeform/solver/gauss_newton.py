@@ -456,9 +456,7 @@ class GaussNewton:
         here = self._iterate_at(p, self.positions.toward(targets))
         return self.farthest(self.response(p, here.slope, here.rows))
 
-    def response(
-        self, p: FloatArray, slope: FloatArray, rows: Sequence[FloatArray]
-    ) -> FloatArray:
+    def response(self, p: FloatArray, slope: FloatArray, rows: Sequence[FloatArray]) -> FloatArray:
         """Return Newton's step (m, 3) at *p* against a *slope* (m, 3), half a gradient.
 
         To first order it keeps the volumes whose gradients are *rows*, (m, 3) each.  The Hessian is

@@ -8,10 +8,14 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..arrays import FloatArray, IntArray
 from ..freezing import read_only
+from ..mesh import Mesh
 
 _T = TypeVar("_T")
+_NAMED = 3  # parts in a sentence
 
 
 CONVERGED = 1e-4
@@ -31,7 +35,7 @@ class Status(enum.Enum):
     """
 
     CONVERGED = "converged"
-    STEP_LIMIT = "not fully converged: solve or finish it again to continue, or raise max_steps"
+    STEP_LIMIT = "not fully converged: solve again or finish again to continue, or raise max_steps"
     STALLED = "no further improvement: move less, or add cage vertices"
     MISSED = (
         "the cages cannot reach this pose: add cage vertices, move less, or leave more room "
@@ -74,9 +78,10 @@ class Solution:
     """(k, 3) float: the targets of this pose, if it is on the way to those of the solve."""
     is_finished: bool = False
     """Whether it was finished on the mesh, by `Deformer.finish`; `status` is then about that."""
-    unmoved: tuple[IntArray, ...] = ()
-    """(k,) int for each connected part of the mesh that stays where it is, because it has neither
-    handles nor fixed vertices and shares no region with a part that does: its vertices."""
+    unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(k,) int: the connected parts of the mesh, numbered as in `Mesh.components`, that stay where
+    they are: they have no handle and no fixed vertices, and share no region with a part that has
+    some.  The rest may bend through them."""
 
     def __post_init__(self) -> None:
         for name in ("vertices", "cage_vertices", "unmoved"):
@@ -135,6 +140,20 @@ class Solution:
         Computed on first call, in about 0.2 s for 50,000 vertices.
         """
         return self._crossings
+
+    def unmoved_summary(self, mesh: Mesh) -> str:
+        """Return which parts of *mesh* are `unmoved`, in one sentence; "" if there are none."""
+        count = len(self.unmoved)
+        if not count:
+            return ""
+        vertices = np.count_nonzero(np.isin(mesh.components, self.unmoved))
+        numbers = ", ".join(str(k + 1) for k in self.unmoved[:_NAMED])
+        numbers += f" and {count - _NAMED} more" if count > _NAMED else ""
+        if count == 1:
+            name, has, stays = "part", "has", "it stays where it is"
+        else:
+            name, has, stays = "parts", "have", "they stay where they are"
+        return f"{name} {numbers} ({vertices:,} vertices) {has} no handle and no fixed vertices: {stays}"
 
     def folds(self) -> IntArray:
         """Return the faces (k,) that are turned over against the surface around them.
