@@ -31,6 +31,7 @@ import itertools
 import math
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
@@ -45,7 +46,7 @@ from ..arrays import FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
-from ..errors import ArgumentError, Cancelled, ConstraintError
+from ..errors import ArgumentError, ConstraintError
 from ..finish import CellEnergy, Finisher, Unbalanced
 from ..freezing import read_only
 from ..geometry import Lids, lids_of, turned_over
@@ -552,6 +553,16 @@ class Deformer:
 
     __copy__ = copy
 
+    @contextmanager
+    def restoring(self) -> Iterator[None]:
+        """Return to the present state, bit for bit, if the ``with`` block raises."""
+        before = self.copy()
+        try:
+            yield
+        except BaseException:
+            vars(self).update(vars(before))
+            raise
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
 
@@ -646,8 +657,8 @@ class Deformer:
             `Solution.targets`, or still the last one.  The next call continues.  Once these targets
             are reached, further calls converge as they do without *within*.
         progress : Progress, optional
-            Called before every step; may raise `Cancelled`, which restores the pose before the
-            call.
+            Called before every step; may raise `Cancelled`.  Then, as after any other exception in
+            it, the deformer is as it was before the call.
 
         Raises
         ------
@@ -661,14 +672,11 @@ class Deformer:
         if within is not None and not is_number(within, 0.0):
             raise ConstraintError(f"within must be a positive number; got {shown(within)}")
         before, offsets = (self._p, self._targets), self._constraints.pulled.offsets
-        try:
+        with nullcontext() if progress is None else self.restoring():
             if within is not None and not np.array_equal(goal, self._targets):
                 solution = self._approach(goal, max_steps, within, _counting(progress))
             else:
                 solution = self._solve(goal, max_steps, _counting(progress))
-        except Cancelled:
-            self._return_to(*before, offsets)
-            raise
         if self._is_plausible(solution.vertices, goal, before[0]):
             return solution
         self._return_to(*before, offsets)

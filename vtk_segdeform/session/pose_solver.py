@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,6 +77,14 @@ class _Aim:
             return self
         share = 1.0 / max(1, self.turns - _TURNS + 2)
         return _Aim(wanted, self.shift + share * (shift - self.shift), self.turns + 1)
+
+
+class _SolveOptions(NamedTuple):
+    """Options of `Deformer.solve`."""
+
+    max_steps: int | None
+    within: float | None
+    progress: Progress | None
 
 
 class PoseSolver:
@@ -201,20 +210,44 @@ class PoseSolver:
             If *state* has no cages, or they do not fit.
         ConstraintError
             If no finite pose is found.
+        Cancelled
+            If *progress* raised it; then everything is as it was.
         """
-        before, shift = state.pose, self._shift(state)
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
-        aim, self._current, self._aim = self._aim, None, None  # in case the solve fails
+        current, aim = self._current if self._current is state.pose else None, self._aim
+        self._current, self._aim = None, None  # in case the solve fails
+        options = _SolveOptions(max_steps, within, progress)
+        if progress is None:
+            return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+        try:
+            with deformer.restoring():
+                return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+        except BaseException:
+            self._current, self._aim = current, aim
+            raise
+
+    def _solved(
+        self,
+        state: State,
+        targets: Mapping[str, FloatArray],
+        deformer: Deformer,
+        aim: _Aim | None,
+        options: _SolveOptions,
+        *,
+        is_passing: bool,
+    ) -> tuple[Pose, Solution]:
+        """Return the result of `solve` with a *deformer* in the pose of *state*."""
+        before, shift = state.pose, self._shift(state)
         wanted = _stacked(targets)
-        for _ in range(_TURNS if shift is not None and max_steps is None else 1):
+        for _ in range(_TURNS if shift is not None and options.max_steps is None else 1):
             if shift is None:
                 aim, places = None, wanted
             else:
                 own = shift[deformer.handle]
                 aim = _Aim(wanted, own) if aim is None else aim.turned(wanted, own)
                 places = wanted - aim.shift
-            solution = deformer.solve(places, max_steps=max_steps, within=within, progress=progress)
+            solution = deformer.solve(places, **options._asdict())
             if not np.isfinite(solution.vertices).all():
                 raise ConstraintError("no finite pose for these targets; move the handles less")
             cages, finished = solution.cage_vertices, None if before is None else before.finished

@@ -153,7 +153,8 @@ class Solution:
             name, has, stays = "part", "has", "it stays where it is"
         else:
             name, has, stays = "parts", "have", "they stay where they are"
-        return f"{name} {numbers} ({vertices:,} vertices) {has} no handle and no fixed vertices: {stays}"
+        who = f"{name} {numbers} ({vertices:,} vertices)"
+        return f"{who} {has} no handle and no fixed vertices: {stays}"
 
     def folds(self) -> IntArray:
         """Return the faces (k,) that are turned over against the surface around them.
