@@ -20,8 +20,7 @@ Say = Callable[[str], None]
 """Prints one line."""
 
 HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
-_AGAINST_CROSSINGS = "move less, add cage vertices, or try --avoid-contact"
-_AGAINST_FOLDS = "move less, or add cage vertices"
+_ADVICE = "move less, or add cage vertices"
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
@@ -53,7 +52,7 @@ def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
 
 
-def report_pose(solution: Solution, mesh: Mesh, say: Say) -> None:
+def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:
     """Print how near a pose is to its minimum and what is wrong with its surface.
 
     The latter are faces that cross others or are turned over, unlike at rest, and parts that
@@ -64,12 +63,12 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say) -> None:
         remaining = f"{100 * solution.remaining:.1g} % of model size"
         status = f"not fully converged: finished further, it would move by about {remaining}"
     say(f"status          {status}")
-    for name, faces, fault, advice in (
-        ("crossings", solution.crossings(), "cross others and did not at rest", _AGAINST_CROSSINGS),
-        ("folds", solution.folds(), "turned over", _AGAINST_FOLDS),
-    ):
-        what = f"{len(faces):,} faces {fault}: {advice}" if len(faces) else "none"
-        say(f"{name:16s}{what}")
+    advice = _ADVICE if avoids_contact else f"{_ADVICE}, or use --avoid-contact"
+    crossings, folds = len(solution.crossings()), len(solution.folds())
+    crossing = f"{crossings:,} faces cross that did not at rest: {advice}" if crossings else "none"
+    folded = f"{folds:,} faces are turned over: {_ADVICE}" if folds else "none"
+    say(f"crossings       {crossing}")
+    say(f"folds           {folded}")
     if len(solution.unmoved):
         say(f"parts           {solution.unmoved_summary(mesh)}")
 

@@ -57,7 +57,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     report_volume(solution.volume_change, say)
     say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
-    report_pose(solution, mesh, say)
+    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact)
     surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")
     if options.picture is not None:

@@ -741,15 +741,20 @@ class Deformer:
         given = self._rest_pose, self._cell_energy, held, volumes, progress
         finisher = Finisher(*given, avoid_contact=self._avoid_contact)
         found = finisher.run(start, places[held], progress, further=solution.is_finished)
-        if shares is not None and found.vertices is not start:
-            ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)
-            better = next((x for x in ways if finisher.is_better(start, x)), start)
-            found = replace(found, vertices=better)
+        end = found.vertices
+        if shares is not None and end is not start:
+            unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
+            base = frame.about_origin(unfinished)
+            ways = (finisher.between(base, end, part * shares) for part in _PARTS)
+            found = replace(
+                found,
+                vertices=next((x for x in ways if finisher.is_better(start, x)), start),
+            )
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if max(off, default=0.0) > _VOLUME_KEPT:
-            found = replace(found, vertices=start)
-        is_there = solution.targets is None
+            found, end = replace(found, vertices=start), start
+        is_there, is_start = solution.targets is None, found.vertices is start
         measured = replace(
             solution,
             errors=partial(self._errors, self._targets) if is_there else solution.errors,
@@ -757,10 +762,9 @@ class Deformer:
             region_volumes=self._region_volume_changes,
             unmoved=self._constraints.unmoved,
         )
-        is_start = found.vertices is start
         if is_start and not solution.is_finished:
-            return measured
-        remaining = self._remaining_of_finish(finisher.unbalanced(found.vertices), shares)
+            return replace(measured, status=_or_missed(solution.status, measured))
+        remaining = self._remaining_of_finish(finisher.unbalanced(end), shares)
         status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
         moved = _largest(found.vertices - start) / self.mesh.diagonal
         if status is Status.STEP_LIMIT and moved <= _UNMOVED:
@@ -770,10 +774,10 @@ class Deformer:
             vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
             steps=solution.steps + found.steps,
             merits=found.merits,
-            is_finished=True,
             remaining=remaining,
+            unfinished=solution.vertices if solution.unfinished is None else solution.unfinished,
         )
-        return replace(finished, status=_or_missed(status, finished))
+        return replace(finished, status=Status.MISSED if _is_off(finished) else status)
 
     def _remaining_of_finish(self, off: Unbalanced, shares: FloatArray | None) -> float:
         """Return the estimate `Solution.remaining` of a finished pose, of which *shares* move.
@@ -882,7 +886,7 @@ class Deformer:
         status = solution.status
         if remaining <= CONVERGED:
             status = _or_missed(Status.CONVERGED, solution)
-        elif status is Status.CONVERGED:
+        elif status in (Status.CONVERGED, Status.MISSED):
             status = Status.STEP_LIMIT
         return replace(solution, remaining=remaining, status=status)
 
@@ -1300,9 +1304,12 @@ class Deformer:
 
 def _or_missed(status: Status, solution: Solution) -> Status:
     """Return *status*, or `MISSED` of a converged *solution* with handles off their targets."""
-    if status is not Status.CONVERGED:
-        return status
-    return Status.MISSED if max(solution.handle_error, solution.fixed_error) > _MET else status
+    return Status.MISSED if status is Status.CONVERGED and _is_off(solution) else status
+
+
+def _is_off(solution: Solution) -> bool:
+    """Return whether handles or fixed vertices of *solution* are off their places."""
+    return max(solution.handle_error, solution.fixed_error) > _MET
 
 
 def _largest(vectors: FloatArray) -> float:

@@ -90,7 +90,7 @@ class Finish:
             region_volumes=lambda _: np.empty(0),
             crossed=partial(new_crossings, rest=mesh.vertices, faces=mesh.faces),
             folded=partial(turned_over, rest=mesh.vertices, faces=mesh.faces),
-            is_finished=self.is_further,
+            unfinished=self.start if self.is_further else None,
         )
         solution = deformer.finish(start, progress=progress)
         held = np.union1d(deformer.fixed, deformer.handle)

@@ -296,9 +296,11 @@ class PoseSolver:
         shift = self._shift(state)
         is_shifted = shift is not None and bool(shift[state.fixed].any())
         deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
-        is_local, is_further = state.locality is not None, pose.is_finished
-        own = self.vertices(state, pose) if is_local or is_further else None
-        x = self._surface(state, pose.cage_vertices) if own is None else own
+        is_further = pose.is_finished and state.locality is None
+        if is_further or state.locality is not None:
+            x = self.vertices(state, pose)
+        else:
+            x = self._surface(state, pose.cage_vertices)
         if state.locality is not None:
             at_press = self._known_surface(state, state.locality)
             deformer = localised(deformer, state.locality, at_press)

@@ -319,8 +319,9 @@ class Session(Timeline):
         if self.solution is None or self.solution.status is Status.CONVERGED:
             return "drag a handle"
         if self.solution.status is Status.STEP_LIMIT:
-            further = "refine the pose" if self.is_unsettled else "finish it again"
-            return f"not fully converged: keep dragging, or {further}"
+            if self.is_unsettled:
+                return "not fully converged: keep dragging, or refine the pose"
+            return "drag a handle" + (", or finish the pose again" * self.can_finish_further)
         return str(self.solution.status)
 
     def layers(self) -> dict[str, pv.PolyData]:
@@ -917,10 +918,8 @@ class Session(Timeline):
 
     @property
     def can_finish_further(self) -> bool:
-        """Whether the pose was finished, and `finish` would still move it."""
-        solution = self.solution
-        is_finished = solution is not None and solution.is_finished
-        return is_finished and solution.status is Status.STEP_LIMIT
+        """Whether the pose was finished, but not to its end, and is not that of a pull."""
+        return self._is_on_its_way(finished=True) and self._state.locality is None
 
     @property
     def is_finished(self) -> bool:
@@ -930,9 +929,13 @@ class Session(Timeline):
     @property
     def is_unsettled(self) -> bool:
         """Whether the cages of the pose have not converged, so that `refine` would move it."""
+        return self._is_on_its_way(finished=False)
+
+    def _is_on_its_way(self, *, finished: bool) -> bool:
         solution = self.solution
-        is_limited = solution is not None and solution.status is Status.STEP_LIMIT
-        return is_limited and not self.can_finish_further
+        if solution is None or solution.is_finished != finished:
+            return False
+        return solution.status is Status.STEP_LIMIT
 
     def finishing(self) -> Finish:
         """Return a function that finishes the current pose, ``finishing(progress)``.

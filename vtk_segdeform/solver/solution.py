@@ -76,15 +76,15 @@ class Solution:
     solve with ``max_steps`` that has not converged."""
     targets: FloatArray | None = None
     """(k, 3) float: the targets of this pose, if it is on the way to those of the solve."""
-    is_finished: bool = False
-    """Whether it was finished on the mesh, by `Deformer.finish`; `status` is then about that."""
+    unfinished: FloatArray | None = None
+    """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(k,) int: the connected parts of the mesh, numbered as in `Mesh.components`, that stay where
     they are: they have no handle and no fixed vertices, and share no region with a part that has
     some.  The rest may bend through them."""
 
     def __post_init__(self) -> None:
-        for name in ("vertices", "cage_vertices", "unmoved"):
+        for name in ("vertices", "cage_vertices", "unmoved", "unfinished"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
     # Copies and pickles store the computed values instead of the functions.
@@ -104,6 +104,11 @@ class Solution:
     @cached_property
     def _errors(self) -> tuple[float, ...]:
         return self.errors(self.vertices)
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it was finished on the mesh, which `status` and `remaining` are then about."""
+        return self.unfinished is not None
 
     @property
     def handle_error(self) -> float:
