@@ -754,28 +754,26 @@ class Deformer:
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if max(off, default=0.0) > _VOLUME_KEPT:
             found, end = replace(found, vertices=start), start
-        is_there, is_start = solution.targets is None, found.vertices is start
-        measured = replace(
-            solution,
-            errors=partial(self._errors, self._targets) if is_there else solution.errors,
-            volume=partial(self._total_volume.relative, found.vertices),
-            region_volumes=self._region_volume_changes,
-            unmoved=self._constraints.unmoved,
-        )
+        is_start = found.vertices is start
         if is_start and not solution.is_finished:
-            return replace(measured, status=_or_missed(solution.status, measured))
+            return solution
         remaining = self._remaining_of_finish(finisher.unbalanced(end), shares)
         status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
         moved = _largest(found.vertices - start) / self.mesh.diagonal
         if status is Status.STEP_LIMIT and moved <= _UNMOVED:
             status = Status.STALLED
+        is_there = solution.targets is None
         finished = replace(
-            measured,
+            solution,
             vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
             steps=solution.steps + found.steps,
             merits=found.merits,
+            errors=partial(self._errors, self._targets) if is_there else solution.errors,
+            volume=partial(self._total_volume.relative, found.vertices),
+            region_volumes=self._region_volume_changes,
             remaining=remaining,
             unfinished=solution.vertices if solution.unfinished is None else solution.unfinished,
+            unmoved=self._constraints.unmoved,
         )
         return replace(finished, status=Status.MISSED if _is_off(finished) else status)
 

@@ -23,6 +23,8 @@ deformer that avoids contact, parts that still cross are separated (`untangling`
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
+
+Long because the iteration and its repairs share the factored problem.
 """
 
 from __future__ import annotations

@@ -27,10 +27,10 @@ from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..files import cache_folder
-from ..geometry import Lids, lids_of, volume_gradient
-from ..mesh import Mesh
+from ..geometry import Lids, lids_of, turned_over, volume_gradient
+from ..mesh import Mesh, new_crossings
 from ..progress import Progress, part, tell
-from ..solver import Solution, VolumeConstraint, errors_at, total_volume
+from ..solver import Solution, Status, VolumeConstraint, errors_at, total_volume
 from .finishing import Finish, Surfaces, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
@@ -304,9 +304,23 @@ class PoseSolver:
         if state.locality is not None:
             at_press = self._known_surface(state, state.locality)
             deformer = localised(deformer, state.locality, at_press)
-        return Finish(
-            self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x, is_further
+        ids, wanted = (deformer.handle, deformer.fixed), _stacked(pose.targets)
+        places, (_, volume) = (wanted, _fixed_at(self._mesh, state)), self._enclosed(state)
+        surface = {"rest": self._mesh.vertices, "faces": self._mesh.faces}
+        start = Solution(
+            vertices=x,
+            cage_vertices=pose.cage_vertices,
+            steps=0,
+            status=Status.STEP_LIMIT if is_further else Status.CONVERGED,
+            merits=(),
+            errors=partial(errors_at, ids, places, self._mesh.diagonal),
+            volume=partial(volume.relative, x),
+            region_volumes=lambda _: np.empty(0),
+            crossed=partial(new_crossings, **surface),
+            folded=partial(turned_over, **surface),
+            unfinished=x if is_further else None,
         )
+        return Finish(deformer.copy(), pose, wanted, shift, start)
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""
