@@ -1278,7 +1278,7 @@ class Deformer:
     def _solution(self, result: SolverResult, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._frame.size
         x = self._frame.in_scene(x)
-        surface = {"rest": self.mesh.vertices, "faces": self.mesh.faces}
+        rest, faces = self.mesh.vertices, self.mesh.faces
         solution = Solution(
             vertices=x,
             cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
@@ -1288,8 +1288,8 @@ class Deformer:
             errors=partial(self._errors, self._targets),
             volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
-            crossed=partial(new_crossings, **surface),
-            folded=partial(turned_over, **surface),
+            crossed=partial(new_crossings, rest=rest, faces=faces),
+            folded=partial(turned_over, rest=rest, faces=faces),
             remaining=0.0 if result.status is Status.CONVERGED else np.inf,
             unmoved=self._constraints.unmoved,
         )

@@ -306,7 +306,7 @@ class PoseSolver:
             deformer = localised(deformer, state.locality, at_press)
         ids, wanted = (deformer.handle, deformer.fixed), _stacked(pose.targets)
         places, (_, volume) = (wanted, _fixed_at(self._mesh, state)), self._enclosed(state)
-        surface = {"rest": self._mesh.vertices, "faces": self._mesh.faces}
+        rest, faces = self._mesh.vertices, self._mesh.faces
         start = Solution(
             vertices=x,
             cage_vertices=pose.cage_vertices,
@@ -316,8 +316,8 @@ class PoseSolver:
             errors=partial(errors_at, ids, places, self._mesh.diagonal),
             volume=partial(volume.relative, x),
             region_volumes=lambda _: np.empty(0),
-            crossed=partial(new_crossings, **surface),
-            folded=partial(turned_over, **surface),
+            crossed=partial(new_crossings, rest=rest, faces=faces),
+            folded=partial(turned_over, rest=rest, faces=faces),
             unfinished=x if is_further else None,
         )
         return Finish(deformer.copy(), pose, wanted, shift, start)

@@ -955,8 +955,8 @@ class Session(Timeline):
         if self._state.pose is not before:
             return False
         self._pose_solver.accept(before, pose)
-        is_unchanged = not solution.is_finished and self.solution is not None
-        self._solution = pose, self.solution if is_unchanged else solution
+        known = None if solution.is_finished else self.solution  # it was not changed
+        self._solution = pose, known or solution
         self._set_state(replace(self._state, pose=pose), Change(0))
         return True
 
