@@ -790,6 +790,7 @@ class Deformer:
         forces = [each if shares is None else shares * each for each in (off.slope, *off.rows)]
         slope, *rows = self.subspace.adjoints(forces)
         step = self.subspace.map(solver.response(self._p, scale * slope, rows)) * size
+        step[off.stays] = 0.0
         return max(_largest(step), _largest(off.step)) / self.mesh.diagonal
 
     def _near_pulled_vertices(self) -> FloatArray:

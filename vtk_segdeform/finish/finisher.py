@@ -86,6 +86,8 @@ class Unbalanced(NamedTuple):
     """(n, 3) each: the gradients of the volumes, of which the slope of a minimum is a sum."""
     step: FloatArray
     """(n, 3): the next step, which keeps the rotations; smooth motions may have far more to go."""
+    stays: BoolArray
+    """(n,): the vertices that do not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +269,7 @@ class Finisher:
         slope[self._free] = here.slope[self._free]
         for each in rows:
             each[self._stays] = 0.0
-        return Unbalanced(slope, rows, step)
+        return Unbalanced(slope, rows, step, self._stays)
 
     def _run(
         self, begin: FloatArray, progress: Progress | None, *, further: bool = False
