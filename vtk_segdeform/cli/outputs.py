@@ -66,7 +66,8 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
     advice = _ADVICE if avoids_contact else f"{_ADVICE}, or use --avoid-contact"
     crossings, folds = len(solution.crossings()), len(solution.folds())
     crossing = f"{crossings:,} faces cross that did not at rest: {advice}" if crossings else "none"
-    folded = f"{folds:,} faces are turned over: {_ADVICE}" if folds else "none"
+    plural = "s" if folds > 1 else ""
+    folded = f"{folds:,} turned-over face{plural}: {_ADVICE}" if folds else "none"
     say(f"crossings       {crossing}")
     say(f"folds           {folded}")
     if len(solution.unmoved):

@@ -709,7 +709,9 @@ class Deformer:
         -------
         Solution
             With the finished `vertices`; ``cage_vertices`` are those of *solution*, and ``merits``
-            those of the last steps.
+            those of the last steps.  The status is measured on the finished mesh: it is STEP_LIMIT
+            where finishing it again would still move it, and STALLED where only crossings, folds or
+            the like keep it from its minimum.
 
         Raises
         ------
@@ -878,14 +880,14 @@ class Deformer:
     def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
         """Return the *solution* for *goal* (k, 3) with its estimate, and the status by that."""
         solver, p = self._continuation.solver, self._continuation.p
-        if not solver.has_newton_steps:
+        if solution.status is Status.STEP_LIMIT or not solver.has_newton_steps:
             return solution
         places = self._constraints.pulled.moved(self._constraints.places(goal))
         remaining = solver.remaining(p, places) * self._frame.size / self.mesh.diagonal
         status = solution.status
         if remaining <= CONVERGED:
             status = _or_missed(Status.CONVERGED, solution)
-        elif status in (Status.CONVERGED, Status.MISSED):
+        elif status is not Status.STALLED:
             status = Status.STEP_LIMIT
         return replace(solution, remaining=remaining, status=status)
 

@@ -21,8 +21,9 @@ _NAMED = 3  # parts in a sentence
 CONVERGED = 1e-4
 """`Solution.remaining` of a converged pose, at most, in diagonals of the mesh.
 
-It is the length of one Newton step.  Where a surface buckles the way to the minimum is longer: in
-60 poses of bodies with thin limbs, 2 to 10 times.  So a converged pose is within about 1e-3.
+It is the length of one Newton step.  The way to the minimum is longer: in 22 poses of animals and
+random bodies 1 to 10 times, and 40 times while a limb was buckling.  So a converged pose is within
+about 1e-3: eight more finishes of 25 such poses moved them by 8.5e-4 at most.
 """
 
 

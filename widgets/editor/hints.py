@@ -129,7 +129,8 @@ def _fault(solution: Solution | None) -> str:
     if count := len(solution.crossings()):
         return f"{count:,} faces cross others. Move less, or turn on Avoid contact"
     if count := len(solution.folds()):
-        return f"{count:,} faces are turned over. Move less, or add cage vertices"
+        plural = "s" if count > 1 else ""
+        return f"{count:,} turned-over face{plural}. Move less, or add cage vertices"
     return ""
 
 

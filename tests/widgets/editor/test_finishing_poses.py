@@ -431,7 +431,7 @@ def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F8
     assert "further" not in bench.editor.status
     crossing = told(crossed=lambda _: few)
     assert "3 faces cross others. Move less, or turn on Avoid contact" in crossing
-    assert "1,200 faces are turned over. Move less, or add" in told(folded=lambda _: many)
+    assert "1,200 turned-over faces. Move less, or add" in told(folded=lambda _: many)
     assert "Shift+F: finish further" in told(status=Status.STEP_LIMIT)
     before = session.vertices
     assert not session.can_finish
