@@ -140,7 +140,7 @@ def test_faces_that_cross_or_are_turned_over_are_counted(shift, bar, bar_file, t
         assert (crossings > 0) == (shift < 0.0)
         what = f"{crossings} faces cross that did not at rest: move less, or add cage vertices"
         assert said["crossings"] == f"crossings       {what + advice if crossings else 'none'}"
-        what = f"{folds} turned-over faces: move less, or add cage vertices"
+        what = f"{folds} turned-over face{'s' * (folds > 1)}: move less, or add cage vertices"
         assert said["folds"] == f"folds           {what if folds else 'none'}"
 
 
