@@ -884,11 +884,10 @@ class Deformer:
             return solution
         places = self._constraints.pulled.moved(self._constraints.places(goal))
         remaining = solver.remaining(p, places) * self._frame.size / self.mesh.diagonal
-        status = solution.status
+        is_stalled = solution.status is Status.STALLED
+        status = Status.STALLED if is_stalled else Status.STEP_LIMIT
         if remaining <= CONVERGED:
             status = _or_missed(Status.CONVERGED, solution)
-        elif status is not Status.STALLED:
-            status = Status.STEP_LIMIT
         return replace(solution, remaining=remaining, status=status)
 
     def _is_from_elsewhere(self, goal: FloatArray) -> bool:
