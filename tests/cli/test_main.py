@@ -17,8 +17,9 @@ from vtk_segdeform import models
 from vtk_segdeform.benchmarks import report, table_one
 from vtk_segdeform.benchmarks.sections import Ratio, Section
 from vtk_segdeform.cli.main import ProgressBar, main
+from vtk_segdeform.geometry import turned_over
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.io import convert, read_mesh
+from vtk_segdeform.io import convert, read_mesh, write_mesh
 from vtk_segdeform.mesh import new_crossings
 from vtk_segdeform.mesh.mesh import Mesh
 
@@ -126,20 +127,32 @@ def test_a_turn_about_the_fixed_centre_is_asked_for_by_name(bar, bar_file, tmp_p
     assert_allclose(found, expected, atol=2e-3 * bar.diagonal)
 
 
-@pytest.mark.parametrize(("shift", "advice"), [(0.05, ""), (-0.9, ": move less, or add cage")])
-def test_faces_that_cross_are_counted_where_contact_is_avoided(
-    shift, advice, bar, bar_file, tmp_path, capsys
-):
+@pytest.mark.parametrize("shift", [0.05, -0.9])
+def test_faces_that_cross_or_are_turned_over_are_counted(shift, bar, bar_file, tmp_path, capsys):
     out = tmp_path / "moved.ply"
     words = ["deform", bar_file, "-o", str(out), "--fixed", "z<10%", "--handle", "z>90%"]
     words += ["--translate", f"0,0,{shift}", "--regions", "1", "--cage-vertices", "40"]
-    main([*words, "--no-refine"])
-    assert "crossings" not in lines(capsys.readouterr().out)
-    main([*words, "--no-refine", "--avoid-contact"])
-    count = len(new_crossings(read_mesh(out).vertices, bar.vertices, bar.faces))
-    expected = f"crossings       {count} faces cross that did not at rest{advice}"
-    assert lines(capsys.readouterr().out)["crossings"].startswith(expected)
-    assert (count > 0) == (shift < 0.0)
+    for more, advice in (([], ", or use --avoid-contact"), (["--avoid-contact"], "")):
+        main([*words, "--no-refine", *more])
+        x, said = read_mesh(out).vertices, lines(capsys.readouterr().out)
+        crossings = len(new_crossings(x, bar.vertices, bar.faces))
+        folds = len(turned_over(x, bar.vertices, bar.faces))
+        assert (crossings > 0) == (shift < 0.0)
+        what = f"{crossings} faces cross that did not at rest: move less, or add cage vertices"
+        assert said["crossings"] == f"crossings       {what + advice if crossings else 'none'}"
+        what = f"{folds} turned-over face{'s' * (folds > 1)}: move less, or add cage vertices"
+        assert said["folds"] == f"folds           {what if folds else 'none'}"
+
+
+def test_a_part_that_nothing_moves_is_named(bar, tmp_path, capsys):
+    path = tmp_path / "two.ply"
+    x = np.concatenate([bar.vertices, bar.vertices + [2.0, 0.0, 0.0]])
+    write_mesh(path, Mesh(x, np.concatenate([bar.faces, bar.faces + bar.n_vertices])))
+    words = ["deform", str(path), "-o", str(tmp_path / "out.ply"), "--fixed", "z<10%&x<50%"]
+    words += ["--handle", "z>90%&x<50%", "--translate", "0,0,0.1", "--cage-vertices", "60"]
+    assert main(words) == 0
+    expected = f"part 2 ({bar.n_vertices} vertices) has no handle and no fixed vertices: it stays"
+    assert lines(capsys.readouterr().out)["parts"].startswith(f"parts           {expected}")
 
 
 def test_check_praises_a_good_mesh(bar_file, capsys):

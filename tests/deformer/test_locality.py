@@ -267,8 +267,9 @@ def test_on_a_coarse_mesh_a_pulled_vertex_stays_in_the_plane_of_its_neighbours(
     local = coarse().hold(handle=[vertex]).local(vertex, 0.3 * d, spread * d)
     to = x[vertex] + share * d * outward(x, vertex, ring)
     solution = local.solve(to[None])
+    assert solution.status is Status.CONVERGED
     for pose in (solution, local.finish(solution)):
-        assert pose.status is Status.CONVERGED
+        assert pose.status is not Status.MISSED
         assert abs(pose.volume_change) < 1e-12
         assert np.linalg.norm(pose.vertices[vertex] - to) < 1e-4 * d
         assert spike(mesh, pose.vertices, vertex) < 0.1

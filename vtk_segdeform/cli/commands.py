@@ -32,7 +32,7 @@ from .outputs import (
     coloured_cages,
     coloured_regions,
     report_cages,
-    report_crossings,
+    report_pose,
     report_regions,
     report_solution,
     report_surface,
@@ -76,8 +76,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     report_solution(solution, time.perf_counter() - start, say)
-    if options.avoid_contact:
-        report_crossings(solution, say)
+    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact)
     surface.write(options.output, solution.vertices)
     say(f"written         {options.output}")
     if options.picture is not None:

@@ -35,6 +35,7 @@ from .outputs import (
     coloured_cages,
     coloured_regions,
     report_cages,
+    report_pose,
     report_regions,
     report_solution,
 )
@@ -110,6 +111,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
         f"finish          {steps} steps on the mesh, {1e3 * seconds:.0f} ms, "
         f"handle error {100 * solution.handle_error:.3f} %, volume {solution.volume_change:+.1e}"
     )
+    report_pose(solution, mesh, say)
     change = local_volume_change(mesh, solution.vertices)
     usual = math.ceil(100 * np.percentile(np.abs(change), 99.0))  # as in the legend of the picture
     say(

@@ -86,8 +86,10 @@ examples:
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
 exit codes:
-  0    success; for check: the surface can be deformed, or was repaired to a closed mesh
-  1    the command failed; for check: it cannot be deformed, or the repair left it open
+  0    success; for check: the surface can be deformed, or was repaired to a closed mesh; for deform
+       and pull also where the report says that the pose has crossings, folds or not converged
+  1    the command failed; for check: it cannot be deformed, or the repair left it open; for deform
+       and pull also where the mesh was written, but a handle misses its target by 0.1 % of its size
   2    usage error
   130  interrupted by Ctrl+C
 """

@@ -11,15 +11,16 @@ import pyvista as pv
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..io import Surface, polydata_of
-from ..mesh import Kind
+from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
-from ..solver import Solution
+from ..solver import Solution, Status
 
 Say = Callable[[str], None]
 """Prints one line."""
 
 HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
+_ADVICE = "move less, or add cage vertices"
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
@@ -44,19 +45,33 @@ def report_cages(cages: Sequence[Cage], say: Say) -> None:
 
 
 def report_solution(solution: Solution, seconds: float, say: Say) -> None:
-    """Print the volume change, the handle error, the time and the status of a solution."""
+    """Print the volume change, the handle error and the time of a solution."""
     each = 1e3 * seconds / max(solution.steps, 1)
     report_volume(solution.volume_change, say)
     say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
-    say(f"status          {solution.status}")
 
 
-def report_crossings(solution: Solution, say: Say) -> None:
-    """Print how many faces cross others that did not at rest, and what to do about it."""
-    count = len(solution.crossings())
-    advice = ": move less, or add cage vertices" if count else ""
-    say(f"crossings       {count} faces cross that did not at rest{advice}")
+def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:
+    """Print how near a pose is to its minimum and what is wrong with its surface.
+
+    The latter are faces that cross others or are turned over, unlike at rest, and parts that
+    nothing moves, if there are any.
+    """
+    status = str(solution.status)
+    if solution.is_finished and solution.status is Status.STEP_LIMIT:
+        remaining = f"{100 * solution.remaining:.1g} % of model size"
+        status = f"not fully converged: finished further, it would move by about {remaining}"
+    say(f"status          {status}")
+    advice = _ADVICE if avoids_contact else f"{_ADVICE}, or use --avoid-contact"
+    crossings, folds = len(solution.crossings()), len(solution.folds())
+    crossing = f"{crossings:,} faces cross that did not at rest: {advice}" if crossings else "none"
+    plural = "s" if folds > 1 else ""
+    folded = f"{folds:,} turned-over face{plural}: {_ADVICE}" if folds else "none"
+    say(f"crossings       {crossing}")
+    say(f"folds           {folded}")
+    if len(solution.unmoved):
+        say(f"parts           {solution.unmoved_summary(mesh)}")
 
 
 def report_volume(change: float, say: Say) -> None:

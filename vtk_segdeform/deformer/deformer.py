@@ -31,6 +31,7 @@ import itertools
 import math
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from types import EllipsisType
@@ -45,15 +46,16 @@ from ..arrays import FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
-from ..errors import ArgumentError, Cancelled, ConstraintError
-from ..finish import CellEnergy, Finisher
+from ..errors import ArgumentError, ConstraintError
+from ..finish import CellEnergy, Finisher, Unbalanced
 from ..freezing import read_only
-from ..geometry import Lids, lids_of
+from ..geometry import Lids, lids_of, turned_over
 from ..kernels import compiled_kernels, one_blas_thread
 from ..mesh import Mesh, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import (
+    CONVERGED,
     LONGEST_MOVE,
     Anchors,
     Barrier,
@@ -124,6 +126,7 @@ _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contact
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
+_UNMOVED = 0.1 * CONVERGED  # diagonals: a finish that moves less has come to its end
 _PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -213,6 +216,7 @@ class _Constraints:
     solver: GaussNewton  # with the initial weights
     contact: Contact | None  # one of its terms
     pulled: _PulledPoints
+    unmoved: IntArray  # `Solution.unmoved`
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
     def places(self, targets: FloatArray) -> FloatArray:
@@ -549,6 +553,16 @@ class Deformer:
 
     __copy__ = copy
 
+    @contextmanager
+    def restoring(self) -> Iterator[None]:
+        """Return to the present state, bit for bit, if the ``with`` block raises."""
+        before = self.copy()
+        try:
+            yield
+        except BaseException:
+            vars(self).update(vars(before))
+            raise
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
 
@@ -643,8 +657,8 @@ class Deformer:
             `Solution.targets`, or still the last one.  The next call continues.  Once these targets
             are reached, further calls converge as they do without *within*.
         progress : Progress, optional
-            Called before every step; may raise `Cancelled`, which restores the pose before the
-            call.
+            Called before every step; may raise `Cancelled`.  Then, as after any other exception in
+            it, the deformer is as it was before the call.
 
         Raises
         ------
@@ -658,14 +672,11 @@ class Deformer:
         if within is not None and not is_number(within, 0.0):
             raise ConstraintError(f"within must be a positive number; got {shown(within)}")
         before, offsets = (self._p, self._targets), self._constraints.pulled.offsets
-        try:
+        with nullcontext() if progress is None else self.restoring():
             if within is not None and not np.array_equal(goal, self._targets):
                 solution = self._approach(goal, max_steps, within, _counting(progress))
             else:
                 solution = self._solve(goal, max_steps, _counting(progress))
-        except Cancelled:
-            self._return_to(*before, offsets)
-            raise
         if self._is_plausible(solution.vertices, goal, before[0]):
             return solution
         self._return_to(*before, offsets)
@@ -698,7 +709,9 @@ class Deformer:
         -------
         Solution
             With the finished `vertices`; ``cage_vertices`` are those of *solution*, and ``merits``
-            those of the last steps.
+            those of the last steps.  The status is measured on the finished mesh: it is STEP_LIMIT
+            where finishing it again would still move it, and STALLED where only crossings, folds or
+            the like keep it from its minimum.
 
         Raises
         ------
@@ -729,30 +742,58 @@ class Deformer:
         volumes = self.preserved_volumes
         given = self._rest_pose, self._cell_energy, held, volumes, progress
         finisher = Finisher(*given, avoid_contact=self._avoid_contact)
-        found = finisher.run(start, places[held], progress)
-        if shares is not None and found.vertices is not start:
-            ways = (finisher.between(start, found.vertices, part * shares) for part in _PARTS)
-            better = next((x for x in ways if finisher.is_better(start, x)), None)
-            if better is None:
-                return solution
-            found = replace(found, vertices=better)
+        found = finisher.run(start, places[held], progress, further=solution.is_finished)
+        end = found.vertices
+        if shares is not None and end is not start:
+            unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
+            base = frame.about_origin(unfinished)
+            ways = (finisher.between(base, end, part * shares) for part in _PARTS)
+            found = replace(
+                found,
+                vertices=next((x for x in ways if finisher.is_better(start, x)), start),
+            )
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
-        if found.vertices is start or max(off, default=0.0) > _VOLUME_KEPT:
+        if max(off, default=0.0) > _VOLUME_KEPT:
+            found, end = replace(found, vertices=start), start
+        is_start = found.vertices is start
+        if is_start and not solution.is_finished:
             return solution
-        x = frame.in_scene(found.vertices)
+        remaining = self._remaining_of_finish(finisher.unbalanced(end), shares)
+        status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
+        moved = _largest(found.vertices - start) / self.mesh.diagonal
+        if status is Status.STEP_LIMIT and moved <= _UNMOVED:
+            status = Status.STALLED
         is_there = solution.targets is None
-        errors = partial(self._errors, self._targets) if is_there else solution.errors
-        return replace(
+        finished = replace(
             solution,
-            vertices=x,
+            vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
             steps=solution.steps + found.steps,
-            status=Status.MISSED if max(errors(x)) > _MET else Status.CONVERGED,
             merits=found.merits,
-            errors=errors,
+            errors=partial(self._errors, self._targets) if is_there else solution.errors,
             volume=partial(self._total_volume.relative, found.vertices),
             region_volumes=self._region_volume_changes,
+            remaining=remaining,
+            unfinished=solution.vertices if solution.unfinished is None else solution.unfinished,
+            unmoved=self._constraints.unmoved,
         )
+        return replace(finished, status=Status.MISSED if _is_off(finished) else status)
+
+    def _remaining_of_finish(self, off: Unbalanced, shares: FloatArray | None) -> float:
+        """Return the estimate `Solution.remaining` of a finished pose, of which *shares* move.
+
+        The steps of the finish hardly see the smooth motions that are left at its end.  These are
+        motions of the cages, so it is the larger of the next step and Newton's step of the cages
+        against the same forces, with the Hessian of their own energy.  That is scaled to the energy
+        of the finish: both are the same for a pose that is collapsed to a point.
+        """
+        solver, size = self._continuation.solver, self._frame.size
+        scale = self._binding.energy.constant / self._cell_energy.constant * size
+        forces = [each if shares is None else shares * each for each in (off.slope, *off.rows)]
+        slope, *rows = self.subspace.adjoints(forces)
+        step = self.subspace.map(solver.response(self._p, scale * slope, rows)) * size
+        step[off.stays] = 0.0
+        return max(_largest(step), _largest(off.step)) / self.mesh.diagonal
 
     def _near_pulled_vertices(self) -> FloatArray:
         """Return 1 within the spread of pulled vertices, 0 beyond twice the spread, (n,) float.
@@ -833,7 +874,21 @@ class Deformer:
                 break
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)
-        return self._solution(result, x, steps)
+        solution = self._solution(result, x, steps)
+        return solution if is_live else self._with_remaining(solution, goal)
+
+    def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
+        """Return the *solution* for *goal* (k, 3) with its estimate, and the status by that."""
+        solver, p = self._continuation.solver, self._continuation.p
+        if solution.status is Status.STEP_LIMIT or not solver.has_newton_steps:
+            return solution
+        places = self._constraints.pulled.moved(self._constraints.places(goal))
+        remaining = solver.remaining(p, places) * self._frame.size / self.mesh.diagonal
+        is_stalled = solution.status is Status.STALLED
+        status = Status.STALLED if is_stalled else Status.STEP_LIMIT
+        if remaining <= CONVERGED:
+            status = _or_missed(Status.CONVERGED, solution)
+        return replace(solution, remaining=remaining, status=status)
 
     def _is_from_elsewhere(self, goal: FloatArray) -> bool:
         """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
@@ -1128,6 +1183,7 @@ class Deformer:
             solver=GaussNewton(binding.energy, positions, volumes, terms=tuple(terms)),
             contact=contact,
             pulled=_PulledPoints(),
+            unmoved=self._unmoved_parts(),
         )
         self.reset()
 
@@ -1155,6 +1211,14 @@ class Deformer:
         weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
         rows = samples.rows[loose]
         return np.asarray(quadratic + (rows.T * weight) @ rows)
+
+    def _unmoved_parts(self) -> IntArray:
+        """Return `Solution.unmoved`."""
+        ids = np.concatenate([self.handle, self.fixed])
+        if not len(ids):
+            return _NONE
+        of_component, _ = self._linked_parts
+        return np.flatnonzero(~np.isin(of_component, of_component[self.mesh.components[ids]]))
 
     @cached_property
     def _linked_parts(self) -> tuple[IntArray, IntArray]:
@@ -1216,25 +1280,36 @@ class Deformer:
     def _solution(self, result: SolverResult, x: FloatArray, steps: int) -> Solution:
         p = self._p * self._frame.size
         x = self._frame.in_scene(x)
-        errors = partial(self._errors, self._targets)
-        status = result.status
-        if status is Status.CONVERGED and max(errors(x)) > _MET:
-            status = Status.MISSED
-        return Solution(
+        rest, faces = self.mesh.vertices, self.mesh.faces
+        solution = Solution(
             vertices=x,
             cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
             steps=steps,
-            status=status,
+            status=result.status,
             merits=result.merits,
-            errors=errors,
+            errors=partial(self._errors, self._targets),
             volume=partial(self._total_volume.relative, x),
             region_volumes=self._region_volume_changes,
-            crossed=partial(new_crossings, rest=self.mesh.vertices, faces=self.mesh.faces),
+            crossed=partial(new_crossings, rest=rest, faces=faces),
+            folded=partial(turned_over, rest=rest, faces=faces),
+            remaining=0.0 if result.status is Status.CONVERGED else np.inf,
+            unmoved=self._constraints.unmoved,
         )
+        return replace(solution, status=_or_missed(result.status, solution))
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
         places = self._frame.outward(targets), self._constraints.fixed_at
         return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
+
+
+def _or_missed(status: Status, solution: Solution) -> Status:
+    """Return *status*, or `MISSED` of a converged *solution* with handles off their targets."""
+    return Status.MISSED if status is Status.CONVERGED and _is_off(solution) else status
+
+
+def _is_off(solution: Solution) -> bool:
+    """Return whether handles or fixed vertices of *solution* are off their places."""
+    return max(solution.handle_error, solution.fixed_error) > _MET
 
 
 def _largest(vectors: FloatArray) -> float:

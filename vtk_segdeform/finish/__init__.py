@@ -14,7 +14,7 @@ The files, in reading order:
 """
 
 from .cell_energy import CellEnergy
-from .finisher import Finish, Finisher
+from .finisher import Finish, Finisher, Unbalanced
 from .folds import Folds
 
-__all__ = ["CellEnergy", "Finish", "Finisher", "Folds"]
+__all__ = ["CellEnergy", "Finish", "Finisher", "Folds", "Unbalanced"]

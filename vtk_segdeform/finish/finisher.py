@@ -23,6 +23,8 @@ deformer that avoids contact, parts that still cross are separated (`untangling`
 
 Components without a fixed or handle vertex stay where they are, since nothing determines their
 place; so do vertices in no triangle.
+
+Long because the iteration and its repairs share the factored problem.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -51,6 +54,7 @@ _STEPS = 30  # at most
 # distortion of most poses is 1.01 times as much, but of long thin limbs 1.16 times.
 _SEVERAL, _GAIN = 8, 0.03
 _TOLERANCE = 1e-5  # or once the root mean square of a step, in mesh sizes, is less
+_ROUNDED = 1e-9  # the same of a pose that is finished further: such a step may be due to rounding
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 _Z_STEPS = 4  # for which the directions of the volumes are used
 _ROUNDING = 1e-15  # mesh sizes by which places may differ from those of the start
@@ -71,6 +75,19 @@ class Finish:
     vertices: FloatArray  # (n, 3); the start itself if no step was taken
     merits: tuple[float, ...]  # the energy before and after each step
     steps: int
+
+
+class Unbalanced(NamedTuple):
+    """What a minimum would not have, at a pose of n vertices; zero where these stay."""
+
+    slope: FloatArray
+    """(n, 3): half the gradient of the energy."""
+    rows: list[FloatArray]
+    """(n, 3) each: the gradients of the volumes, of which the slope of a minimum is a sum."""
+    step: FloatArray
+    """(n, 3): the next step, which keeps the rotations; smooth motions may have far more to go."""
+    stays: BoolArray
+    """(n,): the vertices that do not move."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,15 +151,21 @@ class Finisher:
 
     @one_blas_thread()
     def run(
-        self, start: FloatArray, places: FloatArray, progress: Progress | None = None
+        self,
+        start: FloatArray,
+        places: FloatArray,
+        progress: Progress | None = None,
+        *,
+        further: bool = False,
     ) -> Finish:
         """Return the finish of the pose *start* (n, 3), with its held vertices at *places* (k, 3).
 
         *places* are in the order of the vertices.  If *start* has no crossings, nor has the result:
-        it is *start* itself if all else fails.
+        it is *start* itself if all else fails.  A pose that was finished before is finished
+        *further*, with all steps.
         """
         begin = self._at_places(start, places)
-        found = self._run(begin, part(progress, 0.0, 0.5))
+        found = self._run(begin, part(progress, 0.0, 0.5), further=further)
         if not found.steps and not self._avoid_contact:
             return found
         return self._apart(begin, found, part(progress, 0.5, 1.0))
@@ -237,11 +260,24 @@ class Finisher:
         before, after = (self._evaluated(x).value for x in (begin, end))
         return after < before and bool(folds.at(end).sum() <= folds.at(begin).sum())
 
-    def _run(self, begin: FloatArray, progress: Progress | None) -> Finish:
+    def unbalanced(self, x: FloatArray) -> Unbalanced:
+        """Return how far the pose *x* (n, 3), on the volumes, is from a minimum."""
+        here, step, slope = self._evaluated(x), np.zeros_like(x), np.zeros_like(x)
+        if len(self._free):
+            step[self._free] = self._step(here, self._directions(x))
+        rows = [each.gradient(x) for each in self._constraints]
+        slope[self._free] = here.slope[self._free]
+        for each in rows:
+            each[self._stays] = 0.0
+        return Unbalanced(slope, rows, step, self._stays)
+
+    def _run(
+        self, begin: FloatArray, progress: Progress | None, *, further: bool = False
+    ) -> Finish:
         """Return the finish of a pose whose held vertices are in their places."""
         if not len(self._free):
             return Finish(begin, (), 0)
-        found = self._descend(begin, part(progress, 0.0, 0.7))
+        found = self._descend(begin, part(progress, 0.0, 0.7), further=further)
         if found.steps:
             x = self._without_folds(found.vertices, part(progress, 0.7, 1.0))
             found = replace(found, vertices=x)
@@ -262,8 +298,8 @@ class Finisher:
         is_near = np.isfinite(landed).all() and np.ptp(landed - x, axis=0).max() < self._size
         return landed if is_near else x
 
-    def _descend(self, begin: FloatArray, progress: Progress | None) -> Finish:
-        """Return *begin* after as many steps as it takes, or `_STEPS`."""
+    def _descend(self, begin: FloatArray, progress: Progress | None, *, further: bool) -> Finish:
+        """Return *begin* after as many steps as it takes, or `_STEPS`; *further*, after these."""
         here, free = self._evaluated(begin), self._free
         merits, anderson, age = [here.value], Anderson(_WINDOW), _Z_STEPS
         directions: list[FloatArray] = []
@@ -274,9 +310,11 @@ class Finisher:
                 directions, age = self._directions(here.x), 0
             age += 1
             h = self._step(here, directions)
-            if math.sqrt(float(np.vdot(h, h)) / len(h)) <= _TOLERANCE * self._size:
+            tolerance = _ROUNDED if further else _TOLERANCE
+            if math.sqrt(float(np.vdot(h, h)) / len(h)) <= tolerance * self._size:
                 break
-            if len(merits) > _SEVERAL and here.value > (1.0 - _GAIN) * merits[-1 - _SEVERAL]:
+            is_slow = len(merits) > _SEVERAL and here.value > (1.0 - _GAIN) * merits[-1 - _SEVERAL]
+            if is_slow and not further:
                 break
             guess = anderson.extrapolate(here.x[free], h, h[stride])
             ahead = self._improved(here, guess, directions)

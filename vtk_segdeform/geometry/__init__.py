@@ -14,6 +14,7 @@ The files, in reading order:
     normals         vertex normals for drawing
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
+    turned_over     folds: triangles that a pose turned over
     local_volume    volume change below the surface at each vertex
     up_axis         a guess of the axis that points up
 """
@@ -36,6 +37,7 @@ from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
+from .turned_over import turned_over
 from .up_axis import guess_up_axis
 from .volume import (
     corner_and_edges,
@@ -81,6 +83,7 @@ __all__ = [
     "signed_volume",
     "step_to_volume",
     "triangle_distortion",
+    "turned_over",
     "unique_edges",
     "volume_along",
     "volume_along_path",

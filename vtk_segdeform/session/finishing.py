@@ -19,7 +19,8 @@ offset.  If too few vertices are free for that, handles are moved as well, and f
 vertices: as in the solve for the cages, the volume takes precedence.
 
 The finish of a pull starts from the mesh that is shown, because it keeps the surface beyond the
-reach; any other starts from W~ p, so that the way to it makes no difference.
+reach, and so does that of a pose that is finished further; any other starts from W~ p, so that the
+way to it makes no difference.
 """
 
 from __future__ import annotations
@@ -27,16 +28,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
-from ..mesh import Mesh, new_crossings
+from ..mesh import Mesh
 from ..progress import Progress
-from ..solver import Solution, Status, VolumeConstraint, moved_along, steps_to_volume
+from ..solver import Solution, VolumeConstraint, moved_along, steps_to_volume
 from .state import Finished, Pose
 
 Cages: TypeAlias = tuple[FloatArray, ...]
@@ -61,32 +61,20 @@ class FinishedPose(NamedTuple):
 class Finish:
     """A pose to finish, and its own deformer; another thread may call ``finish(progress)``."""
 
-    mesh: Mesh
     deformer: Deformer
     pose: Pose
     targets: FloatArray
     """(k, 3) float, of all handles."""
     shifts: FloatArray | None
     """(n, 3) float, as `Finished.shifted`, if the pose was finished before."""
-    start: FloatArray
-    """(n, 3) float: the mesh that the finish starts from."""
+    start: Solution
+    """The pose as it is, with the mesh that the finish starts from."""
 
     def __call__(self, progress: Progress | None = None, /) -> FinishedPose:
         """Finish the pose."""
-        mesh, deformer, pose = self.mesh, self.deformer, self.pose
+        deformer, pose = self.deformer, self.pose
         deformer.resume(pose.cage_vertices, self.targets)
-        start = Solution(
-            vertices=self.start,
-            cage_vertices=pose.cage_vertices,
-            steps=0,
-            status=Status.CONVERGED,
-            merits=(),
-            errors=lambda _: (0.0, 0.0),
-            volume=lambda: 0.0,
-            region_volumes=lambda _: np.empty(0),
-            crossed=partial(new_crossings, rest=mesh.vertices, faces=mesh.faces),
-        )
-        solution = deformer.finish(start, progress=progress)
+        solution = deformer.finish(self.start, progress=progress)
         held = np.union1d(deformer.fixed, deformer.handle)
         shifts = np.zeros((len(held), 3)) if self.shifts is None else self.shifts[held]
         vertices = np.array(solution.vertices)

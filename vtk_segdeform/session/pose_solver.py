@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,10 +27,10 @@ from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
 from ..errors import CageError, ConstraintError
 from ..files import cache_folder
-from ..geometry import Lids, lids_of, volume_gradient
-from ..mesh import Mesh
+from ..geometry import Lids, lids_of, turned_over, volume_gradient
+from ..mesh import Mesh, new_crossings
 from ..progress import Progress, part, tell
-from ..solver import Solution, VolumeConstraint, errors_at, total_volume
+from ..solver import Solution, Status, VolumeConstraint, errors_at, total_volume
 from .finishing import Finish, Surfaces, moved_on
 from .handles import require_near, targets_at
 from .listeners import Change
@@ -76,6 +77,14 @@ class _Aim:
             return self
         share = 1.0 / max(1, self.turns - _TURNS + 2)
         return _Aim(wanted, self.shift + share * (shift - self.shift), self.turns + 1)
+
+
+class _SolveOptions(NamedTuple):
+    """Options of `Deformer.solve`."""
+
+    max_steps: int | None
+    within: float | None
+    progress: Progress | None
 
 
 class PoseSolver:
@@ -201,20 +210,44 @@ class PoseSolver:
             If *state* has no cages, or they do not fit.
         ConstraintError
             If no finite pose is found.
+        Cancelled
+            If *progress* raised it; then everything is as it was.
         """
-        before, shift = state.pose, self._shift(state)
         deformer = self._localise(state, self._constrain(state))
         self._start_from(state, deformer)
-        aim, self._current, self._aim = self._aim, None, None  # in case the solve fails
+        current, aim = self._current if self._current is state.pose else None, self._aim
+        self._current, self._aim = None, None  # in case the solve fails
+        options = _SolveOptions(max_steps, within, progress)
+        if progress is None:
+            return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+        try:
+            with deformer.restoring():
+                return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+        except BaseException:
+            self._current, self._aim = current, aim
+            raise
+
+    def _solved(
+        self,
+        state: State,
+        targets: Mapping[str, FloatArray],
+        deformer: Deformer,
+        aim: _Aim | None,
+        options: _SolveOptions,
+        *,
+        is_passing: bool,
+    ) -> tuple[Pose, Solution]:
+        """Return the result of `solve` with a *deformer* in the pose of *state*."""
+        before, shift = state.pose, self._shift(state)
         wanted = _stacked(targets)
-        for _ in range(_TURNS if shift is not None and max_steps is None else 1):
+        for _ in range(_TURNS if shift is not None and options.max_steps is None else 1):
             if shift is None:
                 aim, places = None, wanted
             else:
                 own = shift[deformer.handle]
                 aim = _Aim(wanted, own) if aim is None else aim.turned(wanted, own)
                 places = wanted - aim.shift
-            solution = deformer.solve(places, max_steps=max_steps, within=within, progress=progress)
+            solution = deformer.solve(places, **options._asdict())
             if not np.isfinite(solution.vertices).all():
                 raise ConstraintError("no finite pose for these targets; move the handles less")
             cages, finished = solution.cage_vertices, None if before is None else before.finished
@@ -263,12 +296,31 @@ class PoseSolver:
         shift = self._shift(state)
         is_shifted = shift is not None and bool(shift[state.fixed].any())
         deformer = self._held(state, state.fixed_at) if is_shifted else self._constrain(state)
-        x = self._surface(state, pose.cage_vertices)
-        if state.locality is not None:
+        is_further = pose.is_finished and state.locality is None
+        if is_further or state.locality is not None:
             x = self.vertices(state, pose)
+        else:
+            x = self._surface(state, pose.cage_vertices)
+        if state.locality is not None:
             at_press = self._known_surface(state, state.locality)
             deformer = localised(deformer, state.locality, at_press)
-        return Finish(self._mesh, deformer.copy(), pose, _stacked(pose.targets), shift, x)
+        ids, wanted = (deformer.handle, deformer.fixed), _stacked(pose.targets)
+        places, (_, volume) = (wanted, _fixed_at(self._mesh, state)), self._enclosed(state)
+        rest, faces = self._mesh.vertices, self._mesh.faces
+        start = Solution(
+            vertices=x,
+            cage_vertices=pose.cage_vertices,
+            steps=0,
+            status=Status.STEP_LIMIT if is_further else Status.CONVERGED,
+            merits=(),
+            errors=partial(errors_at, ids, places, self._mesh.diagonal),
+            volume=partial(volume.relative, x),
+            region_volumes=lambda _: np.empty(0),
+            crossed=partial(new_crossings, rest=rest, faces=faces),
+            folded=partial(turned_over, rest=rest, faces=faces),
+            unfinished=x if is_further else None,
+        )
+        return Finish(deformer.copy(), pose, wanted, shift, start)
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""

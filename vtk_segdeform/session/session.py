@@ -322,7 +322,9 @@ class Session(Timeline):
         if self.solution is None or self.solution.status is Status.CONVERGED:
             return "drag a handle"
         if self.solution.status is Status.STEP_LIMIT:
-            return "not fully converged: keep dragging, or refine the pose"
+            if self.is_unsettled:
+                return "not fully converged: keep dragging, or refine the pose"
+            return "drag a handle" + (", or finish the pose again" * self.can_finish_further)
         return str(self.solution.status)
 
     def layers(self) -> dict[str, pv.PolyData]:
@@ -879,7 +881,8 @@ class Session(Timeline):
         # Converged already: keep the same pose object.  But even without a step, the final pose can
         # have other weights of handles than the one before.
         if solution.steps == 0 and (here is None or self._is_same_place(here, pose)):
-            self._solution = None if here is None else (here, solution)
+            if self.solution is None or not self.solution.is_finished:  # of which it tells nothing
+                self._solution = None if here is None else (here, solution)
             return solution
         self._solution = pose, solution
         self._set_state(replace(self._state, pose=pose), Change(0))
@@ -890,7 +893,7 @@ class Session(Timeline):
 
         Triangles are less distorted, joints bend in less space, and handles and fixed vertices are
         exact.  The next drag continues from the finished pose.  The pose of a pull is finished
-        within its reach.
+        within its reach.  A finished pose is finished further.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
 
@@ -905,7 +908,7 @@ class Session(Timeline):
             If there is no pose, or nothing is fixed or in a handle.
         """
         begun = 0.0
-        if self.solution is not None and self.solution.status is Status.STEP_LIMIT:
+        if self.is_unsettled:
             begun = 0.5
             self.refine(progress=part(progress, 0.0, begun))
         result = self.finishing()(part(progress, begun, 1.0))
@@ -915,7 +918,28 @@ class Session(Timeline):
     @property
     def can_finish(self) -> bool:
         """Whether there is a pose that `finish` can finish, and it is not finished yet."""
-        return not self._reason_not_to_finish() and not self._is_finished
+        return not self._reason_not_to_finish() and not self.is_finished
+
+    @property
+    def can_finish_further(self) -> bool:
+        """Whether the pose was finished, but not to its end, and is not that of a pull."""
+        return self._is_on_its_way(finished=True) and self._state.locality is None
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the pose was finished on the mesh, and not moved since then."""
+        return self._state.pose is not None and self._state.pose.is_finished
+
+    @property
+    def is_unsettled(self) -> bool:
+        """Whether the cages of the pose have not converged, so that `refine` would move it."""
+        return self._is_on_its_way(finished=False)
+
+    def _is_on_its_way(self, *, finished: bool) -> bool:
+        solution = self.solution
+        if solution is None or solution.is_finished != finished:
+            return False
+        return solution.status is Status.STEP_LIMIT
 
     def finishing(self) -> Finish:
         """Return a function that finishes the current pose, ``finishing(progress)``.
@@ -935,16 +959,10 @@ class Session(Timeline):
         if self._state.pose is not before:
             return False
         self._pose_solver.accept(before, pose)
-        self._solution = pose, solution
+        known = None if solution.is_finished else self.solution  # it was not changed
+        self._solution = pose, known or solution
         self._set_state(replace(self._state, pose=pose), Change(0))
         return True
-
-    @property
-    def _is_finished(self) -> bool:
-        pose = self._state.pose
-        if pose is None or pose.finished is None:
-            return False
-        return pose.finished.cage_vertices is pose.cage_vertices  # it was not moved since then
 
     def _reason_not_to_finish(self) -> str:
         """Return why the pose cannot be finished, or ""."""

@@ -147,6 +147,11 @@ class Pose(Frozen):
     finished: Finished | None = None
     """The mesh, unless it is that of the cages, W~ p."""
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether the mesh was finished with these cages, which were not moved since then."""
+        return self.finished is not None and self.finished.cage_vertices is self.cage_vertices
+
     def is_same_surface(self, other: Pose) -> bool:
         """Return whether the mesh is that of *other*, whatever the targets."""
         return self.cage_vertices is other.cage_vertices and self.finished is other.finished

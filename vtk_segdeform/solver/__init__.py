@@ -31,7 +31,7 @@ from .exact_volume import (
 )
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
-from .solution import Solution, Status
+from .solution import CONVERGED, Solution, Status
 from .terms import Term
 from .volume_constraints import (
     Bodies,
@@ -44,6 +44,7 @@ from .waypoints import LONGEST_MOVE, is_half_turn, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
+    "CONVERGED",
     "LONGEST_MOVE",
     "Anchors",
     "Anderson",

@@ -443,20 +443,39 @@ class GaussNewton:
         share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
         return np.reshape(slope - share @ rows, p.shape)
 
+    @property
+    def has_newton_steps(self) -> bool:
+        """Whether the Hessian is known: the energy has an exact gradient."""
+        return self.energy.has_exact_gradient
+
+    def remaining(self, p: FloatArray, targets: FloatArray) -> float:
+        """Return by how much Newton's step at *p* moves the surface of the volumes, at most.
+
+        An estimate of the distance to the minimum for *targets*; the step is not taken.
+        """
+        here = self._iterate_at(p, self.positions.toward(targets))
+        return self.farthest(self.response(p, here.slope, here.rows))
+
+    def response(self, p: FloatArray, slope: FloatArray, rows: Sequence[FloatArray]) -> FloatArray:
+        """Return Newton's step (m, 3) at *p* against a *slope* (m, 3), half a gradient.
+
+        To first order it keeps the volumes whose gradients are *rows*, (m, 3) each.  The Hessian is
+        that of the last step, if this was Newton's.  Where it is not convex, the step is longer.
+        """
+        factor = None if self._state is None else self._state.factor
+        if factor is None or factor.share < _EXACT:
+            of_terms = hessian_of(self._begun, p, self._surface(p)) if self._begun else None
+            factor = full_factor(self._hessian, rotation_term(self.energy, p), added=of_terms)
+        is_exact, factor = factor is not None and factor.share >= _EXACT, factor or self._factor
+        step, _, _ = _constrained_step(factor, slope, rows, np.zeros(len(rows)))
+        return step if is_exact else _SHORT * step
+
     def _step(
         self, here: _Iterate, factor: Factor
     ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
         """Return h and lambda of (21), and Z = H^-1 G^T, one direction for each constraint."""
-        h, *z = factor.solve_all([-here.slope, *here.rows])  # -H^-1 d, and Z
-        if not self.volumes.constraints:
-            return h, np.zeros(0), []
         g = violations(self.volumes.constraints, here.x)
-        gh = np.array([np.vdot(row, h) for row in here.rows])  # -G H^-1 d
-        gz = np.array([[np.vdot(row, direction) for direction in z] for row in here.rows])
-        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
-        for multiplier, direction in zip(multipliers, z, strict=True):
-            h -= multiplier * direction
-        return h, multipliers, z
+        return _constrained_step(factor, here.slope, here.rows, g)
 
     def _retract(
         self,
@@ -591,6 +610,21 @@ class GaussNewton:
     def _length(self, step: FloatArray) -> float:
         """Return the root mean square of a *step* over the surface."""
         return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))
+
+
+def _constrained_step(
+    factor: Factor, slope: FloatArray, rows: Sequence[FloatArray], g: FloatArray
+) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
+    """Return h, lambda and Z of (21), for d = *slope* and the *rows* of G."""
+    h, *z = factor.solve_all([-slope, *rows])  # -H^-1 d, and Z
+    if not rows:
+        return h, np.zeros(0), []
+    gh = np.array([np.vdot(row, h) for row in rows])  # -G H^-1 d
+    gz = np.array([[np.vdot(row, direction) for direction in z] for row in rows])
+    multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
+    for multiplier, direction in zip(multipliers, z, strict=True):
+        h -= multiplier * direction
+    return h, multipliers, z
 
 
 def _left(length: float, before: float) -> float:

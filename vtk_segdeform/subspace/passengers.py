@@ -104,7 +104,9 @@ def bind_passengers(
     weights = as_numbers(weights, "weights")
     if weights.shape != (len(cages), mesh.n_vertices):
         expected = len(cages), mesh.n_vertices
-        raise ArgumentError(f"weights must have shape {expected}; got {weights.shape}")
+        raise ArgumentError(
+            f"weights must have shape {expected}, a row for each of the cages; got {weights.shape}"
+        )
     alpha = blend_at(mesh.vertices, weights, points)
     rows, blocks = [], []
     for r, cage in enumerate(cages):

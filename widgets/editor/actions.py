@@ -24,6 +24,7 @@ from vtk_segdeform.session import FinishedPose, State
 from ..region_selector import Paint, Tool
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
+from .finishing import measured
 from .widget_set import Mode
 
 Action = Callable[[Controller], None]
@@ -97,7 +98,7 @@ def finish(controller: Controller) -> None:
         is_same = controller.finishing.accept(result)
         return "Pose finished on the mesh" if is_same else "The pose changed; it was not finished"
 
-    controller.start("Finishing on the mesh", session.finishing(), accept)
+    controller.start("Finishing on the mesh", measured(session.finishing()), accept)
 
 
 def save(controller: Controller) -> None:

@@ -35,7 +35,7 @@ from .preparing import Preparing
 from .recordings import Recordings
 from .rest import Rest
 from .session_file import SessionFile, is_mesh, read_session
-from .settling import Settling, is_unsettled
+from .settling import Settling
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling takes about half a minute, once"
@@ -92,7 +92,7 @@ class Controller:
         self._mode = Mode.PULL
         self._is_on = False
         self._left = False, False  # by turning off: as `_ahead`
-        self._instead = ""
+        self._instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
         self._worker = Worker(view_timer(view), self._job_changed)
         self._preparing = Preparing(
@@ -201,7 +201,7 @@ class Controller:
         session = self.session
         if settles:
             session.refine(progress=part(progress, 0.0, 0.5))
-        if finishes and session.can_finish and not is_unsettled(session):
+        if finishes and session.can_finish and not session.is_unsettled:
             session.finish(progress=part(progress, 0.5, 1.0))
 
     def remove(self) -> None:
@@ -327,9 +327,19 @@ class Controller:
         pulled = self.session.last_pulled
         if is_pull and self.session.position != self._began_at and pulled in self.session.handles:
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
+        if widget is self.widgets.dragger:
+            self._tell_unmoved()
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
+
+    def _tell_unmoved(self) -> None:
+        """Name the parts that no handle moves, once."""
+        solution = self.session.solution
+        text = "" if solution is None else solution.unmoved_summary(self.session.mesh)
+        if text and text != self._unmoved:
+            self.messages.note(text[:1].upper() + text[1:])
+        self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
         self._began_at = self.session.position
@@ -522,7 +532,7 @@ class Controller:
     @property
     def pose_remark(self) -> str:
         """What to say about a saved pose; "" if it has settled."""
-        return ". The pose had not settled" if is_unsettled(self.session) else ""
+        return ". The pose had not settled" if self.session.is_unsettled else ""
 
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""

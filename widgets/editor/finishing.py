@@ -15,8 +15,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from vtk_segdeform.checks import as_flag
+from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, FinishedPose, Session
-from vtk_segdeform.solver import Status
 
 from ..recording import announce_finish, on_finish_request, recorded_keys
 from ..scene import Glide, SurfaceDisplay, View
@@ -127,14 +127,14 @@ class Finishing:
         """Begin to finish the pose; True if it must converge first."""
         session = self._session()
         solution = session.solution  # None after undo
-        if solution is not None and solution.status is Status.STEP_LIMIT:
+        if session.is_unsettled:
             return True  # it will be refined
         self.interrupt()
         if solution is None or not session.can_finish:
             return False
         self._job = Job(
             view_timer(self._view),
-            session.finishing(),
+            measured(session.finishing()),
             done=self._accept_announced,
             watch=self._watch,
             is_due=self._is_free,
@@ -165,10 +165,23 @@ class Finishing:
         self._show(_STEP * int(job.fraction / _STEP) if job.is_running else None)
 
     def _finish_now(self) -> None:
-        if self._session().can_finish:
-            self._session().finish()
+        session = self._session()
+        if session.can_finish or session.can_finish_further:
+            session.finish()
 
     def _show(self, fraction: float | None) -> None:
         if fraction != self._fraction:
             self._fraction = fraction
             self._changed()
+
+
+def measured(finish: Callable[[Progress], FinishedPose]) -> Callable[[Progress], FinishedPose]:
+    """Return *finish*, which also looks for crossings and folds of the pose, for the hint."""
+
+    def run(progress: Progress) -> FinishedPose:
+        result = finish(progress)
+        result.solution.crossings()
+        result.solution.folds()
+        return result
+
+    return run

@@ -6,7 +6,7 @@ A hint names the key for that step, so that the user can reach every mode from e
 from __future__ import annotations
 
 from vtk_segdeform.session import Session, region_name
-from vtk_segdeform.solver import Status
+from vtk_segdeform.solver import Solution, Status
 
 from ..puller import LOCKED
 from ..region_selector import Paint, Tool
@@ -113,10 +113,25 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     if solution is not None and solution.status not in (Status.CONVERGED, Status.STEP_LIMIT):
         text = str(solution.status)
         return text[:1].upper() + text[1:]
+    if fault := _fault(solution):
+        return fault
+    further = f" · {keys.cap('finish')}: finish further" if session.can_finish_further else ""
     fixing = f" · {keys.cap('handles')}, {keys.cap('paint_fixed')}: paint fixed vertices"
     next_step = "" if len(session.fixed) else fixing
     axes = f" · Local axes ({keys.cap('local_axes')})" if widgets.dragger.local else ""
-    return f"Move or rotate a handle{axes}{next_step}"
+    return f"Move or rotate a handle{axes}{next_step}{further}"
+
+
+def _fault(solution: Solution | None) -> str:
+    """Return what is wrong with the surface of a finished pose; "" if it is all right."""
+    if solution is None or not solution.is_finished:
+        return ""
+    if count := len(solution.crossings()):
+        return f"{count:,} faces cross others. Move less, or turn on Avoid contact"
+    if count := len(solution.folds()):
+        plural = "s" if count > 1 else ""
+        return f"{count:,} turned-over face{plural}. Move less, or add cage vertices"
+    return ""
 
 
 def _out_of_reach(widgets: WidgetSet) -> str:

@@ -15,7 +15,6 @@ from collections.abc import Callable
 import numpy as np
 
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import Status
 
 from ..scene import Stop, View
 from .widget_set import WidgetSet
@@ -51,7 +50,7 @@ class Settling:
         """Whether a released pose is converging."""
         widgets = self._widgets()
         is_refined = widgets.puller.is_refining or widgets.dragger.is_refining
-        return is_refined and not widgets.session.is_dragging and is_unsettled(widgets.session)
+        return is_refined and not widgets.session.is_dragging and widgets.session.is_unsettled
 
     @property
     def is_pending(self) -> bool:
@@ -126,11 +125,6 @@ class Settling:
             self.remove()
             self.flush()
             self._changed()
-
-
-def is_unsettled(session: Session) -> bool:
-    """Return whether the pose of *session* has not converged."""
-    return session.solution is not None and session.solution.status is Status.STEP_LIMIT
 
 
 def _distance(session: Session) -> float:

@@ -18,7 +18,7 @@ from collections.abc import Callable
 from statistics import median
 
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import Solution, Status
+from vtk_segdeform.solver import Solution
 
 from ..scene import Draft, StepBudget, Stop, View
 
@@ -92,7 +92,7 @@ class LiveSolve:
         Also stop if changed options or cages need a new binding, which may take long.
         """
         solution = self._session.solution
-        is_final = solution is None or solution.status is not Status.STEP_LIMIT
+        is_final = not self._session.is_unsettled
         if (
             is_final
             or solution is self._halted

@@ -194,7 +194,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "deform.finish",
                     "finish",
                     "Finish pose",
-                    enabled=session.can_finish,
+                    enabled=session.can_finish or session.can_finish_further,
                 ),
                 reset_button(editor, "deform.reset"),
             ),

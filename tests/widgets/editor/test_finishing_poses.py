@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 import time
@@ -14,11 +15,12 @@ from soaking import session_of, slender
 from test_editor import Bench, bench  # noqa: F401 - one of them is a fixture
 from test_editor import pull_handle as pull_handle_in
 
-from vtk_segdeform import load_session, read_mesh
+from vtk_segdeform import Mesh, Regions, Session, fit_cages, load_session, read_mesh
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session import save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets.editor import (
+    Mode,
     exporting,
     finishing,
     finishing_after_drags,
@@ -423,3 +425,61 @@ def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
     bench.type("shift+f")
     assert is_finished(bench)
     assert "Pose finished on the mesh" in bench.editor.status
+
+
+def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F811
+    bench.editor.do(finishing_after_drags(False))
+    bench.type("4")
+    pull_handle(bench)
+    bench.type("shift+f")
+    session, (pose, solution) = bench.session, bench.session._solution
+    few, many, controller = np.arange(3), np.arange(1200), bench.editor.controller
+
+    def told(**changes):
+        session._solution = pose, dataclasses.replace(solution, **changes)
+        controller.refresh()
+        return bench.editor.status
+
+    assert "Move or rotate a handle" in told(status=Status.CONVERGED)
+    assert "faces" not in bench.editor.status
+    assert "further" not in bench.editor.status
+    crossing = told(crossed=lambda _: few)
+    assert "3 faces cross others. Move less, or turn on Avoid contact" in crossing
+    assert "1,200 turned-over faces. Move less, or add" in told(folded=lambda _: many)
+    assert "Shift+F: finish further" in told(status=Status.STEP_LIMIT)
+    before = session.vertices
+    assert not session.can_finish
+    assert session.can_finish_further
+    assert not session.is_unsettled
+    bench.type("shift+f")
+    assert session.solution.is_finished
+    assert np.abs(session.vertices - before).max() < 0.1 * session.mesh.diagonal
+    assert not np.array_equal(session.vertices, before)
+
+
+def test_a_part_that_no_handle_moves_is_named_once():
+    scene = slender()
+    mesh, far = scene.mesh, np.array([0.0, 0.0, 6.0])
+    n = mesh.n_vertices
+    both = Mesh(
+        np.concatenate([mesh.vertices, mesh.vertices + far]),
+        np.concatenate([mesh.faces, mesh.faces + n]),
+    )
+    masks = np.zeros((3, 2 * n), dtype=bool)
+    masks[:2, :n], masks[2, n:] = scene.regions.membership, True
+    session = Session(both)
+    session.set_regions(Regions.from_masks(both, masks))
+    moved = mesh.with_vertices(both.vertices[n:])
+    session.set_cages([*scene.cages, *fit_cages(moved, Regions.single(moved), 20)])
+    session.set_fixed(scene.fixed)
+    session.add_handle(scene.handle)
+    session.bind()
+    made = Bench(plain_view((400, 320)), session, Mode.DEFORM)
+    made.editor.do(finishing_after_drags(False))
+    said = f"Part 2 ({n} vertices) has no handle and no fixed vertices: it stays where it is"
+    for is_said in (True, False):
+        pull_handle(made)
+        made.hand.tick(2)
+        assert (said in made.editor.status) == is_said
+    assert made.hand.failures == []
+    made.editor.remove()

@@ -38,6 +38,8 @@ KEYS = keys_of("pyvista")
          "Drag the surface · Volume preservation off (turn on)", ["preserve_volume"]),
         ("Brush: paint fixed vertices. Ctrl: erase · Next: D, paint a handle", Mode.HANDLES,
          "Brush: paint fixed vertices · Next: paint a handle", ["paint_handle"]),
+        ("Move or rotate a handle · Shift+F: finish further", Mode.DEFORM,
+         "Move or rotate a handle · finish further", ["finish"]),
     ],
 )  # fmt: skip
 def test_hints_name_what_to_tap(sentence, mode, text, actions):
