@@ -12,9 +12,11 @@ from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whol
 from ..cages import Cage
 from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
-from ..mesh import Mesh, counted
+from ..mesh import Mesh, SurfacePoint, counted
 
 _FARTHEST = 1e3  # sizes of the mesh
+_FARTHEST_OFF = 0.05  # diagonals between a given point and the surface
+_ROUNDING = 1e-9  # of the sum of shares
 _PULL_RADIUS = 0.15  # diagonals of the mesh
 _PINNED_LOCALITY, _ENOUGH = 0.05, 3  # with fewer fixed points, about which the body can turn
 LOCALITY, SPREAD = 0.2, 0.5
@@ -88,6 +90,43 @@ def checked_vertex(mesh: Mesh, vertex: int) -> int:
         last = mesh.n_vertices - 1
         raise ConstraintError(f"vertex must be a whole number, 0 to {last}; got {shown(vertex)}")
     return int(vertex)
+
+
+def checked_place(mesh: Mesh, vertex: int | ArrayLike | SurfacePoint) -> SurfacePoint:
+    """Return the point of the surface that is a vertex, or nearest to a point (3,) at rest.
+
+    Raises
+    ------
+    ConstraintError
+        If there is no such vertex, or the point is far from the surface.
+    """
+    if isinstance(vertex, SurfacePoint):
+        return _checked_surface_point(mesh, vertex)
+    if np.ndim(vertex) == 0:  # type: ignore[arg-type]
+        return SurfacePoint.at_vertex(checked_vertex(mesh, vertex))  # type: ignore[arg-type]
+    place = checked_point(vertex, "vertex")
+    point = SurfacePoint.nearest(mesh, place)
+    apart = float(np.linalg.norm(point.at(mesh.vertices) - place)) / mesh.diagonal
+    if apart > _FARTHEST_OFF:
+        nearest = ", ".join(f"{x:.6g}" for x in point.at(mesh.vertices))
+        raise ConstraintError(
+            f"the grabbed point is {100 * apart:.3g} % of model size away from the surface; give "
+            f"a point on it. The nearest one is ({nearest})"
+        )
+    return point
+
+
+def _checked_surface_point(mesh: Mesh, point: SurfacePoint) -> SurfacePoint:
+    corners = [checked_vertex(mesh, vertex) for vertex in point.corners]
+    joined = mesh.adjacency[corners][:, corners].nnz == len(corners) * (len(corners) - 1)
+    shares = np.asarray(point.shares, dtype=np.float64)
+    is_mean = len(shares) == len(corners) > 0 and bool((shares > 0.0).all())
+    if not (joined and len(corners) <= 3 and is_mean and abs(shares.sum() - 1.0) < _ROUNDING):
+        raise ConstraintError(
+            f"a point of the surface must have positive shares, with the sum 1, of the corners of "
+            f"one face; got {shown(point)}"
+        )
+    return point
 
 
 def checked_radius(mesh: Mesh, radius: float | None) -> float:
