@@ -71,7 +71,7 @@ def test_places_far_from_the_origin_have_all_their_digits(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* vertex is at"),
+        (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* one is at"),
         (["--at", "0,1", "--to", "0,0,1"], "--at must be three numbers"),
         (
             ["--at", "{top}", "--to", "0,0,9", "--radius", "-1"],

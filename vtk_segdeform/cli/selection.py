@@ -31,9 +31,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..checks import coordinate_text
 from ..errors import ConstraintError
 from ..files import open_regular
-from .motion import coordinate_text
 
 Role = Literal["fixed", "handle"]
 

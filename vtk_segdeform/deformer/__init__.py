@@ -25,10 +25,12 @@ from .arguments import (
     checked_radius,
     checked_targets,
     checked_vertex,
+    fault_of_grab,
+    place_text,
     reach_and_follows,
 )
 from .clamping import clamped
-from .deform import deform, finished
+from .deform import deform, finished, solved_along
 from .deformer import Deformer
 from .pull import pull
 
@@ -47,7 +49,10 @@ __all__ = [
     "checked_vertex",
     "clamped",
     "deform",
+    "fault_of_grab",
     "finished",
+    "place_text",
     "pull",
     "reach_and_follows",
+    "solved_along",
 ]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole, plain
 from ..cages import Cage
-from ..checks import require_sequence, shown
+from ..checks import coordinate_text, require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
 from ..mesh import Mesh, SurfacePoint, counted
 
@@ -92,8 +92,12 @@ def checked_vertex(mesh: Mesh, vertex: int) -> int:
     return int(vertex)
 
 
-def checked_place(mesh: Mesh, vertex: int | ArrayLike | SurfacePoint) -> SurfacePoint:
+def checked_place(
+    mesh: Mesh, vertex: int | ArrayLike | SurfacePoint, name: str = "vertex"
+) -> SurfacePoint:
     """Return the point of the surface that is a vertex, or nearest to a point (3,) at rest.
+
+    It is called *name* in messages.
 
     Raises
     ------
@@ -104,16 +108,45 @@ def checked_place(mesh: Mesh, vertex: int | ArrayLike | SurfacePoint) -> Surface
         return _checked_surface_point(mesh, vertex)
     if np.ndim(vertex) == 0:  # type: ignore[arg-type]
         return SurfacePoint.at_vertex(checked_vertex(mesh, vertex))  # type: ignore[arg-type]
-    place = checked_point(vertex, "vertex")
+    place = checked_point(vertex, name)
     point = SurfacePoint.nearest(mesh, place)
     apart = float(np.linalg.norm(point.at(mesh.vertices) - place)) / mesh.diagonal
     if apart > _FARTHEST_OFF:
-        nearest = ", ".join(f"{x:.6g}" for x in point.at(mesh.vertices))
         raise ConstraintError(
-            f"the grabbed point is {100 * apart:.3g} % of model size away from the surface; give "
-            f"a point on it. The nearest one is ({nearest})"
+            f"{name} is {100 * apart:.3g} % of model size away from the surface; give a point on "
+            f"it. The nearest one is at {place_text(mesh, point)}"
         )
     return point
+
+
+def place_text(mesh: Mesh, point: SurfacePoint) -> str:
+    """Return the coordinates of *point* at rest as text: "0.5,0,2"."""
+    return ",".join(coordinate_text(x, mesh.diagonal) for x in point.at(mesh.vertices))
+
+
+def fault_of_grab(mesh: Mesh, point: SurfacePoint, radius: float) -> str:
+    """Return why a pull of this *radius* cannot grab *point*: no vertex is near it; or "".
+
+    A pull grabs the surface within `SPREAD` of its radius.  If the nearest corner of the face is
+    farther away than that, the face is so large that the surface cannot follow.  On a cylinder, a
+    box and a plate with edges of 1/3 to 1/31 of their length, pulled by 10 % of the diagonal in
+    the middle of an edge, the surface was off its pose on a dense mesh by
+
+        distance of the nearest corner / diagonal     .12-.16   .07-.09   .04-.05   .02-.03   .01
+        root mean square / that of the motion         1.3-2.1   .8-1.4    .5-.9     .3-.6     .1-.4
+
+    so from 0.075 on, half the default radius, by about as much as it moves.
+    """
+    x = mesh.vertices
+    away = float(np.linalg.norm(x[list(point.corners)] - point.at(x), axis=1).min())
+    if away <= SPREAD * radius:
+        return ""
+    near, most = (100.0 * length / mesh.diagonal for length in (away, SPREAD * radius))
+    return (
+        f"no vertex is near this point: the nearest one of its face is {near:.3g} % of model size "
+        f"away, and a pull of this radius grabs the surface within {most:.3g} %; subdivide the "
+        "mesh first (segdeform subdivide), or enlarge the radius"
+    )
 
 
 def _checked_surface_point(mesh: Mesh, point: SurfacePoint) -> SurfacePoint:

@@ -72,7 +72,6 @@ from ..solver import (
     are_met,
     connected_sets,
     errors_at,
-    is_half_turn,
     moved_along,
     position_term,
     region_volumes,
@@ -304,7 +303,6 @@ class Deformer:
     _aim: _Approach
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
     _targets: FloatArray  # (k, 3), the targets of the last pose
-    _half_turned: FloatArray  # (k, 3), the last targets half a turn from rest; empty after `_begin`
 
     @one_blas_thread()
     def __init__(
@@ -658,7 +656,9 @@ class Deformer:
         ----------
         targets : (k, 3) float
             One for each vertex of `handle`, in its order.  A far motion goes through waypoints, so
-            that the mesh does not fold.
+            that the mesh does not fold.  Each handle turns the shorter way from its targets of the
+            last solve.  So the body is wound up by half a turn or more if it is solved for targets
+            on the way, each less than half a turn from the last ones.
         max_steps : int, optional
             Instead of the deformer's own limit, from the last waypoint on: a drag may stop early
             and continue with the next event.
@@ -776,7 +776,7 @@ class Deformer:
             solution,
             vertices=x,
             steps=solution.steps + found.steps,
-            status=Status.MISSED if max(errors(x)) > _MET else Status.CONVERGED,
+            status=self._missed_status if max(errors(x)) > _MET else Status.CONVERGED,
             merits=found.merits,
             errors=errors,
             volume=partial(self._total_volume.relative, found.vertices),
@@ -853,9 +853,6 @@ class Deformer:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
         self._aim.next = None
-        if max_steps is None and self._is_from_elsewhere(goal):
-            self.reset()
-            self._half_turned = goal
         steps = self._follow_waypoints(goal, options)
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
@@ -874,13 +871,6 @@ class Deformer:
             pulled.correct(off, error)
             is_same, result = True, replace(result, status=Status.STEP_LIMIT)
         return self._solution(result, x, steps)
-
-    def _is_from_elsewhere(self, goal: FloatArray) -> bool:
-        """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
-        own = self._constraints
-        if own.keeps is not None or np.array_equal(goal, self._half_turned):
-            return False
-        return is_half_turn(self._rest.vertices[self.handle], goal, own.handles)
 
     def _approach(
         self, goal: FloatArray, max_steps: int | None, within: float, progress: Progress | None
@@ -1245,7 +1235,7 @@ class Deformer:
         solver.volumes = self._constraints.volumes
         self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._aim = _Approach()
-        self._p, self._targets, self._half_turned = p, targets, _NO_POINTS
+        self._p, self._targets = p, targets
         if self._constraints.scaled is not None and p is not self._rest_cages:
             self._continuation.continue_from(p)
 
@@ -1261,7 +1251,7 @@ class Deformer:
         errors = partial(self._errors, self._targets)
         status = result.status
         if status is Status.CONVERGED and max(errors(x)) > _MET:
-            status = Status.MISSED
+            status = self._missed_status
         return Solution(
             vertices=x,
             cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
@@ -1273,6 +1263,11 @@ class Deformer:
             region_volumes=self._region_volume_changes,
             crossed=partial(new_crossings, rest=self.mesh.vertices, faces=self.mesh.faces),
         )
+
+    @property
+    def _missed_status(self) -> Status:
+        is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
+        return Status.MISSED if is_free else Status.ALL_HELD
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
         """Return `Solution.handle_error`, that of the pulled points included, and `fixed_error`."""

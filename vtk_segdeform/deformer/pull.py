@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
+from ..errors import ConstraintError
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress
 from ..regions import segment
@@ -19,6 +20,7 @@ from .arguments import (
     checked_place,
     checked_point,
     checked_radius,
+    fault_of_grab,
     reach_and_follows,
 )
 from .deform import checked_refine, finished, is_finished, stages_of
@@ -84,7 +86,8 @@ def pull(
     Raises
     ------
     ConstraintError
-        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid.
+        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid, or the faces at the grabbed
+        point are so large that no vertex is within half the radius.
     Cancelled
         If *progress* raised it.
 
@@ -106,6 +109,8 @@ def pull(
     fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")
     target = checked_point(to)[None] - point.at(mesh.vertices) + mesh.vertices[handle]
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
+    if fault := fault_of_grab(mesh, point, radius):
+        raise ConstraintError(fault)
     if locality is None:
         locality = automatic_locality(len(fixed))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
