@@ -9,12 +9,14 @@ import pytest
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
+from scipy.spatial.transform import Rotation
 from solids import TETRAHEDRON, exact_volume_change, icosphere, rotation
 
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
+from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights

@@ -78,7 +78,7 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
     places = local._constraints.pulled.moved(local._constraints.places(local._targets))
     assert np.abs(solver.unbalanced(p, places)).max() < 1e-12 * np.abs(solver._hessian).max()
     assert local.solve(X[[HIGH]] + UP).steps == 0
-    assert list(local._constraints.pulled.points) == [SurfacePoint.at_vertex(HIGH)]  # not as a single vertex
+    assert local._constraints.pulled.points == (SurfacePoint.at_vertex(HIGH),)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
-from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.pulling import automatic_locality
 from vtk_segdeform.session.session import Session
@@ -557,7 +557,8 @@ def test_a_tiny_or_a_huge_radius_is_no_error():
 
 def test_the_locality_of_another_mesh_is_refused():
     state = pulled().state
-    for wrong in ({"vertex": len(X)}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
+    off = SurfacePoint.at_vertex(len(X))
+    for wrong in ({"point": off}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
         broken = replace(state, locality=replace(state.locality, **wrong))
         with pytest.raises(ConstraintError):
             Session(MESH, state=broken)

@@ -31,7 +31,7 @@ def turn(
     vertex = int(handle[away[handle].argmin()])
     if not np.isfinite(away[vertex]):
         return None
-    way = list(_way(vertex, before))
+    way = list(_way(vertex, before.astype(np.int64)))
     patches = (np.append(mesh.adjacency[[each]].indices, each) for each in way)
     R = np.stack([rigid_fit(mesh.vertices[patch], x[patch])[0] for patch in patches])
     between = Rotation.from_matrix(R[:-1] @ np.swapaxes(R[1:], 1, 2)).as_rotvec()

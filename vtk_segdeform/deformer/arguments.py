@@ -106,7 +106,7 @@ def checked_place(
     """
     if isinstance(vertex, SurfacePoint):
         return _checked_surface_point(mesh, vertex)
-    if np.ndim(vertex) == 0:  # type: ignore[arg-type]
+    if plain(vertex, name).ndim == 0:
         return SurfacePoint.at_vertex(checked_vertex(mesh, vertex))  # type: ignore[arg-type]
     place = checked_point(vertex, name)
     point = SurfacePoint.nearest(mesh, place)
