@@ -189,6 +189,16 @@ class _Approach:
         return True
 
 
+class _HandlePoint(NamedTuple):
+    """A point of the surface that the target of a handle vertex moves."""
+
+    place: int
+    """Among those of all sets."""
+    point: SurfacePoint
+    is_alone: bool
+    """Whether no edge joins the vertex to another one in a handle."""
+
+
 class _Preserved(NamedTuple):
     """The volumes to preserve; the same for all handles on the same bodies."""
 
@@ -432,8 +442,8 @@ class Deformer:
         ----------
         vertex : int or SurfacePoint
             The grabbed vertex, or another point of the surface.  If its `SurfacePoint.vertex` is
-            a handle of one vertex, the target of that handle moves the point: by as much as the
-            vertex would move from where it is now.
+            in a handle, the target of that vertex moves the point: by as much as the vertex would
+            move from where it is now.
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
             it the surface is held the more, the farther away; from 4 times this distance it hardly
@@ -462,24 +472,21 @@ class Deformer:
         anchors = Anchors(quadratic, p, np.zeros_like(p))
         points = self._points_of_handles(point)
         energy, flat = self._with_flat_rings(points, anchors)
-        for number, own in points.items():
-            row = flat.get(number)
-            if row is None:
+        for target, (place, own, is_alone) in points.items():
+            row = flat.get(target)
+            if row is None and is_alone:
                 at = own.at(self._rest.vertices)
                 row = self._samples.soft_row(own, at, spread / self._frame.size)
             if row is None and not own.is_vertex:
                 row = self._row_of(own)
             if row is not None:
-                place = int(np.searchsorted(before.positions.set_of, number))
                 rows[place] = row
                 soft.append(place)
-                of_target.append(number)
+                of_target.append(target)
         positions = before.positions.local(rows, anchors)
         places = self._constraints.places(self._targets)
-        pulled = _PulledPoints(np.array(soft, dtype=np.int64))
-        first = [int(self._constraints.handles[number][0]) for number in of_target]
-        pulled.targets = np.array(first, dtype=np.int64)
-        pulled.points = tuple(points[number] for number in of_target)
+        pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
+        pulled.points = tuple(points[target].point for target in of_target)
         own_rows = [self._row_of(each) for each in pulled.points]
         pulled.rows = np.array(own_rows).reshape(-1, self.subspace.n_columns)
         pulled.levers = (pulled.rows - self.subspace.at(self.handle[pulled.targets])) @ p
@@ -501,17 +508,18 @@ class Deformer:
         other._begin(p, self._targets)
         return other
 
-    def _points_of_handles(self, point: SurfacePoint) -> dict[int, SurfacePoint]:
-        """Return what handles of one vertex move, by their number: this vertex, or *point*."""
-        single = {
-            number: int(self.handle[ids[0]])
-            for number, ids in enumerate(self._constraints.handles)
-            if len(ids) == 1
-        }
-        return {
-            number: point if vertex == point.vertex else SurfacePoint.at_vertex(vertex)
-            for number, vertex in single.items()
-        }
+    def _points_of_handles(self, point: SurfacePoint) -> dict[int, _HandlePoint]:
+        """Return the points that handles of one vertex move, and *point*, by their target."""
+        found, set_of = {}, self._constraints.solver.positions.set_of
+        for number, ids in enumerate(self._constraints.handles):
+            places = np.flatnonzero(set_of == number)
+            for place, target in zip(places, ids, strict=False):
+                vertex = int(self.handle[target])
+                is_grabbed = vertex == point.vertex and len(places) == len(ids)
+                own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
+                if len(ids) == 1 or not own.is_vertex:
+                    found[int(target)] = _HandlePoint(int(place), own, len(ids) == 1)
+        return found
 
     def _row_of(self, point: SurfacePoint) -> FloatArray:
         """Return the row of W~ of *point*, (m,)."""
@@ -532,20 +540,20 @@ class Deformer:
         return np.asarray((rows.T * weight) @ rows)
 
     def _with_flat_rings(
-        self, pulled: dict[int, SurfacePoint], anchors: Anchors
+        self, pulled: dict[int, _HandlePoint], anchors: Anchors
     ) -> tuple[Energy, dict[int, FloatArray]]:
         """Return the shape energy with the rings of *pulled* points that would become spikes.
 
-        And the rows of these points by the number of their handle; see `locality`.
+        And the rows of these points by their target; see `locality`.
         """
         energy, flat = self._binding.energy, dict[int, FloatArray]()
         held, x = np.concatenate([self.fixed, self.handle]), self._rest.vertices
         rings = []
-        for number, point in pulled.items():
+        for target, (_, point, _) in pulled.items():
             ring = Ring.around(self.mesh, x, point)
             others = held[held != point.vertex]
             if ring is not None and not np.isin(ring.vertices, others).any():
-                rings.append((number, point, ring))
+                rings.append((target, point, ring))
         if energy.has_vertex_rotations or not rings:  # rotations of vertices act on the mesh
             return energy, flat
         positions = self._constraints.solver.positions
@@ -553,14 +561,14 @@ class Deformer:
         without = replace(self._constraints.solver, energy=energy, positions=positions)
         far = _FAR_PULL * self.mesh.diagonal / self._frame.size
         most = _POSITION_WEIGHT * energy.scale
-        for number, point, ring in rings:
+        for target, point, ring in rings:
             rows, row = ring.combinations @ self.subspace.at(ring.vertices), self._row_of(point)
             (own, both), (_, offset) = without.compliance(np.stack([row, rows[0]]))
             excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
             if excess > 0.0:
                 strength = most * excess / max(excess, most * (offset - both * both / own))
                 energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
-                flat[number] = row
+                flat[target] = row
         return energy, flat
 
     def copy(self) -> Deformer:

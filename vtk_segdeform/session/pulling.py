@@ -169,9 +169,11 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
     pose = Pose(places, targets_at(handles, vertices), finished)
     reach, follows = reach_and_follows(radius, locality)
+    if len(handles[name]) > 1:  # which moves as a whole
+        point = SurfacePoint.at_vertex(point.vertex)
     local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
-    return Grasp(grip, after, name, point.at(vertices), MappingProxyType(carried))
+    return Grasp(grip, after, name, grip.point.at(vertices), MappingProxyType(carried))
 
 
 def released(state: State, vertices: FloatArray) -> State:

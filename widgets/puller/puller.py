@@ -268,6 +268,7 @@ class Puller(Widget):
         pull = partial(session.pull, point, radius=self.radius, locality=self.locality)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
+        sent, reached, part = 0.0, 0.0, motion.part  # angles: of the last targets, of the pose
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
                 if has_moved and not session.is_dragging:
@@ -282,7 +283,12 @@ class Puller(Widget):
                     continue
                 to = motion.of(start)
                 if self._is_ready():
+                    reached = sent if self._live.has_reached() else reached
+                    reached = reached if motion.part == part else 0.0
+                    way = motion.way(start, reached)
+                    self._live.lead([partial(pull, stop) for stop in way])
                     self._solve(partial(pull, to))
+                    sent, part = motion.turn, motion.part
                     has_moved = has_moved or session.is_dragging  # not if it was refused
                 else:
                     self._live.begin()
