@@ -53,18 +53,6 @@ def shown(value: object) -> str:
     return " ".join(_BRIEF.repr(value).split())
 
 
-def coordinate_text(x: float, size: float) -> str:
-    """Return the coordinate *x* in 6 digits, or in as many as show 1e-6 of a mesh's *size*.
-
-    Examples
-    --------
-    >>> coordinate_text(1 / 3, 2.0), coordinate_text(1e6 + 1 / 3, 2.0)
-    ('0.333333', '1000000.33333')
-    """
-    digits = next(d for d in range(6, 17) if d == 16 or abs(x) <= size * 10.0 ** (d - 6))
-    return f"{x:.{digits}g}"
-
-
 def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> _T:
     """Return *value* if it is an instance of *kind*, one class or several.
 

@@ -105,21 +105,22 @@ def test_deform_goes_through_the_targets_on_the_way():
 
 def test_the_turn_of_a_handle_is_measured_along_the_surface():
     z = BAR.vertices[:, 2]
-    ends = np.flatnonzero(z < 0.1), np.flatnonzero(z > HEIGHT - 0.1)
+    fixed, handle = np.flatnonzero(z < 0.1), np.flatnonzero(z > HEIGHT - 0.1)
+    axis = np.array([0.0, 0.0, 1.0])
     for angle in (0.0, 2.0, -3.5, 12.0):
         x = np.concatenate(
             [
-                transform(each[None], rotation([0.0, 0.0, 1.0], angle * each[2] / HEIGHT))
+                transform(each[None], rotation(axis, angle * each[2] / HEIGHT))
                 for each in BAR.vertices
             ]
         )
-        assert turn(BAR, x, *ends, np.array([0.0, 0.0, 1.0])) == pytest.approx(angle, abs=0.2)
+        assert turn(BAR, x, axis, fixed=fixed, handle=handle) == pytest.approx(angle, abs=0.2)
     apart = Mesh(
         np.concatenate([BAR.vertices, BAR.vertices + 5.0]),
         np.concatenate([BAR.faces, BAR.faces + BAR.n_vertices]),
     )
-    other = ends[1] + BAR.n_vertices
-    assert turn(apart, apart.vertices, ends[0], other, np.array([0.0, 0.0, 1.0])) is None
+    other = handle + BAR.n_vertices
+    assert turn(apart, apart.vertices, axis, fixed=fixed, handle=other) is None
 
 
 def test_legs_are_less_than_half_a_turn():

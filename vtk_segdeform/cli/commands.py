@@ -248,7 +248,7 @@ def _require_turns(options: Namespace, surface: Surface, fixed: IntArray, x: Flo
         axis, angle = motion.parse_rotation(handle.get("rotate", "z,0"))
         if motion.legs([angle]) > 1 and "matrix" not in handle:
             own = _selected(handle["select"], surface, "handle")
-            found = turn(surface.mesh, x, fixed, own, axis)
+            found = turn(surface.mesh, x, axis, fixed=fixed, handle=own)
             if found is not None and abs(found - angle) > math.pi:
                 raise MeshError(
                     f"{options.output} was written, but the body is not wound by "

@@ -30,8 +30,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import BoolArray, FloatArray, IntArray
-from ..checks import coordinate_text
+from ..arrays import BoolArray, FloatArray, IntArray, coordinate_text
 from ..errors import ConstraintError
 from ..files import open_regular
 

@@ -19,7 +19,7 @@ from ..mesh import Mesh
 
 
 def turn(
-    mesh: Mesh, x: FloatArray, fixed: IntArray, handle: IntArray, axis: FloatArray
+    mesh: Mesh, x: FloatArray, axis: FloatArray, *, fixed: IntArray, handle: IntArray
 ) -> float | None:
     """Return by how many radians the *handle* is turned about *axis* (3,) in the pose *x* (n, 3).
 

@@ -8,9 +8,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole, plain
+from ..arrays import (
+    FloatArray,
+    IntArray,
+    as_ids,
+    as_points,
+    coordinate_text,
+    is_number,
+    is_whole,
+    plain,
+)
 from ..cages import Cage
-from ..checks import coordinate_text, require_sequence, shown
+from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
 from ..mesh import Mesh, SurfacePoint, counted
 

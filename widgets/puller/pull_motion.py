@@ -90,25 +90,14 @@ class PullMotion:
         self._shift = self._base_shift if self.is_turning else self._base_shift + matrix[:3, 3]
         return True
 
-    @property
-    def turn(self) -> float:
-        """The angle of the current turn; see `Motion.turn`."""
-        return self._motion.turn
-
     def of(self, start: FloatArray) -> FloatArray:
         """Return where *start* (3,) is pulled to; once turned, a matrix (4, 4) about it."""
         to = start + self._shift
-        return self._about(start, self._turn) if self.has_turned else np.asarray(to)
-
-    def way(self, start: FloatArray, since: float) -> list[FloatArray]:
-        """Return the matrices (4, 4) on the way from the angle *since*; see `Motion.way`."""
-        turns = (stop[:3, :3] @ self._base_turn for stop in self._motion.way(since))
-        return [self._about(start, turn) for turn in turns]
-
-    def _about(self, start: FloatArray, turn: FloatArray) -> FloatArray:
+        if not self.has_turned:
+            return np.asarray(to)
         matrix = np.eye(4)
-        matrix[:3, :3] = turn
-        matrix[:3, 3] = start + self._shift - turn @ start
+        matrix[:3, :3] = self._turn
+        matrix[:3, 3] = to - self._turn @ start
         return matrix
 
     def _begin(self) -> None:

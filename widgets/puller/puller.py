@@ -7,8 +7,7 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
     shift + wheel, [ ]  smaller, larger radius
     while pulling:
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
-    r           turn the surface around the point instead of moving it, about the line of sight or
-                the axis of x, y, z; again: move it
+    r           turn the surface around the point, about the line of sight or x, y, z; again: move
     control     pull in steps of about 1 % of the diagonal, turn in steps of 5 degrees
     shift       pull slowly; with control in finer steps
     a number, enter             pull by exactly that much along the axis, or in the direction so far
@@ -28,9 +27,8 @@ from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
 from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.mesh import SurfacePoint
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session, automatic_locality
+from vtk_segdeform.session import Change, Session, SurfacePoint, automatic_locality
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
@@ -209,8 +207,7 @@ class Puller(Widget):
         if marker is not None:
             point = SurfacePoint.at_vertex(self._markers.vertex(marker))
         elif hit is not None:
-            corners = self.session.mesh.faces[hit.face]
-            point = SurfacePoint.in_face(self._surface.points, corners, hit.point)
+            point = hit.place
         else:
             return None
         name = self.session.grabbed(point, self.radius)
@@ -218,9 +215,8 @@ class Puller(Widget):
             return self._refuse(LOCKED.format(name))
         if np.isin(point.vertex, self.session.fixed):
             return self._refuse(_FIXED)
-        if not self.session.can_grab(point, self.radius):
-            return self._refuse(_TOO_COARSE)
-        return self._pull(point, press)
+        can_grab = self.session.can_grab(point, self.radius)
+        return self._pull(point, press) if can_grab else self._refuse(_TOO_COARSE)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
         """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
@@ -262,13 +258,11 @@ class Puller(Widget):
         session = self.session
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.begin()
-        start = point.at(self._surface.points)
-        step = step_of(session.mesh.diagonal)
+        start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
         pull = partial(session.pull, point, radius=self.radius, locality=self.locality)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
-        sent, reached, part = 0.0, 0.0, motion.part  # angles: of the last targets, of the pose
         try:
             while (pointer := (yield)).phase is Phase.MOVE:
                 if has_moved and not session.is_dragging:
@@ -283,12 +277,7 @@ class Puller(Widget):
                     continue
                 to = motion.of(start)
                 if self._is_ready():
-                    reached = sent if self._live.has_reached() else reached
-                    reached = reached if motion.part == part else 0.0
-                    way = motion.way(start, reached)
-                    self._live.lead([partial(pull, stop) for stop in way])
                     self._solve(partial(pull, to))
-                    sent, part = motion.turn, motion.part
                     has_moved = has_moved or session.is_dragging  # not if it was refused
                 else:
                     self._live.begin()

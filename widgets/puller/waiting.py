@@ -11,8 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.mesh import SurfacePoint
-from vtk_segdeform.session import StandIn
+from vtk_segdeform.session import StandIn, SurfacePoint
 
 from ..scene import Stop, SurfaceDisplay
 
