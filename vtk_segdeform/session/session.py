@@ -709,9 +709,9 @@ class Session(Timeline):
 
         Notes
         -----
-        Calls with the same vertex, radius and locality belong to one pull until `commit`, which
-        leaves a handle at the grabbed vertex.  When the first map follows points, the surface
-        around the vertex keeps its current shape; see `turned`.
+        Calls with the same point, radius and locality belong to one pull until `commit`, which
+        leaves a handle at the vertex nearest to it.  When the first map follows points, the surface
+        around the point keeps its current shape; see `turned`.
         """
         point = checked_place(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
