@@ -105,7 +105,7 @@ def test_pull_takes_a_position_a_point_or_a_vertex():
             pull(MESH, wrong, place, **quick)
 
 
-def test_a_face_without_a_vertex_within_half_the_radius_is_refused():
+def test_a_face_without_a_vertex_within_the_radius_is_refused():
     corners = np.array([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], dtype=float)
     top = corners + [0.0, 0.0, 1.0]
     sides = [[0, 1, 5], [0, 5, 4], [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7]]

@@ -662,7 +662,7 @@ def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
     assert moved(again, session.vertices) < 1e-4
 
 
-def test_a_face_without_a_vertex_within_half_the_radius_is_not_grabbed():
+def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():
     session = ready()
     assert session.can_grab(INSIDE)
     assert not session.can_grab(INSIDE, radius=0.001 * D)

@@ -136,25 +136,25 @@ def place_text(mesh: Mesh, point: SurfacePoint) -> str:
 def fault_of_grab(mesh: Mesh, point: SurfacePoint, radius: float) -> str:
     """Return why a pull of this *radius* cannot grab *point*: no vertex is near it; or "".
 
-    A pull grabs the surface within `SPREAD` of its radius.  If the nearest corner of the face is
-    farther away than that, the face is so large that the surface cannot follow.  On a cylinder, a
-    box and a plate with edges of 1/3 to 1/31 of their length, pulled by 10 % of the diagonal in
-    the middle of an edge, the surface was off its pose on a dense mesh by
+    If the nearest corner of the face is not within the *radius*, the face is so large that the
+    surface cannot follow.  On a cylinder, a box and a plate with edges of 1/3 to 1/31 of their
+    length, pulled by 10 % of the diagonal in the middle of an edge, the surface was off its pose
+    on a dense mesh by
 
-        distance of the nearest corner / diagonal     .12-.16   .07-.09   .04-.05   .02-.03   .01
-        root mean square / that of the motion         1.3-2.1   .8-1.4    .5-.9     .3-.6     .1-.4
+        distance of the nearest corner, in diagonals   .12-.16  .07-.09  .05-.07  .04-.05  .01-.03
+        root mean square / that of the motion          1.3-2.1  .8-1.4   .6-1.2   .5-.9    .1-.6
 
-    so from 0.075 on, half the default radius, by about as much as it moves.
+    so at the default radius, 0.15, by more than it moves.
     """
     x = mesh.vertices
     away = float(np.linalg.norm(x[list(point.corners)] - point.at(x), axis=1).min())
-    if away <= SPREAD * radius:
+    if away <= radius:
         return ""
-    near, most = (100.0 * length / mesh.diagonal for length in (away, SPREAD * radius))
+    near, most = (100.0 * length / mesh.diagonal for length in (away, radius))
     return (
         f"no vertex is near this point: the nearest one of its face is {near:.3g} % of model size "
-        f"away, and a pull of this radius grabs the surface within {most:.3g} %; subdivide the "
-        "mesh first (segdeform subdivide), or enlarge the radius"
+        f"away, and the radius of the pull is {most:.3g} %; subdivide the mesh first (segdeform "
+        "subdivide), or enlarge the radius"
     )
 
 

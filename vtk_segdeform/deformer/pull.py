@@ -87,7 +87,7 @@ def pull(
     ------
     ConstraintError
         If *vertex*, *to*, *radius*, *pins* or *locality* are invalid, or the faces at the grabbed
-        point are so large that no vertex is within half the radius.
+        point are so large that no vertex is within the radius.
     Cancelled
         If *progress* raised it.
 

@@ -705,7 +705,7 @@ class Session(Timeline):
         ------
         ConstraintError, CageError
             If there is no such vertex, it is fixed, *to* is too far away, or there are no cages;
-            or if the faces at the point are so large that no vertex is within half the radius.
+            or if the faces at the point are so large that no vertex is within the radius.
 
         Notes
         -----
