@@ -828,7 +828,9 @@ class Session(Timeline):
             The handle.
         motion : (4, 4) or (k, 3) float
             An affine map of the targets at the start of the drag, so that moving the mouse back
-            moves the handle back; or a target for each vertex of the handle.
+            moves the handle back.  A handle turns the shorter way from where it is: to wind the
+            body up by 270 degrees, turn it by 90 and by 180 before.  Or a target for each vertex of
+            the handle.
         max_steps, within : int and float, optional
             As in `drag`.
         """
