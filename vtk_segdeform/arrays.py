@@ -135,6 +135,18 @@ def plain(values: ArrayLike, name: str) -> NDArray[Any]:
     return array
 
 
+def coordinate_text(x: float, size: float) -> str:
+    """Return the coordinate *x* in 6 digits, or in as many as show 1e-6 of a mesh's *size*.
+
+    Examples
+    --------
+    >>> coordinate_text(1 / 3, 2.0), coordinate_text(1e6 + 1 / 3, 2.0)
+    ('0.333333', '1000000.33333')
+    """
+    digits = next(d for d in range(6, 17) if d == 16 or abs(x) <= size * 10.0 ** (d - 6))
+    return f"{x:.{digits}g}"
+
+
 def _require_bounded(values: object, name: str) -> None:
     """Raise an ArgumentError where numpy would recurse infinitely or run out of memory.
 

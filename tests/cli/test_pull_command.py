@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+import pyvista as pv
 from given_surfaces import holed, require_only_moved
 from numpy.testing import assert_allclose
 
@@ -14,6 +15,7 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
+from vtk_segdeform.mesh import SurfacePoint
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +72,7 @@ def test_places_far_from_the_origin_have_all_their_digits(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* vertex is at"),
+        (["--at", "9,9,9", "--to", "0,0,1"], "--at is .* away from the surface; .* one is at"),
         (["--at", "0,1", "--to", "0,0,1"], "--at must be three numbers"),
         (
             ["--at", "{top}", "--to", "0,0,9", "--radius", "-1"],
@@ -92,3 +94,51 @@ def test_wrong_options_are_errors_that_name_them(words, says, given, tmp_path, c
     message = capsys.readouterr().err
     assert re.search(says, message), message
     assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def beam(tmp_path) -> str:
+    """Return a file of a beam with vertices at its ends only, as CAD programs write it."""
+    path = tmp_path / "beam.ply"
+    write_mesh(path, pv.Box((0.0, 6.0, 0.0, 1.0, 0.0, 1.0)))
+    return str(path)
+
+
+QUICK = ["--regions", "1", "--cage-vertices", "40"]
+
+
+def test_a_point_in_the_middle_of_a_large_face_is_refused_until_it_is_subdivided(
+    beam, tmp_path, capsys
+):
+    fine, out = str(tmp_path / "fine.ply"), tmp_path / "out.ply"
+    words = ["--at", "2.93,0.37,1", "--to", "2.93,0.37,1.8", *QUICK]
+    assert main(["pull", beam, "-o", str(out), *words]) == 2
+    assert "% of model size away" in (message := capsys.readouterr().err)
+    assert "segdeform subdivide" in message
+    assert not out.exists()
+    assert main(["subdivide", beam, "-o", fine, "--edge", "8"]) == 0
+    before, after = Surface.read(beam), Surface.read(fine)
+    x, edges = after.mesh.vertices, after.mesh.edges
+    assert_allclose(after.given.points[: before.given.n_points], before.given.points, atol=1e-6)
+    assert after.mesh.is_closed
+    longest = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1).max()
+    assert longest < 0.08 * before.mesh.diagonal
+    assert signed_volume(x, after.mesh.faces) == pytest.approx(6.0, rel=1e-6)
+    assert main(["pull", fine, "-o", str(out), *words]) == 0
+    assert "a point between the vertices" in capsys.readouterr().out
+    point = SurfacePoint.nearest(after.mesh, np.array([2.93, 0.37, 1.0]))
+    assert len(point.corners) == 3
+    assert_allclose(point.at(Surface.read(out).mesh.vertices), [2.93, 0.37, 1.8], atol=1e-3)
+
+
+def test_a_pin_in_the_middle_of_a_large_face_is_refused(beam, tmp_path, capsys):
+    words = ["--at", "0.1,0.1,1", "--to", "0.1,0.1,1.5", "--pin", "3,0.5,0", *QUICK]
+    assert main(["pull", beam, "-o", str(tmp_path / "out.ply"), *words]) == 2
+    assert "--pin: no vertex is near this point" in capsys.readouterr().err
+
+
+def test_edges_are_subdivided_by_a_sensible_share_only(beam, tmp_path, capsys):
+    for edge in ("0", "-1", "nan", "101"):
+        words = ["subdivide", beam, "-o", str(tmp_path / "out.ply"), f"--edge={edge}"]
+        assert main(words) == 2
+        assert "--edge must be from 0.5 to 100" in capsys.readouterr().err

@@ -22,7 +22,7 @@ from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import Finisher
 from vtk_segdeform.geometry import distortion
 from vtk_segdeform.io.surface import Surface
-from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
@@ -78,14 +78,14 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
     places = local._constraints.pulled.moved(local._constraints.places(local._targets))
     assert np.abs(solver.unbalanced(p, places)).max() < 1e-12 * np.abs(solver._hessian).max()
     assert local.solve(X[[HIGH]] + UP).steps == 0
-    assert list(local._constraints.pulled.vertices) == [HIGH]  # not as a single vertex
+    assert local._constraints.pulled.points == (SurfacePoint.at_vertex(HIGH),)
 
 
 @pytest.mark.parametrize(
     ("follows", "free"), [(0.0, range(6, 11)), (0.1, range(6, 11)), (0.5, range(6, 12))]
 )
 def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows, free):
-    weights = np.diag(chain().quadratic(8, 2.0, follows)) * 12
+    weights = np.diag(chain().quadratic(SurfacePoint.at_vertex(8), 2.0, follows)) * 12
     assert set(np.flatnonzero(weights == 0.0)) == set(free)
     assert weights[:6] == pytest.approx((np.arange(8, 2, -1) ** 2 / 4.0 - 1.0) ** 2)
 
@@ -95,20 +95,20 @@ def test_another_body_stays():
     edges = samples.edges.tolil()
     edges[3, 4] = edges[4, 3] = 0.0
     apart = replace(samples, edges=edges.tocsr())
-    weights = np.diag(apart.quadratic(8, 3.0, 1.0)) * 12
+    weights = np.diag(apart.quadratic(SurfacePoint.at_vertex(8), 3.0, 1.0)) * 12
     assert (weights[:4] > 1e3).all()
-    assert not np.diag(apart.quadratic(8, np.inf, 0.0)).any()
+    assert not np.diag(apart.quadratic(SurfacePoint.at_vertex(8), np.inf, 0.0)).any()
 
 
 def test_a_soft_row_reproduces_affine_maps():
     samples = held()._samples
     rest = held()._rest.vertices
-    row = samples.soft_row(HIGH, rest[HIGH], 0.15)
+    row = samples.soft_row(SurfacePoint.at_vertex(HIGH), rest[HIGH], 0.15)
     cages = held()._rest_cages
     affine = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.3], [0.0, -0.2, 1.0]])
     assert_allclose(row @ (cages @ affine), rest[HIGH] @ affine, atol=1e-3)
     assert row.sum() == pytest.approx(1.0)
-    assert samples.soft_row(HIGH, rest[HIGH], 1e-6) is None
+    assert samples.soft_row(SurfacePoint.at_vertex(HIGH), rest[HIGH], 1e-6) is None
 
 
 def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_one():
@@ -318,7 +318,7 @@ def test_only_rings_that_would_bend_resist():
 
 def test_a_ring_has_its_vertex_as_an_affine_mean_of_the_neighbours():
     mesh = coarse().mesh
-    ring = Ring.around(mesh, mesh.vertices, 5)
+    ring = Ring.around(mesh, mesh.vertices, SurfacePoint.at_vertex(5))
     around = np.setdiff1d(mesh.adjacency[[5]].indices, [5])
     assert ring.vertices.tolist() == [5, *around]
     assert_allclose(ring.combinations.sum(axis=1), 0.0, atol=1e-12)

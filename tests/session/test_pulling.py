@@ -18,7 +18,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
-from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.pulling import automatic_locality
 from vtk_segdeform.session.session import Session
@@ -557,7 +557,8 @@ def test_a_tiny_or_a_huge_radius_is_no_error():
 
 def test_the_locality_of_another_mesh_is_refused():
     state = pulled().state
-    for wrong in ({"vertex": len(X)}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
+    off = SurfacePoint.at_vertex(len(X))
+    for wrong in ({"point": off}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
         broken = replace(state, locality=replace(state.locality, **wrong))
         with pytest.raises(ConstraintError):
             Session(MESH, state=broken)
@@ -603,3 +604,69 @@ def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
     assert session.undo() == "convert pin 1 to handle 1"
     assert (set(session.handles), session.state.pulls) == ({"pull 1", "pin 1"}, ("pull 1",))
     assert_array_equal(session.vertices, before)
+
+
+FACE = MESH.faces[int(np.argmax(X[MESH.faces].mean(axis=1)[:, 2]))]
+INSIDE = SurfacePoint.of(FACE, [0.3, 0.4, 0.3])
+
+
+def test_a_pull_moves_the_grabbed_point_of_a_face_and_its_handle_stays_where_it_was_left():
+    session, place = ready(), INSIDE.at(X)
+    session.pin(LOW)
+    for share in (0.5, 1.0, 3.0):
+        session.pull(INSIDE, place + share * UP)
+        off = np.linalg.norm(INSIDE.at(session.vertices) - place - share * UP)
+        assert off < 1e-4 * D
+        assert session.solution.handle_error < 1e-4
+    session.commit()
+    assert list(session.handles["pull 1"]) == [INSIDE.vertex]
+    assert session.grabbed(INSIDE) == "pull 1"
+    before = session.vertices
+    session.refine()
+    assert moved(session, before) < 1e-4
+    session.move_handle("pin 1", np.eye(4))
+    assert np.linalg.norm(session.vertices[INSIDE.vertex] - before[INSIDE.vertex]) < 1e-3 * D
+    session.revert()
+    other = SurfacePoint.of(FACE, [0.6, 0.1, 0.3])
+    start = other.at(session.vertices)
+    for radius, names in ((0.1 * D, ["pull 1", "pull 2"]), (0.5 * D, ["pull 1"])):
+        session.pull(other, start + UP, radius=radius)  # beside it, or as the same one
+        assert np.linalg.norm(other.at(session.vertices) - start - UP) < 1e-4 * D
+        assert list(session.handles) == ["pin 1", *names]
+        session.revert()
+
+
+def test_the_finish_of_a_pulled_point_of_a_face_keeps_it_at_its_target():
+    session, place = ready(), INSIDE.at(X)
+    session.pull(INSIDE, place + 3.0 * UP)
+    session.commit()
+    before = session.vertices
+    session.finish()
+    assert moved(session, before) > 1e-4
+    assert_allclose(INSIDE.at(session.vertices), place + 3.0 * UP, atol=1e-9)
+    session.revert()
+    to = place + 3.0 * UP + UP[::-1]  # sideways: the face turns
+    session.pull(INSIDE, to)
+    assert np.linalg.norm(INSIDE.at(session.vertices) - to) < 1e-3 * D
+    assert session.solution.handle_error < 1e-3
+
+
+def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
+    session, place = ready(), INSIDE.at(X)
+    session.pull(INSIDE, place + UP)
+    session.commit()
+    save_session(tmp_path / "pulled.segdeform", session)
+    again = load_session(tmp_path / "pulled.segdeform")
+    assert again.state.locality.point == INSIDE
+    again.refine()
+    assert moved(again, session.vertices) < 1e-4
+
+
+def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():
+    session = ready()
+    assert session.can_grab(INSIDE)
+    assert not session.can_grab(INSIDE, radius=0.001 * D)
+    assert session.can_grab(HIGH, radius=0.001 * D)
+    with pytest.raises(ConstraintError, match="no vertex is near this point"):
+        session.pull(INSIDE, INSIDE.at(X) + UP, radius=0.001 * D)
+    assert session.state.pose is None

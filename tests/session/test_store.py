@@ -104,7 +104,7 @@ def locality(session: Session) -> list[object]:
     if last is None:
         return []
     kept = np.concatenate(last.cage_vertices)
-    return [last.vertex, last.reach, last.spread, last.follows, kept.tobytes()]
+    return [last.point, last.reach, last.spread, last.follows, kept.tobytes()]
 
 
 def saved(session: Session, folder: Path) -> bytes:
@@ -408,7 +408,15 @@ WRONG = [
     ({"header": {"locality": 3}}, "locality must be a list"),
     ({"header": {"locality": [2, None, 0.1]}}, "locality must have 4 entries"),
     ({"header": {"locality": [2.5, None, 0.1, 0.5]}}, "locality must be a whole number"),
-    ({"header": {"locality": [99, None, 0.1, 0.5]}}, "there is no vertex 99"),
+    (
+        {"header": {"locality": [99, None, 0.1, 0.5]}},
+        "whole number, 0 to 5; got 99",
+    ),
+    ({"header": {"pulled_point": [[0, 99], [0.5, 0.5]]}}, "0 to 5; got 99"),
+    ({"header": {"pulled_point": [[0, 1], [0.5, 0.6]]}}, "must have positive shares"),
+    ({"header": {"pulled_point": [[0, 1], ["a", 0.6]]}}, "is not a readable session file"),
+    ({"header": {"pulled_point": [0, 1]}}, "is not a readable session file"),
+    ({"header": {"pulled_point": [[0, 1]]}}, "is not a readable session file"),
     ({"header": {"locality": [2, -1.0, 0.1, 0.5]}}, "radius of a pull must be positive"),
     ({"header": {"locality": [2, "far", 0.1, 0.5]}}, "radius of a pull must be positive"),
     ({"header": {"locality": [2, None, None, 0.5]}}, "radius of a pull must be positive"),
@@ -422,7 +430,7 @@ WRONG = [
 
 @pytest.mark.parametrize(("change", "says"), WRONG)
 def test_a_file_that_was_tampered_with_is_refused_and_the_fault_named(change, says, tmp_path):
-    of_pulls = {"locality", "pulls"} & {*change, *change.get("header", {})}
+    of_pulls = {"locality", "pulls", "pulled_point"} & {*change, *change.get("header", {})}
     content = rewritten(saved(shared(pulled) if of_pulls else shared(tiny), tmp_path), **change)
     assert re.search(says, refuse(content, tmp_path))
 

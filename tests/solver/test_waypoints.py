@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from solids import rotation, somewhere
 
-from vtk_segdeform.solver.waypoints import is_half_turn, waypoints
+from vtk_segdeform.solver.waypoints import waypoints
 
 ALL = [np.arange(50)]
 
@@ -76,9 +76,3 @@ def test_a_change_of_shape_is_spread_evenly_over_the_waypoints():
     assert len(way) >= 4
     for leg, targets in enumerate(way, 1):
         assert_allclose(targets, start + leg / len(way) * (end - start), atol=1e-9)
-
-
-@pytest.mark.parametrize(("degrees", "expected"), [(180.0, True), (179.99, False), (0.0, False)])
-def test_half_a_turn_is_known_as_such(degrees, expected):
-    start = somewhere(size=0.1) + [0.0, 0.0, 0.4]
-    assert is_half_turn(start, start @ rotation([1, 2, 0], np.radians(degrees)).T, ALL) is expected

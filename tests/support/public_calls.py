@@ -429,6 +429,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "subtract": lambda: False,
     "surface": surface,
     "targets": _targets,
+    "through": lambda: [_targets()],
     "to": lambda: mesh().vertices[100] + [0.0, 0.0, 0.1],
     "tolerance": lambda: 1e-6,
     "vertex": lambda: 100,

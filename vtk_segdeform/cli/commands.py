@@ -7,6 +7,7 @@ the exit code.
 
 from __future__ import annotations
 
+import math
 import time
 from argparse import Namespace
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, clamped, finished
+from ..deformer import Deformer, clamped, finished, solved_along
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -39,6 +40,7 @@ from .outputs import (
     report_volume,
 )
 from .selection import Role, parse_selection
+from .turns import turn
 
 SESSION = ".segdeform"  # suffix of session files
 LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
@@ -56,13 +58,13 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
         enclosed = lids_of(mesh, LIDS[options.lids])
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = _selected(options.fixed, surface, "fixed")
-    handle, targets = _handles(options.handles, surface, fixed)
+    handle, path = _handles(options.handles, surface, fixed)
     found = _regions(options, surface, part(progress, 0.0, 0.18))
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[fixed] = True
     regions, rigid = clamped(
-        found, fixed=is_fixed, handle=handle, targets=targets, n_cage_vertices=size
+        found, fixed=is_fixed, handle=handle, targets=path[-1], n_cage_vertices=size
     )
     cages = fit_cages(mesh, regions, size, fixed=rigid, progress=part(progress, 0.18, 0.6))
     report_regions(regions, say)
@@ -73,7 +75,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
-    solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
+    solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     report_solution(solution, time.perf_counter() - start, say)
     report_pose(solution, mesh, say, avoids_contact=options.avoid_contact)
@@ -87,6 +89,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
             f"{options.output} was written, but a handle misses its target by "
             f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
         )
+    _require_turns(options, surface, fixed, solution.vertices)
     return True
 
 
@@ -209,10 +212,9 @@ def _settings(options: Namespace) -> dict[str, Any]:
 
 def _handles(
     handles: list[dict[str, str]], surface: Surface, fixed: IntArray
-) -> tuple[IntArray, FloatArray]:
-    """Return the vertices (k,) of all handles and their targets (k, 3)."""
-    ids, targets, mesh = [], [], surface.mesh
-    fixed_centre = mesh.vertices[fixed].mean(axis=0)
+) -> tuple[IntArray, list[FloatArray]]:
+    """Return the vertices (k,) of all handles, and their targets (k, 3): on the way, and last."""
+    ids, mesh = [], surface.mesh
     for handle in handles:
         if len(handle) == 1:
             raise ConstraintError(
@@ -220,15 +222,45 @@ def _handles(
                 "after it"
             )
         ids.append(_selected(handle["select"], surface, "handle"))
-        targets.append(_moved(mesh.vertices[ids[-1]], handle, fixed_centre))
     together = np.concatenate(ids)
     if len(np.unique(together)) < len(together):
         raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
-    return together, np.concatenate(targets)
+    at_rest, centre = [mesh.vertices[own] for own in ids], mesh.vertices[fixed].mean(axis=0)
+    pairs = list(zip(at_rest, handles, strict=True))
+    return together, [
+        np.concatenate([_moved(points, handle, centre, share) for points, handle in pairs])
+        for share in _shares(handles)
+    ]
 
 
-def _moved(points: FloatArray, handle: dict[str, str], fixed_centre: FloatArray) -> FloatArray:
-    """Apply the matrix, the rotation and the translation of a handle, in this order.
+def _shares(handles: list[dict[str, str]]) -> list[float]:
+    """Return the shares of the rotations at which the handles stop on the way; the last is 1."""
+    turned = [handle for handle in handles if "rotate" in handle]
+    count = motion.legs([motion.parse_rotation(handle["rotate"])[1] for handle in turned])
+    begins = [0.0] if any("matrix" in handle for handle in turned) else []
+    return [*begins, *((k + 1) / count for k in range(count))]
+
+
+def _require_turns(options: Namespace, surface: Surface, fixed: IntArray, x: FloatArray) -> None:
+    """Raise a MeshError if the pose *x* (n, 3) has lost turns of a handle."""
+    for handle in options.handles:
+        axis, angle = motion.parse_rotation(handle.get("rotate", "z,0"))
+        if motion.legs([angle]) > 1 and "matrix" not in handle:
+            own = _selected(handle["select"], surface, "handle")
+            found = turn(surface.mesh, x, axis, fixed=fixed, handle=own)
+            if found is not None and abs(found - angle) > math.pi:
+                raise MeshError(
+                    f"{options.output} was written, but the body is not wound by "
+                    f"{math.degrees(angle):.4g} degrees: it has snapped back to "
+                    f"{math.degrees(found):.0f}; turn less, or leave more room between handle and "
+                    f"fixed vertices"
+                )
+
+
+def _moved(
+    points: FloatArray, handle: dict[str, str], fixed_centre: FloatArray, share: float = 1.0
+) -> FloatArray:
+    """Apply the matrix, and a *share* of the rotation and of the translation, in this order.
 
     *fixed_centre* (3,) is the mean of the fixed vertices.
     """
@@ -239,7 +271,7 @@ def _moved(points: FloatArray, handle: dict[str, str], fixed_centre: FloatArray)
         pivot = handle.get("pivot", "handle")
         centres = {"handle": points.mean(axis=0), "fixed": fixed_centre}
         centre = centres[pivot] if pivot in centres else motion.parse_vector(pivot, "pivot")
-        points = motion.transform(points, motion.rotation(axis, angle, centre))
+        points = motion.transform(points, motion.rotation(axis, share * angle, centre))
     if "translate" in handle:
-        points = points + motion.parse_vector(handle["translate"], "translate")
+        points = points + share * motion.parse_vector(handle["translate"], "translate")
     return points

@@ -47,6 +47,7 @@ COMMANDS = {
     "serve": "serving",
     "replay": "replaying",
     "check": "checking",
+    "subdivide": "subdividing",
     "regions": "commands",
     "cages": "commands",
     "bench": "bench",
@@ -74,6 +75,7 @@ examples:
   segdeform demo -o demo-output
   segdeform pull horse.ply -o pulled.ply --at 0.1,0,0.9 --to 0.2,0,1.1
   segdeform check scan.ply --repair -o closed.ply
+  segdeform subdivide part.stl -o fine.stl
   segdeform edit horse.ply -o bent.ply
   segdeform app horse.ply
   segdeform serve horse.ply --open
@@ -296,6 +298,11 @@ def _parser() -> argparse.ArgumentParser:
     text = "fill holes of at most this many edges (default: 100)"
     sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
 
+    sub = add_command("subdivide", "split long edges, so that large faces can be pulled")
+    _input_output(sub, "the subdivided mesh, of triangles", required=True)
+    text = "longest edge, in %% of the diagonal (default: 5)"
+    sub.add_argument("--edge", type=float, default=5.0, metavar="PERCENT", help=text)
+
     sub = add_command("regions", "divide a mesh into regions")
     _input_output(sub, 'the mesh with point arrays "region" and "regions_here", and colours')
     _regions(sub)
@@ -416,8 +423,10 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     handle = parser.add_argument_group("handles (motion options follow the handle they apply to)")
     for name, metavar, text in [
         ("handle", "SEL", "handle vertices; may be repeated"),
-        ("matrix", "FILE", "4x4 matrix, applied first"),
-        ("rotate", "AXIS,DEGREES", "rotation, applied second: z,60 or 1,0,1,60"),
+        ("matrix", "FILE", "4x4 matrix, applied first; it tells no turns: in it, a rotation by 270 "
+         "degrees is one by -90"),
+        ("rotate", "AXIS,DEGREES", "rotation, applied second: z,60 or 1,0,1,60; the body is turned "
+         "in this direction, and with z,720 wound twice"),
         ("pivot", "X,Y,Z", "pivot of the rotation: a point, or the centre of 'fixed' or 'handle' "
          "(default: handle)"),
         ("translate", "X,Y,Z", "translation, applied last"),

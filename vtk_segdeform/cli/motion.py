@@ -11,12 +11,17 @@ Rodrigues' formula, where K is the cross-product matrix of the unit axis:
     R = 1 + sin(angle) K + (1 - cos(angle)) K^2
 
 Angles are in degrees in the options, and in radians everywhere else.
+
+M does not tell how many turns the rotation has, and the solver turns a handle the shorter way.  So
+where a rotation has half a turn or more, or follows a matrix, the handles go through targets on the
+way, in which the shares s = 1/n, 2/n, ... of their rotations and translations are made.
 """
 
 from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +30,7 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, as_points
 from ..errors import ConstraintError
 
+_LEG = 0.5 * math.pi  # between targets on the way of a far rotation, at most
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -40,18 +46,6 @@ def parse_vector(text: str, name: str) -> FloatArray:
     if len(numbers) != 3:
         raise ConstraintError(f"{name} must be three numbers, x,y,z; got {text!r}")
     return numbers
-
-
-def coordinate_text(x: float, size: float) -> str:
-    """Return the coordinate *x* in 6 digits, or in as many as show 1e-6 of a mesh's *size*.
-
-    Examples
-    --------
-    >>> coordinate_text(1 / 3, 2.0), coordinate_text(1e6 + 1 / 3, 2.0)
-    ('0.333333', '1000000.33333')
-    """
-    digits = next(d for d in range(6, 17) if d == 16 or abs(x) <= size * 10.0 ** (d - 6))
-    return f"{x:.{digits}g}"
 
 
 def parse_rotation(text: str) -> tuple[FloatArray, float]:
@@ -75,6 +69,16 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
     if len(axis) != 3 or len(numbers) != 1 or length == 0.0:
         raise ConstraintError(f"rotate must be {form} (z,60 or 1,0,1,60); got {text!r}")
     return axis / length, math.radians(numbers[0])
+
+
+def legs(angles: Sequence[float]) -> int:
+    """Return the number of equal legs of rotations by *angles*, each the shorter way.
+
+    >>> legs([1.0, 3.1]), legs([-math.pi]), legs([1.0, 1.5 * math.pi]), legs([])
+    (1, 2, 3, 1)
+    """
+    largest = max(map(abs, angles), default=0.0)
+    return math.ceil(largest / _LEG - 1e-9) if largest > math.pi * (1.0 - 1e-9) else 1
 
 
 def read_matrix(path: str | Path) -> FloatArray:

@@ -5,22 +5,19 @@ from __future__ import annotations
 import time
 from argparse import Namespace
 
-import numpy as np
-
 from .. import io
 from ..arrays import FloatArray
+from ..deformer import checked_place, checked_radius, fault_of_grab, place_text
 from ..deformer import pull as pulled
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
-from ..mesh import Mesh, distance_to_surface
+from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
 from .commands import LIDS
-from .motion import coordinate_text, parse_vector
+from .motion import parse_vector
 from .outputs import HANDLE_TOLERANCE, Say, report_pose, report_surface, report_volume
-
-_FARTHEST = 0.05  # diagonals between a given point and the surface
 
 
 def pull(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -35,15 +32,15 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     report_surface(surface, say)
     if not mesh.is_closed:
         say(f"volume          {lids_of(mesh, lids).summary(preserved=True)}")
-    vertex = _nearest(mesh, at, "at")
-    pinned = [_nearest(mesh, pin, "pin") for pin in pins]
-    say(f"grabbed         vertex {vertex} of the mesh at {_place(mesh, vertex)}")
+    point, radius = checked_place(mesh, at, "--at"), checked_radius(mesh, options.radius)
+    say(f"grabbed         {_named(point)} of the mesh at {place_text(mesh, point)}")
+    pinned = [_pinned(mesh, pin, radius, say) for pin in pins]
     start = time.perf_counter()
     solution = pulled(
         mesh,
-        vertex,
+        point,
         to,
-        options.radius,
+        radius,
         pins=pinned,
         locality=options.local,
         n_regions=options.regions,
@@ -62,7 +59,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(
-            options.picture, mesh, solution.vertices, fixed=pinned, handle=[vertex]
+            options.picture, mesh, solution.vertices, fixed=pinned, handle=point.corners
         )
         say(f"written         {options.picture}")
     if solution.handle_error > HANDLE_TOLERANCE:
@@ -73,17 +70,18 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     return True
 
 
-def _nearest(mesh: Mesh, point: FloatArray, name: str) -> int:
-    """Return the vertex nearest to *point* (3,); ConstraintError if it is far from the surface."""
-    vertex = int(np.linalg.norm(mesh.vertices - point, axis=1).argmin())
-    apart = float(distance_to_surface(point[None], mesh.vertices, mesh.faces)[0]) / mesh.diagonal
-    if apart > _FARTHEST:
-        raise ConstraintError(
-            f"--{name} is {100 * apart:.3g} % of model size away from the surface; give a point on "
-            f"it. The nearest vertex is at {_place(mesh, vertex)}"
-        )
-    return vertex
+def _pinned(mesh: Mesh, place: FloatArray, radius: float, say: Say) -> int:
+    """Return the vertex that is pinned at *place* (3,): the nearest corner of the face there."""
+    point = checked_place(mesh, place, "--pin")
+    if fault := fault_of_grab(mesh, point, radius):
+        raise ConstraintError(f"--pin: {fault}")
+    vertex = SurfacePoint.at_vertex(point.vertex)
+    say(f"pinned          {_named(vertex)} of the mesh at {place_text(mesh, vertex)}")
+    return vertex.vertex
 
 
-def _place(mesh: Mesh, vertex: int) -> str:
-    return ",".join(coordinate_text(x, mesh.diagonal) for x in mesh.vertices[vertex])
+def _named(point: SurfacePoint) -> str:
+    """Return "vertex 3", or "a point between the vertices 3, 5, 8"."""
+    if point.is_vertex:
+        return f"vertex {point.vertex}"
+    return f"a point between the vertices {', '.join(map(str, point.corners))}"

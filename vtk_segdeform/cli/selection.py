@@ -30,10 +30,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray, coordinate_text
 from ..errors import ConstraintError
 from ..files import open_regular
-from .motion import coordinate_text
 
 Role = Literal["fixed", "handle"]
 

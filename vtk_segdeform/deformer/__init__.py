@@ -20,14 +20,17 @@ from .arguments import (
     automatic_locality,
     checked_constraints,
     checked_locality,
+    checked_place,
     checked_point,
     checked_radius,
     checked_targets,
     checked_vertex,
+    fault_of_grab,
+    place_text,
     reach_and_follows,
 )
 from .clamping import clamped
-from .deform import deform, finished
+from .deform import deform, finished, solved_along
 from .deformer import Deformer
 from .pull import pull
 
@@ -39,13 +42,17 @@ __all__ = [
     "automatic_locality",
     "checked_constraints",
     "checked_locality",
+    "checked_place",
     "checked_point",
     "checked_radius",
     "checked_targets",
     "checked_vertex",
     "clamped",
     "deform",
+    "fault_of_grab",
     "finished",
+    "place_text",
     "pull",
     "reach_and_follows",
+    "solved_along",
 ]

@@ -8,13 +8,24 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points, is_number, is_whole, plain
+from ..arrays import (
+    FloatArray,
+    IntArray,
+    as_ids,
+    as_points,
+    coordinate_text,
+    is_number,
+    is_whole,
+    plain,
+)
 from ..cages import Cage
 from ..checks import require_sequence, shown
 from ..errors import ArgumentError, CageError, ConstraintError
-from ..mesh import Mesh, counted
+from ..mesh import Mesh, SurfacePoint, counted
 
 _FARTHEST = 1e3  # sizes of the mesh
+_FARTHEST_OFF = 0.05  # diagonals between a given point and the surface
+_ROUNDING = 1e-9  # of the sum of shares
 _PULL_RADIUS = 0.15  # diagonals of the mesh
 _PINNED_LOCALITY, _ENOUGH = 0.05, 3  # with fewer fixed points, about which the body can turn
 LOCALITY, SPREAD = 0.2, 0.5
@@ -88,6 +99,76 @@ def checked_vertex(mesh: Mesh, vertex: int) -> int:
         last = mesh.n_vertices - 1
         raise ConstraintError(f"vertex must be a whole number, 0 to {last}; got {shown(vertex)}")
     return int(vertex)
+
+
+def checked_place(
+    mesh: Mesh, vertex: int | ArrayLike | SurfacePoint, name: str = "vertex"
+) -> SurfacePoint:
+    """Return the point of the surface that is a vertex, or nearest to a point (3,) at rest.
+
+    It is called *name* in messages.
+
+    Raises
+    ------
+    ConstraintError
+        If there is no such vertex, or the point is far from the surface.
+    """
+    if isinstance(vertex, SurfacePoint):
+        return _checked_surface_point(mesh, vertex)
+    if plain(vertex, name).ndim == 0:
+        return SurfacePoint.at_vertex(checked_vertex(mesh, vertex))  # type: ignore[arg-type]
+    place = checked_point(vertex, name)
+    point = SurfacePoint.nearest(mesh, place)
+    apart = float(np.linalg.norm(point.at(mesh.vertices) - place)) / mesh.diagonal
+    if apart > _FARTHEST_OFF:
+        raise ConstraintError(
+            f"{name} is {100 * apart:.3g} % of model size away from the surface; give a point on "
+            f"it. The nearest one is at {place_text(mesh, point)}"
+        )
+    return point
+
+
+def place_text(mesh: Mesh, point: SurfacePoint) -> str:
+    """Return the coordinates of *point* at rest as text: "0.5,0,2"."""
+    return ",".join(coordinate_text(x, mesh.diagonal) for x in point.at(mesh.vertices))
+
+
+def fault_of_grab(mesh: Mesh, point: SurfacePoint, radius: float) -> str:
+    """Return why a pull of this *radius* cannot grab *point*: no vertex is near it; or "".
+
+    If the nearest corner of the face is not within the *radius*, the face is so large that the
+    surface cannot follow.  On a cylinder, a box and a plate with edges of 1/3 to 1/31 of their
+    length, pulled by 10 % of the diagonal in the middle of an edge, the surface was off its pose
+    on a dense mesh by
+
+        distance of the nearest corner, in diagonals   .12-.16  .07-.09  .05-.07  .04-.05  .01-.03
+        root mean square / that of the motion          1.3-2.1  .8-1.4   .6-1.2   .5-.9    .1-.6
+
+    so at the default radius, 0.15, by more than it moves.
+    """
+    x = mesh.vertices
+    away = float(np.linalg.norm(x[list(point.corners)] - point.at(x), axis=1).min())
+    if away <= radius:
+        return ""
+    near, most = (100.0 * length / mesh.diagonal for length in (away, radius))
+    return (
+        f"no vertex is near this point: the nearest one of its face is {near:.3g} % of model size "
+        f"away, and the radius of the pull is {most:.3g} %; subdivide the mesh first (segdeform "
+        "subdivide), or enlarge the radius"
+    )
+
+
+def _checked_surface_point(mesh: Mesh, point: SurfacePoint) -> SurfacePoint:
+    corners = [checked_vertex(mesh, vertex) for vertex in point.corners]
+    joined = mesh.adjacency[corners][:, corners].nnz == len(corners) * (len(corners) - 1)
+    shares = np.asarray(point.shares, dtype=np.float64)
+    is_mean = len(shares) == len(corners) > 0 and bool((shares > 0.0).all())
+    if not (joined and len(corners) <= 3 and is_mean and abs(shares.sum() - 1.0) < _ROUNDING):
+        raise ConstraintError(
+            f"a point of the surface must have positive shares, with the sum 1, of the corners of "
+            f"one face; got {shown(point)}"
+        )
+    return point
 
 
 def checked_radius(mesh: Mesh, radius: float | None) -> float:

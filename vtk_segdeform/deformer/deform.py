@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import sizes
+from ..arrays import FloatArray
 from ..cages import fit_cages, suggested_size
-from ..checks import as_flag
+from ..checks import as_flag, require_sequence
 from ..errors import Cancelled, ConstraintError, SegDeformError
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
@@ -33,6 +36,7 @@ def deform(
     handle: ArrayLike,
     targets: ArrayLike,
     *,
+    through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
@@ -54,7 +58,10 @@ def deform(
         Vertices that stay in place, and vertices that follow *targets*.
     targets : (len(handle), 3) float
         Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
-        mask).
+        mask).  A handle turns the shorter way to them, or from the last ones of *through*.
+    through : sequence of (len(handle), 3) float
+        Targets on the way, such as those of a quarter and of half a turn before those of
+        three quarters; each less than half a turn from the last ones.
     n_regions : int, optional
         Number of regions; by default one for each limb and one for the trunk, see `segment`.  Fixed
         parts and handles that move rigidly become regions of their own.
@@ -99,14 +106,16 @@ def deform(
         raise ConstraintError(
             "deform requires at least one vertex in handle; got none. Select the vertices to move"
         )
-    places = checked_targets(targets, len(moves))
+    require_sequence(through, "through")
+    path = [checked_targets(each, len(moves), "through") for each in through]
+    path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
     regions = segment(mesh, n_regions, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[stays] = True
     regions, rigid = clamped(
-        regions, fixed=is_fixed, handle=moves, targets=places, n_cage_vertices=size
+        regions, fixed=is_fixed, handle=moves, targets=path[-1], n_cage_vertices=size
     )
     cages = fit_cages(mesh, regions, size, fixed=rigid, progress=next(stages))
     deformer = Deformer(
@@ -121,12 +130,12 @@ def deform(
         avoid_contact=avoid_contact,
         progress=next(stages),
     )
-    solution = deformer.solve(targets, progress=next(stages))
+    solution = solved_along(deformer, path, progress=next(stages))
     last = next(stages)
     if not avoid_contact:
         return finished(deformer, solution, refine, progress=last)
     solution = finished(deformer, solution, refine, progress=part(last, 0.0, 0.5))
-    solution = _kept_apart(deformer, solution, targets, refine, part(last, 0.5, 1.0))
+    solution = _kept_apart(deformer, solution, path, refine, part(last, 0.5, 1.0))
     tell(last, 1.0, "solved")
     return solution
 
@@ -134,7 +143,7 @@ def deform(
 def _kept_apart(
     deformer: Deformer,
     solution: Solution,
-    targets: ArrayLike,
+    path: Sequence[FloatArray],
     refine: bool | None,
     progress: Progress | None,
 ) -> Solution:
@@ -142,9 +151,21 @@ def _kept_apart(
     if not len(solution.crossings()):
         return solution
     firm = deformer.with_firm_contact()
-    again = firm.solve(targets, progress=part(progress, 0.0, 0.5))
+    again = solved_along(firm, path, progress=part(progress, 0.0, 0.5))
     again = finished(firm, again, refine, progress=part(progress, 0.5, 1.0))
     return again if len(again.crossings()) < len(solution.crossings()) else solution
+
+
+def solved_along(
+    deformer: Deformer, path: Sequence[FloatArray], *, progress: Progress | None = None
+) -> Solution:
+    """Return the pose for the last targets (k, 3) of *path*, solved for the others before it."""
+    steps = 0
+    for number, targets in enumerate(path):
+        ends = number / len(path), (number + 1) / len(path)
+        solution = deformer.solve(targets, progress=part(progress, *ends))
+        steps += solution.steps
+    return replace(solution, steps=steps)
 
 
 def checked_refine(refine: bool | None) -> bool | None:

@@ -42,7 +42,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray, as_numbers, is_number
+from ..arrays import BoolArray, FloatArray, IntArray, as_numbers, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
@@ -51,7 +51,7 @@ from ..finish import CellEnergy, Finisher, Unbalanced
 from ..freezing import read_only
 from ..geometry import Lids, lids_of, turned_over
 from ..kernels import compiled_kernels, one_blas_thread
-from ..mesh import Mesh, connected, new_crossings, require_mesh
+from ..mesh import Mesh, SurfacePoint, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import (
@@ -74,7 +74,6 @@ from ..solver import (
     are_met,
     connected_sets,
     errors_at,
-    is_half_turn,
     moved_along,
     position_term,
     region_volumes,
@@ -88,8 +87,8 @@ from .arguments import (
     check_distance,
     check_options,
     checked_constraints,
+    checked_place,
     checked_targets,
-    checked_vertex,
     require_together,
     stacked_cages,
 )
@@ -138,7 +137,8 @@ class _PulledPoints:
 
     places: IntArray = field(default_factory=lambda: _NONE)  # (q,), among the places of all sets
     targets: IntArray = field(default_factory=lambda: _NONE)  # (q,), their targets
-    vertices: IntArray = field(default_factory=lambda: _NONE)  # (q,)
+    points: tuple[SurfacePoint, ...] = ()  # (q,)
+    levers: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from their vertices
     rows: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, m), of W~
     offsets: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from target to x~
     spread: float = 0.0  # within which they pull, in the mesh's unit
@@ -151,6 +151,10 @@ class _PulledPoints:
         places = places.copy()
         places[self.places] += self.offsets
         return places
+
+    def at(self, x: FloatArray) -> FloatArray:
+        """Return where the points of the mesh *x* (n, 3) are, (q, 3)."""
+        return np.array([point.at(x) for point in self.points]).reshape(-1, 3)
 
     def correct(self, off: FloatArray, error: float) -> None:
         """Move x~ by how far the vertices are *off* their targets, (q, 3), at most by *error*."""
@@ -186,6 +190,16 @@ class _Approach:
             return False
         self.calls, self.next = 0, None
         return True
+
+
+class _HandlePoint(NamedTuple):
+    """A point of the surface that the target of a handle vertex moves."""
+
+    place: int
+    """Among those of all sets."""
+    point: SurfacePoint
+    is_alone: bool
+    """Whether no edge joins the vertex to another one in a handle."""
 
 
 class _Preserved(NamedTuple):
@@ -303,7 +317,6 @@ class Deformer:
     _aim: _Approach
     _p: FloatArray  # (m, 3), the cages of the last pose, in solver coordinates
     _targets: FloatArray  # (k, 3), the targets of the last pose
-    _half_turned: FloatArray  # (k, 3), the last targets half a turn from rest; empty after `_begin`
 
     @one_blas_thread()
     def __init__(
@@ -418,7 +431,9 @@ class Deformer:
         return other
 
     @one_blas_thread()
-    def local(self, vertex: int, reach: float, spread: float, *, follows: float = 0.0) -> Deformer:
+    def local(
+        self, vertex: int | SurfacePoint, reach: float, spread: float, *, follows: float = 0.0
+    ) -> Deformer:
         """Return a deformer in the same pose that deforms the surface near *vertex* only.
 
         Solves keep the rest of the surface where it is now, softly; see `locality`.  Nothing moves
@@ -429,8 +444,10 @@ class Deformer:
 
         Parameters
         ----------
-        vertex : int
-            The grabbed vertex.
+        vertex : int or SurfacePoint
+            The grabbed vertex, or another point of the surface.  If its `SurfacePoint.vertex` is
+            in a handle, the target of that vertex moves the point: by as much as the vertex would
+            move from where it is now.
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
             it the surface is held the more, the farther away; from 4 times this distance it hardly
@@ -442,7 +459,7 @@ class Deformer:
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
         """
-        vertex = checked_vertex(self.mesh, vertex)
+        point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
         if not (is_infinite or (is_number(reach) and reach > 0.0)):
             raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
@@ -450,27 +467,33 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
-        near = vertex, float(reach) / self._frame.size, follows
+        near = point, float(reach) / self._frame.size, follows
         weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
         quadratic = weight * self._samples.quadratic(*near) + self._drag_of(*near)
         quadratic += self._of_loose_parts()
         before, p = self._constraints.solver, self._p
         rows, soft, of_target = before.positions.rows.copy(), [], []
         anchors = Anchors(quadratic, p, np.zeros_like(p))
-        energy, flat = self._with_flat_rings(anchors)
-        for number, ids in enumerate(self._constraints.handles):
-            row = flat.get(number)
-            row = self._soft_row(ids, spread / self._frame.size) if row is None else row
+        points = self._points_of_handles(point)
+        energy, flat = self._with_flat_rings(points, anchors)
+        for target, (place, own, is_alone) in points.items():
+            row = flat.get(target)
+            if row is None and is_alone:
+                at = own.at(self._rest.vertices)
+                row = self._samples.soft_row(own, at, spread / self._frame.size)
+            if row is None and not own.is_vertex:
+                row = self._row_of(own)
             if row is not None:
-                place = int(np.searchsorted(before.positions.set_of, number))
                 rows[place] = row
                 soft.append(place)
-                of_target.append(int(ids[0]))
+                of_target.append(target)
         positions = before.positions.local(rows, anchors)
         places = self._constraints.places(self._targets)
         pulled = _PulledPoints(np.array(soft, dtype=np.int64), np.array(of_target, dtype=np.int64))
-        pulled.vertices = self.handle[pulled.targets]
-        pulled.rows = self.subspace.at(pulled.vertices)
+        pulled.points = tuple(points[target].point for target in of_target)
+        own_rows = [self._row_of(each) for each in pulled.points]
+        pulled.rows = np.array(own_rows).reshape(-1, self.subspace.n_columns)
+        pulled.levers = (pulled.rows - self.subspace.at(self.handle[pulled.targets])) @ p
         pulled.offsets = rows[pulled.places] @ p - places[pulled.places]
         volumes = self._constraints.volumes
         solver = replace(before, energy=energy, positions=positions, volumes=volumes)
@@ -483,41 +506,58 @@ class Deformer:
         other = self._shared()
         keeps = self._samples.weights(*near)
         pulled.spread = spread
-        for each in pulled.vertices:
-            keeps[self._samples.distances(int(each)) < spread / self._frame.size] = np.inf
+        for each in pulled.points:
+            keeps[self._samples.distances(each) < spread / self._frame.size] = np.inf
         other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
         other._begin(p, self._targets)
         return other
 
-    def _drag_of(self, vertex: int, reach: float, follows: float) -> FloatArray:
+    def _points_of_handles(self, point: SurfacePoint) -> dict[int, _HandlePoint]:
+        """Return the points that handles of one vertex move, and *point*, by their target."""
+        found, set_of = {}, self._constraints.solver.positions.set_of
+        for number, ids in enumerate(self._constraints.handles):
+            places = np.flatnonzero(set_of == number)
+            for place, target in zip(places, ids, strict=False):
+                vertex = int(self.handle[target])
+                is_grabbed = vertex == point.vertex and len(places) == len(ids)
+                own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
+                if len(ids) == 1 or not own.is_vertex:
+                    found[int(target)] = _HandlePoint(int(place), own, len(ids) == 1)
+        return found
+
+    def _row_of(self, point: SurfacePoint) -> FloatArray:
+        """Return the row of W~ of *point*, (m,)."""
+        return np.asarray(np.array(point.shares) @ self.subspace.at(np.array(point.corners)))
+
+    def _drag_of(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
         """Return the quadratic (m, m) of a weak drag, if all of the grabbed part is free to move.
 
         It would turn about the grabbed point without any resistance.
         """
         samples, energy = self._samples, self._binding.energy
-        near = np.isfinite(samples.distances(vertex))
-        if not np.isfinite(reach) or samples.weights(vertex, reach, follows)[near].any():
+        near = np.isfinite(samples.distances(point))
+        if not np.isfinite(reach) or samples.weights(point, reach, follows)[near].any():
             return np.zeros_like(energy.quadratic)
-        traces = self._traces[self.regions.membership[:, vertex]]
+        traces = self._traces[self.regions.membership[:, list(point.corners)].any(axis=1)]
         weight = _DRAG * float(traces.min()) * samples.areas[near] / samples.areas[near].sum()
         rows = samples.rows[near]
         return np.asarray((rows.T * weight) @ rows)
 
-    def _with_flat_rings(self, anchors: Anchors) -> tuple[Energy, dict[int, FloatArray]]:
-        """Return the shape energy with the rings of pulled vertices that would become spikes.
+    def _with_flat_rings(
+        self, pulled: dict[int, _HandlePoint], anchors: Anchors
+    ) -> tuple[Energy, dict[int, FloatArray]]:
+        """Return the shape energy with the rings of *pulled* points that would become spikes.
 
-        And the rows of these vertices by the number of their handle; see `locality`.
+        And the rows of these points by their target; see `locality`.
         """
         energy, flat = self._binding.energy, dict[int, FloatArray]()
-        handles, held = self._constraints.handles, np.concatenate([self.fixed, self.handle])
-        single = [(k, int(self.handle[ids[0]])) for k, ids in enumerate(handles) if len(ids) == 1]
-        x = self._rest.vertices
-        around = [(k, Ring.around(self.mesh, x, vertex)) for k, vertex in single]
-        rings = [
-            (k, ring)
-            for k, ring in around
-            if ring is not None and not np.isin(ring.vertices[1:], held).any()
-        ]
+        held, x = np.concatenate([self.fixed, self.handle]), self._rest.vertices
+        rings = []
+        for target, (_, point, _) in pulled.items():
+            ring = Ring.around(self.mesh, x, point)
+            others = held[held != point.vertex]
+            if ring is not None and not np.isin(ring.vertices, others).any():
+                rings.append((target, point, ring))
         if energy.has_vertex_rotations or not rings:  # rotations of vertices act on the mesh
             return energy, flat
         positions = self._constraints.solver.positions
@@ -525,23 +565,15 @@ class Deformer:
         without = replace(self._constraints.solver, energy=energy, positions=positions)
         far = _FAR_PULL * self.mesh.diagonal / self._frame.size
         most = _POSITION_WEIGHT * energy.scale
-        for number, ring in rings:
-            points = self.subspace.at(ring.vertices)
-            rows = ring.combinations @ points
-            (own, both), (_, offset) = without.compliance(np.stack([points[0], rows[0]]))
+        for target, point, ring in rings:
+            rows, row = ring.combinations @ self.subspace.at(ring.vertices), self._row_of(point)
+            (own, both), (_, offset) = without.compliance(np.stack([row, rows[0]]))
             excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
             if excess > 0.0:
                 strength = most * excess / max(excess, most * (offset - both * both / own))
                 energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
-                flat[number] = points[0]
+                flat[target] = row
         return energy, flat
-
-    def _soft_row(self, ids: IntArray, spread: float) -> FloatArray | None:
-        """Return the row with which the handle of targets *ids* pulls, if it is one vertex."""
-        if len(ids) != 1:
-            return None
-        vertex = int(self.handle[ids[0]])
-        return self._samples.soft_row(vertex, self._rest.vertices[vertex], spread)
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
@@ -646,7 +678,9 @@ class Deformer:
         ----------
         targets : (k, 3) float
             One for each vertex of `handle`, in its order.  A far motion goes through waypoints, so
-            that the mesh does not fold.
+            that the mesh does not fold.  Each handle turns the shorter way from its targets of the
+            last solve.  So the body is wound up by half a turn or more if it is solved for targets
+            on the way, each less than half a turn from the last ones.
         max_steps : int, optional
             Instead of the deformer's own limit, from the last waypoint on: a drag may stop early
             and continue with the next event.
@@ -727,6 +761,8 @@ class Deformer:
             raise ArgumentError("solution is not the pose of the last solve; resume it first")
         held = np.zeros(self.mesh.n_vertices, dtype=bool)
         held[self.fixed] = held[self.handle] = True
+        in_faces = [each for each in self._constraints.pulled.points if not each.is_vertex]
+        held[[each.vertex for each in in_faces]] = False
         places = np.array(self._rest_pose.vertices)
         places[self.fixed] = frame.about_origin(self._constraints.fixed_at)
         places[self.handle] = frame.about_origin(frame.outward(self._targets))
@@ -738,6 +774,7 @@ class Deformer:
             stays = (away == 1.0) & ~held
             places[stays] = start[stays]
             held |= stays
+            self._place_points(places, stays)
             shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
         volumes = self.preserved_volumes
         given = self._rest_pose, self._cell_energy, held, volumes, progress
@@ -777,7 +814,7 @@ class Deformer:
             unfinished=solution.vertices if solution.unfinished is None else solution.unfinished,
             unmoved=self._constraints.unmoved,
         )
-        return replace(finished, status=Status.MISSED if _is_off(finished) else status)
+        return replace(finished, status=self._missed_status if _is_off(finished) else status)
 
     def _remaining_of_finish(self, off: Unbalanced, shares: FloatArray | None) -> float:
         """Return the estimate `Solution.remaining` of a finished pose, of which *shares* move.
@@ -796,19 +833,30 @@ class Deformer:
         return max(_largest(step), _largest(off.step)) / self.mesh.diagonal
 
     def _near_pulled_vertices(self) -> FloatArray:
-        """Return 1 within the spread of pulled vertices, 0 beyond twice the spread, (n,) float.
+        """Return 1 within the spread of pulled points, 0 beyond twice the spread, (n,) float.
 
-        And 1 at their neighbours.  Triangles resist no bending, so the finish would concentrate
-        the load of a pulled vertex in a crease around it.  The cages distribute it, so their pose
-        is kept here.
+        And 1 at their corners and the neighbours of these.  Triangles resist no bending, so the
+        finish would concentrate the load of a pulled point in a crease around it.  The cages
+        distribute it, so their pose is kept here.
         """
         x, pulled = self._rest_pose.vertices, self._constraints.pulled
         near = np.zeros(len(x))
-        for each in pulled.vertices:
-            away = np.linalg.norm(x - x[each], axis=1) / pulled.spread
+        for each in pulled.points:
+            away = np.linalg.norm(x - each.at(x), axis=1) / pulled.spread
             near = np.maximum(near, np.clip(2.0 - away, 0.0, 1.0))
-            near[self.mesh.adjacency[[each]].indices] = 1.0
+            corners = list(each.corners)
+            near[corners] = near[self.mesh.adjacency[corners].indices] = 1.0
         return near
+
+    def _place_points(self, places: FloatArray, stays: BoolArray) -> None:
+        """Move corners that stay at *places* (n, 3) so that pulled points are at their targets."""
+        pulled, frame = self._constraints.pulled, self._frame
+        goals = frame.outward(self._targets[pulled.targets] + pulled.levers)
+        for point, goal in zip(pulled.points, frame.about_origin(goals), strict=True):
+            if not point.is_vertex:
+                corners, shares = np.array(point.corners), np.array(point.shares)
+                free = stays[corners]
+                places[corners[free]] += (goal - point.at(places)) / shares[free].sum()
 
     @cached_property
     def _cell_energy(self) -> CellEnergy:
@@ -854,9 +902,6 @@ class Deformer:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
         self._aim.next = None
-        if max_steps is None and self._is_from_elsewhere(goal):
-            self.reset()
-            self._half_turned = goal
         steps = self._follow_waypoints(goal, options)
         is_same = np.array_equal(goal, self._targets)
         self._targets, pulled = goal, self._constraints.pulled
@@ -887,15 +932,8 @@ class Deformer:
         is_stalled = solution.status is Status.STALLED
         status = Status.STALLED if is_stalled else Status.STEP_LIMIT
         if remaining <= CONVERGED:
-            status = _or_missed(Status.CONVERGED, solution)
+            status = self._or_missed(Status.CONVERGED, solution)
         return replace(solution, remaining=remaining, status=status)
-
-    def _is_from_elsewhere(self, goal: FloatArray) -> bool:
-        """Tell whether *goal* is half a turn from rest, which is made from there in one sense."""
-        own = self._constraints
-        if own.keeps is not None or np.array_equal(goal, self._half_turned):
-            return False
-        return is_half_turn(self._rest.vertices[self.handle], goal, own.handles)
 
     def _approach(
         self, goal: FloatArray, max_steps: int | None, within: float, progress: Progress | None
@@ -962,18 +1000,20 @@ class Deformer:
         return reached, x, steps
 
     def _off_at(self, p: FloatArray) -> FloatArray:
-        """Return how far the pulled vertices are off their targets with cages at *p*, (q, 3).
+        """Return how far the pulled points are off their targets with cages at *p*, (q, 3).
 
         The same as `_off`, but for the exact volume, which needs the whole mesh.
         """
         pulled = self._constraints.pulled
-        return self._targets[pulled.targets] - pulled.rows @ p if len(pulled.rows) else _NO_POINTS
+        if not len(pulled.rows):
+            return _NO_POINTS
+        return self._targets[pulled.targets] + pulled.levers - pulled.rows @ p
 
     def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
-        """Return how far the pulled vertices of *x* (n, 3) are off their *targets*, (q, 3)."""
+        """Return how far the pulled points of *x* (n, 3) are off their *targets*, (q, 3)."""
         pulled = self._constraints.pulled
-        there = self._frame.inward(self._frame.in_scene(x[pulled.vertices]))
-        return targets[pulled.targets] - there
+        there = self._frame.inward(self._frame.in_scene(pulled.at(x)))
+        return targets[pulled.targets] + pulled.levers - there
 
     def _solve_once(
         self, goal: FloatArray, options: SolverOptions, is_drag: bool
@@ -1267,7 +1307,7 @@ class Deformer:
         solver.volumes = self._constraints.volumes
         self._continuation = WeightContinuation(solver, p, self._hold_tolerance)
         self._aim = _Approach()
-        self._p, self._targets, self._half_turned = p, targets, _NO_POINTS
+        self._p, self._targets = p, targets
         if self._constraints.scaled is not None and p is not self._rest_cages:
             self._continuation.continue_from(p)
 
@@ -1295,16 +1335,24 @@ class Deformer:
             remaining=0.0 if result.status is Status.CONVERGED else np.inf,
             unmoved=self._constraints.unmoved,
         )
-        return replace(solution, status=_or_missed(result.status, solution))
+        return replace(solution, status=self._or_missed(result.status, solution))
+
+    def _or_missed(self, status: Status, solution: Solution) -> Status:
+        """Return *status*, but that handles are off if a converged *solution* misses its places."""
+        return self._missed_status if status is Status.CONVERGED and _is_off(solution) else status
+
+    @property
+    def _missed_status(self) -> Status:
+        is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
+        return Status.MISSED if is_free else Status.ALL_HELD
 
     def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
-        places = self._frame.outward(targets), self._constraints.fixed_at
-        return errors_at((self.handle, self.fixed), places, self.mesh.diagonal, x)
-
-
-def _or_missed(status: Status, solution: Solution) -> Status:
-    """Return *status*, or `MISSED` of a converged *solution* with handles off their targets."""
-    return Status.MISSED if status is Status.CONVERGED and _is_off(solution) else status
+        """Return `Solution.handle_error`, that of the pulled points included, and `fixed_error`."""
+        places, pulled = self._frame.outward(targets), self._constraints.pulled
+        own = self.handle[pulled.targets]
+        places[pulled.targets] += x[own] + self._frame.size * pulled.levers - pulled.at(x)
+        at = places, self._constraints.fixed_at
+        return errors_at((self.handle, self.fixed), at, self.mesh.diagonal, x)
 
 
 def _is_off(solution: Solution) -> bool:

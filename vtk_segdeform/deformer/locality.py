@@ -60,7 +60,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray
 from ..geometry import faces_between, joints
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
@@ -75,22 +75,24 @@ _FLAT = 1e-3  # of the moments: thinner patches count as flat
 
 @dataclass(frozen=True, eq=False)
 class Ring:
-    """A pulled vertex and its neighbours, as differences y of points that resist all but rotation.
+    """A pulled point and its neighbours, as differences y of points that resist all but rotation.
 
-    The first one is the offset of the vertex from its neighbours, the others are its edges.
+    The first one is the offset of the point from its neighbours, the others are its edges.  The
+    neighbours of a point of a face are those of its corners.
     """
 
-    vertices: IntArray  # (r,), the pulled one first
-    combinations: FloatArray  # (r, r): y = combinations @ x
+    vertices: IntArray  # (v,), the corners first
+    combinations: FloatArray  # (r, v): y = combinations @ x
     offsets: FloatArray  # (r, 3), y at rest
     weights: FloatArray  # (r,)
     edge: float  # mean length
 
     @classmethod
-    def around(cls, mesh: Mesh, x: FloatArray, vertex: int) -> Ring | None:
-        """Return the ring of *vertex* of *mesh*, at rest at *x* (n, 3); None if it is too small."""
-        ring = np.setdiff1d(mesh.adjacency[[vertex]].indices, [vertex])
-        arms = x[ring] - x[vertex]
+    def around(cls, mesh: Mesh, x: FloatArray, point: SurfacePoint) -> Ring | None:
+        """Return the ring of *point* of *mesh*, at rest at *x* (n, 3); None if it is too small."""
+        corners = np.array(point.corners)
+        ring = np.setdiff1d(mesh.adjacency[corners].indices, corners)
+        arms = x[ring] - point.at(x)
         edge = float(np.linalg.norm(arms, axis=1).mean()) if len(ring) else 0.0
         if len(ring) < _FEWEST - 1 or edge == 0.0:
             return None
@@ -100,8 +102,8 @@ class Ring:
         missing = np.array([1.0, 0.0, 0.0]) - basis @ equal
         shares = equal + np.linalg.pinv(basis, rcond=_FLAT) @ missing
         others = np.vstack([-shares, -np.eye(len(ring))])
-        combinations = np.hstack([np.ones((len(ring) + 1, 1)), others])
-        vertices = np.concatenate([[vertex], ring])
+        combinations = np.hstack([np.tile(point.shares, (len(ring) + 1, 1)), others])
+        vertices = np.concatenate([corners, ring])
         offsets = combinations @ x[vertices]
         weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
         return cls(vertices, combinations, offsets, weights, edge)
@@ -225,19 +227,26 @@ class SurfaceSamples:
             np.add.at(normals, corner, across)
         return normals
 
-    def distances(self, vertex: int) -> FloatArray:
-        """Return the distance of each sample from that of *vertex*, (s,); infinite elsewhere."""
-        found = csgraph.dijkstra(self._joined, directed=False, indices=self.cells[vertex])
-        return np.asarray(found, dtype=np.float64)
+    def distances(self, point: SurfacePoint) -> FloatArray:
+        """Return the distance of each sample from *point*, (s,); infinite elsewhere.
 
-    def weights(self, vertex: int, reach: float, follows: float) -> FloatArray:
+        From the samples of its corners, and for a point of a face to these.
+        """
+        corners = list(point.corners)
+        found = csgraph.dijkstra(self._joined, directed=False, indices=self.cells[corners])
+        if self.rest is not None and not point.is_vertex:
+            x = self.rest.vertices
+            found += np.linalg.norm(x[corners] - point.at(x), axis=1)[:, None]
+        return np.asarray(found.min(axis=0), dtype=np.float64)
+
+    def weights(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
         """Return w_s / a_s for kappa = 1, (s,).
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
         """
         if np.isinf(reach):
             return np.zeros(len(self.points))
-        away = self.distances(vertex) / max(reach, _SHORTEST)
+        away = self.distances(point) / max(reach, _SHORTEST)
         nearer = np.clip(away, 1.0, 1e2)
         weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
@@ -247,9 +256,9 @@ class SurfaceSamples:
             weights[far[(size < follows * size.max())[part]]] = 0.0
         return weights
 
-    def quadratic(self, vertex: int, reach: float, follows: float) -> FloatArray:
+    def quadratic(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
-        weights = self.areas * self.weights(vertex, reach, follows)
+        weights = self.areas * self.weights(point, reach, follows)
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)
@@ -266,13 +275,13 @@ class SurfaceSamples:
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
 
-    def soft_row(self, vertex: int, at: FloatArray, spread: float) -> FloatArray | None:
-        """Return the row of x~, (m,), from samples within *spread* of *vertex*, which is *at* v.
+    def soft_row(self, point: SurfacePoint, at: FloatArray, spread: float) -> FloatArray | None:
+        """Return the row of x~, (m,), from samples within *spread* of *point*, which is *at* v.
 
         None if there are too few.
         """
         spread = max(spread, _SHORTEST)
-        away = self.distances(vertex) / spread
+        away = self.distances(point) / spread
         near = np.flatnonzero(away < 1.0)
         if len(near) < _FEWEST:
             return None

@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, suggested_size
 from ..checks import as_flag
-from ..mesh import Mesh, require_mesh
+from ..errors import ConstraintError
+from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress
 from ..regions import segment
 from ..solver import Solution
@@ -16,9 +17,10 @@ from .arguments import (
     automatic_locality,
     checked_constraints,
     checked_locality,
+    checked_place,
     checked_point,
     checked_radius,
-    checked_vertex,
+    fault_of_grab,
     reach_and_follows,
 )
 from .deform import checked_refine, finished, is_finished, stages_of
@@ -27,7 +29,7 @@ from .deformer import Deformer
 
 def pull(
     mesh: Mesh,
-    vertex: int,
+    vertex: int | ArrayLike | SurfacePoint,
     to: ArrayLike,
     radius: float | None = None,
     *,
@@ -40,7 +42,7 @@ def pull(
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Return *mesh* with one vertex pulled to a point, its detail and its volume preserved.
+    """Return *mesh* with one point pulled to another place, its detail and its volume preserved.
 
     For one pull only.  `Session.pull` adds one to another.
 
@@ -48,8 +50,9 @@ def pull(
     ----------
     mesh : Mesh
         n vertices.
-    vertex : int
-        The grabbed vertex.
+    vertex : int, (3,) float or SurfacePoint
+        The grabbed vertex, or another point of the surface, which the pull moves as exactly: if
+        a position is given, the nearest one.
     to : (3,) float
         Where it is pulled to.
     radius : float, optional
@@ -83,7 +86,8 @@ def pull(
     Raises
     ------
     ConstraintError
-        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid.
+        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid, or the faces at the grabbed
+        point are so large that no vertex is within the radius.
     Cancelled
         If *progress* raised it.
 
@@ -101,10 +105,12 @@ def pull(
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     refine = False if refine is None and not avoid_contact else refine
-    vertex = checked_vertex(mesh, vertex)
-    fixed, handle = checked_constraints(mesh, pins, [vertex], "pins")
-    target = checked_point(to)[None]
+    point = checked_place(mesh, vertex)
+    fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")
+    target = checked_point(to)[None] - point.at(mesh.vertices) + mesh.vertices[handle]
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
+    if fault := fault_of_grab(mesh, point, radius):
+        raise ConstraintError(fault)
     if locality is None:
         locality = automatic_locality(len(fixed))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
@@ -116,6 +122,6 @@ def pull(
         progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
-    deformer = deformer.local(vertex, reach, SPREAD * radius, follows=follows)
+    deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)
     solution = deformer.solve(target, progress=next(stages))
     return finished(deformer, solution, refine, progress=next(stages))

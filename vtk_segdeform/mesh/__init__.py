@@ -12,6 +12,7 @@ The files, in reading order:
     soup             a mesh from any triangles, and the map between both
     welding          points at the same position on borders become one vertex
     shells           orientation of closed shells
+    surface_point    a point of a face, which moves with it
     inside           winding numbers, points inside a surface, distance to it
     near_faces       pairs of triangles that may do so: a tree of boxes
     intersections    pairs of triangles that cross or touch
@@ -41,6 +42,7 @@ from .mesh import Mesh, conversion_of, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
+from .surface_point import SurfacePoint
 from .topology import HalfEdges
 from .triangles import corner_angles, cross_rows, least_angle, normals
 
@@ -52,6 +54,7 @@ __all__ = [
     "Mesh",
     "MeshReport",
     "Soup",
+    "SurfacePoint",
     "Workaround",
     "as_soup",
     "components",

@@ -18,6 +18,7 @@ The files, in reading order:
     archive        the file format
 """
 
+from ..mesh import SurfacePoint
 from .finishing import FinishedPose
 from .handles import require_handle
 from .listeners import Change
@@ -37,6 +38,7 @@ __all__ = [
     "Session",
     "StandIn",
     "State",
+    "SurfacePoint",
     "automatic_locality",
     "load_session",
     "middle_vertex",

@@ -281,6 +281,9 @@ class PoseSolver:
         errors = partial(
             errors_at, ids, (wanted, _fixed_at(self._mesh, state)), self._mesh.diagonal
         )
+        if state.locality is not None and not state.locality.point.is_vertex:
+            own = solution.errors(self._surface(state, cages))  # targets are those of the cages
+            return pose, replace(solution, errors=lambda _: own, targets=reached)
         return pose, replace(solution, errors=errors, targets=reached)
 
     def finish(self, state: State, pose: Pose) -> Finish:

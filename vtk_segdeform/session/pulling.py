@@ -1,9 +1,10 @@
 """Pulling: one point of the surface is grabbed, and the surface around it follows.
 
-A pull makes the grabbed vertex a handle, "pull 1", which stays where it was left; so the next pull
-adds to it.  Near it no second one is made: grabbing the surface there moves the same handle.  Other
-pulled points within the radius are carried along, the farther away the less.  At the press nothing
-moves: all handles stay where they are, whether or not the solver had put them into their places.
+A pull moves exactly the grabbed point, in a face or at a vertex.  It makes the nearest vertex a
+handle, "pull 1", which stays where it was left; so the next pull adds to it.  Near it no second one
+is made: grabbing the surface there moves the same handle.  Other pulled points within the radius
+are carried along, the farther away the less.  At the press nothing moves: all handles stay where
+they are, whether or not the solver had put them into their places.
 
 A pin is a handle of one vertex that stays in its place, "pin 1".  Both are handles like any other:
 they can be moved, named, and removed.  `as_handle` makes one a patch that can be rotated, and
@@ -25,10 +26,17 @@ from numpy.typing import ArrayLike
 
 from .. import deformer
 from ..arrays import FloatArray, IntArray, frozen, plain
-from ..deformer import SPREAD, Deformer, checked_point, checked_vertex, reach_and_follows
+from ..deformer import (
+    SPREAD,
+    Deformer,
+    checked_point,
+    checked_vertex,
+    fault_of_grab,
+    reach_and_follows,
+)
 from ..errors import ConstraintError
 from ..geometry import rigid_fit
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from .handles import (
     Targets,
     moved,
@@ -47,13 +55,13 @@ _SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 class Grip(NamedTuple):
     """Where and how the surface is grabbed."""
 
-    vertex: int
+    point: SurfacePoint
     radius: float
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
     """0 to 1; None is `automatic_locality`."""
     turns: bool
-    """Whether a patch around the vertex turns with the motion, which a single vertex cannot."""
+    """Whether a patch around the point turns with the motion, which a single vertex cannot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +77,7 @@ class Grasp:
     name : str
         The handle of the pull.
     point : (3,) float
-        The grabbed vertex at the press.
+        The grabbed point at the press.
     carried : mapping of str to float
         For other pulled points, the share of the motion that they follow.
     """
@@ -102,16 +110,17 @@ def automatic_locality(state: State) -> float:
     return deformer.automatic_locality(len(state.fixed) + sum(map(len, others)))
 
 
-def grabbed(mesh: Mesh, state: State, vertex: int, radius: float) -> str | None:
-    """Return the handle that a pull of *vertex* moves; None if it makes a new one.
+def grabbed(mesh: Mesh, state: State, point: SurfacePoint, radius: float) -> str | None:
+    """Return the handle that a pull of *point* moves; None if it makes a new one.
 
-    It has that vertex, or else is the nearest pulled point within a quarter of the *radius*.
+    It has the vertex of that point, or else is the nearest pulled point within a quarter of the
+    *radius*.
     """
     x = mesh.vertices
     near = []
     for name, ids in state.handles.items():
-        away = float(np.linalg.norm(x[ids] - x[vertex], axis=1).min())
-        if away == 0.0:
+        away = float(np.linalg.norm(x[ids] - point.at(x), axis=1).min())
+        if away == 0.0 or point.vertex in ids:
             return name
         if name in state.pulls and away < _SAME_POINT * radius:
             near.append((away, name))
@@ -119,24 +128,31 @@ def grabbed(mesh: Mesh, state: State, vertex: int, radius: float) -> str | None:
 
 
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
-    """Grab the pose *vertices* (n, 3) of *state*; ConstraintError if the vertex is fixed."""
-    vertex, radius, locality, turns = grip
-    if np.isin(vertex, state.fixed):
+    """Grab the pose *vertices* (n, 3) of *state*.
+
+    ConstraintError if the point is fixed, or no vertex is near it.
+    """
+    point, radius, locality, turns = grip
+    if np.isin(point.vertex, state.fixed):
         raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
+    if fault := fault_of_grab(mesh, point, radius):
+        raise ConstraintError(fault)
     x = mesh.vertices
     pulls = tuple(name for name in state.pulls if name in state.handles)
     away = {
-        name: float(np.linalg.norm(x[ids] - x[vertex], axis=1).min())
+        name: float(np.linalg.norm(x[ids] - point.at(x), axis=1).min())
         for name, ids in state.handles.items()
     }
-    name = grabbed(mesh, state, vertex, radius)
+    name = grabbed(mesh, state, point, radius)
     if locality is None:
         locality = automatic_locality(state)
     handles = state.handles
     if name is None:
         name = _new_name(state, "pull")
-        handles = with_handle(mesh, state, name, [vertex])
+        handles = with_handle(mesh, state, name, [point.vertex])
         pulls = (*pulls, name)
+    elif name in pulls and len(handles[name]) == 1 and not point.is_vertex:
+        handles = with_handle(mesh, state, name, [point.vertex])  # so that it moves this point
     others = [each for each in pulls if each != name and away.get(each, np.inf) < radius]
     inner = SPREAD if turns else 0.0  # what is inside moves with the patch
     beyond = {each: max(0.0, away[each] / radius - inner) / (1.0 - inner) for each in others}
@@ -153,18 +169,39 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
     pose = Pose(places, targets_at(handles, vertices), finished)
     reach, follows = reach_and_follows(radius, locality)
-    local = Locality(vertex, reach, SPREAD * radius, follows, pose.cage_vertices)
+    if len(handles[name]) > 1:  # which moves as a whole
+        point = SurfacePoint.at_vertex(point.vertex)
+    local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
-    return Grasp(grip, after, name, vertices[vertex], MappingProxyType(carried))
+    return Grasp(grip, after, name, grip.point.at(vertices), MappingProxyType(carried))
+
+
+def released(state: State, vertices: FloatArray) -> State:
+    """Return *state* as it is for other drags than the last pull, with the mesh at *vertices*.
+
+    A pull moves a point of a face, and the vertex of its handle only by about as much.
+    """
+    pose, locality = state.pose, state.locality
+    if pose is None or locality is None:
+        return state
+    vertex = locality.point.vertex
+    own = {
+        name: targets_at({name: ids}, vertices)[name]
+        for name, ids in state.handles.items()
+        if not locality.point.is_vertex and np.array_equal(ids, [vertex])
+    }
+    pose = replace(pose, targets=MappingProxyType({**pose.targets, **own})) if own else pose
+    return replace(state, pose=pose, locality=None)
 
 
 def turned(grasp: Grasp, mesh: Mesh, before: FloatArray, now: FloatArray) -> FloatArray:
-    """Return the rotation (3, 3) of the surface around the grabbed vertex since the press.
+    """Return the rotation (3, 3) of the surface around the grabbed point since the press.
 
     *before* and *now* are the poses at the press and at present, (n, 3).
     """
-    patch = _patch(mesh, grasp.grip.vertex, SPREAD * grasp.grip.radius)
-    patch = np.union1d(patch, mesh.adjacency[[grasp.grip.vertex]].indices)
+    vertex = grasp.grip.point.vertex
+    patch = _patch(mesh, vertex, SPREAD * grasp.grip.radius)
+    patch = np.union1d(patch, mesh.adjacency[[vertex]].indices)
     return rigid_fit(before[patch], now[patch])[0]
 
 
@@ -175,7 +212,7 @@ def as_it_is(grasp: Grasp, rotation: FloatArray, now: FloatArray) -> Grasp:
     """
     assert grasp.state.pose is not None
     patch = grasp.state.handles[grasp.name]
-    shape = grasp.point + (now[patch] - now[grasp.grip.vertex]) @ rotation
+    shape = grasp.point + (now[patch] - grasp.grip.point.at(now)) @ rotation
     targets = MappingProxyType({**grasp.state.pose.targets, grasp.name: shape})
     pose = replace(grasp.state.pose, targets=targets)
     return replace(grasp, state=replace(grasp.state, pose=pose))
@@ -188,7 +225,7 @@ def localised(constrained: Deformer, locality: Locality, x: FloatArray) -> Defor
     """
     other = constrained.copy()
     other.resume(locality.cage_vertices, x[other.handle])
-    return other.local(locality.vertex, locality.reach, locality.spread, follows=locality.follows)
+    return other.local(locality.point, locality.reach, locality.spread, follows=locality.follows)
 
 
 def pinned(mesh: Mesh, state: State, vertex: int) -> tuple[str, Mapping[str, IntArray]]:

@@ -38,14 +38,15 @@ from ..deformer import (
     Deformer,
     checked_constraints,
     checked_locality,
+    checked_place,
     checked_point,
     checked_radius,
-    checked_vertex,
+    fault_of_grab,
 )
 from ..errors import CageError, RegionError, SessionError
 from ..geometry import Lids, local_volume_change, rigid_fit
 from ..importing import imported
-from ..mesh import Mesh, require_mesh
+from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
@@ -144,6 +145,8 @@ class Session(Timeline):
         self._fitted: tuple[Regions | None, Sequence[Cage] | None] = None, None
         # The state before the ongoing pull, and what it has grabbed.
         self._grasp: tuple[State, pulling.Grasp] | None = None
+        # A state after a pull, and the same for other drags.
+        self._let_go: tuple[State | None, State] = None, State()
         # The last pose of `move_cage`, and the cage vertices before the volume correction.
         self._placed: tuple[Pose | None, list[FloatArray]] = None, []
 
@@ -670,13 +673,13 @@ class Session(Timeline):
             cages.  The pose does not change then.
         """
         wanted = handles.checked_targets(self.mesh, self.handles, targets)
-        state = replace(self._state, locality=None)
-        limits = max_steps, within
-        return self._drag(state, {**self.targets, **wanted}, list(wanted), limits)
+        state, limits = self._released(self._state), (max_steps, within)
+        kept = self._rest_targets() if state.pose is None else state.pose.targets
+        return self._drag(state, {**kept, **wanted}, list(wanted), limits)
 
     def pull(
         self,
-        vertex: int,
+        vertex: int | ArrayLike | SurfacePoint,
         to: ArrayLike,
         *,
         radius: float | None = None,
@@ -688,8 +691,9 @@ class Session(Timeline):
 
         Parameters
         ----------
-        vertex : int
-            The grabbed vertex.
+        vertex : int, (3,) float or SurfacePoint
+            The grabbed vertex, or another point of the surface, given at rest: of a position, the
+            nearest one.
         to : (3,) or (4, 4) float
             Where it is pulled to; or an affine map of the surface around it since the press, which
             may turn it.
@@ -706,28 +710,29 @@ class Session(Timeline):
         Raises
         ------
         ConstraintError, CageError
-            If there is no such vertex, it is fixed, *to* is too far away, or there are no cages.
+            If there is no such vertex, it is fixed, *to* is too far away, or there are no cages;
+            or if the faces at the point are so large that no vertex is within the radius.
 
         Notes
         -----
-        Calls with the same vertex, radius and locality belong to one pull until `commit`, which
-        leaves a handle at the grabbed vertex.  When the first map follows points, the surface
-        around the vertex keeps its current shape; see `turned`.
+        Calls with the same point, radius and locality belong to one pull until `commit`, which
+        leaves a handle at the vertex nearest to it.  When the first map follows points, the surface
+        around the point keeps its current shape; see `turned`.
         """
-        vertex = checked_vertex(self.mesh, vertex)
+        point = checked_place(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
         locality = checked_locality(locality)
         motion = pulling.checked_motion(self.mesh, to)
         turns = motion.shape == (4, 4)
         start, grasp = self._grasp or (None, None)
         is_new = start is None or start is not self._drag_start
-        if is_new or grasp is None or grasp.grip[:3] != (vertex, radius, locality):
+        if is_new or grasp is None or grasp.grip[:3] != (point, radius, locality):
             self.commit()
             start, grasp = self._state, None
         assert start is not None
         before = grasp
         if grasp is None or (turns and not grasp.grip.turns):
-            grip = pulling.Grip(vertex, radius, locality, turns)
+            grip = pulling.Grip(point, radius, locality, turns)
             grasp = pulling.grasp(self.mesh, start, self._vertices_of(start), grip)
             if before is not None:  # the handle becomes a patch, of the shape that it has now
                 grasp = pulling.as_it_is(grasp, self.turned(), self.vertices)
@@ -748,10 +753,17 @@ class Session(Timeline):
         self._grasp = start, grasp
         return solution
 
-    def grabbed(self, vertex: int, radius: float | None = None) -> str | None:
+    def grabbed(
+        self, vertex: int | ArrayLike | SurfacePoint, radius: float | None = None
+    ) -> str | None:
         """Return the handle that `pull` would move with these arguments; None for a new one."""
-        vertex, radius = checked_vertex(self.mesh, vertex), checked_radius(self.mesh, radius)
-        return pulling.grabbed(self.mesh, self.state, vertex, radius)
+        point, radius = checked_place(self.mesh, vertex), checked_radius(self.mesh, radius)
+        return pulling.grabbed(self.mesh, self.state, point, radius)
+
+    def can_grab(self, vertex: int | ArrayLike | SurfacePoint, radius: float | None = None) -> bool:
+        """Return whether a vertex is so near that `pull` can grab the surface there."""
+        point, radius = checked_place(self.mesh, vertex), checked_radius(self.mesh, radius)
+        return not fault_of_grab(self.mesh, point, radius)
 
     @property
     def last_pulled(self) -> str | None:
@@ -822,7 +834,9 @@ class Session(Timeline):
             The handle.
         motion : (4, 4) or (k, 3) float
             An affine map of the targets at the start of the drag, so that moving the mouse back
-            moves the handle back; or a target for each vertex of the handle.
+            moves the handle back.  A handle turns the shorter way from where it is: to wind the
+            body up by 270 degrees, turn it by 90 and by 180 before.  Or a target for each vertex of
+            the handle.
         max_steps, within : int and float, optional
             As in `drag`.
         """
@@ -830,7 +844,7 @@ class Session(Timeline):
         matrix = plain(motion, "motion")
         if matrix.shape != (4, 4):
             return self.drag({name: matrix}, max_steps=max_steps, within=within)
-        pose = (self._drag_start or self._state).pose
+        pose = self._released(self._drag_start or self._state).pose
         start = self._rest_targets() if pose is None else pose.targets
         targets = {name: handles.moved(start[name], matrix)}
         return self.drag(targets, max_steps=max_steps, within=within)
@@ -992,6 +1006,14 @@ class Session(Timeline):
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
         self._step(label_of_change(self.options, options), replace(self._state, options=options))
+
+    def _released(self, state: State) -> State:
+        """Return `pulling.released` of *state*; the last one is kept."""
+        if state.locality is None:
+            return state
+        if self._let_go[0] is not state:
+            self._let_go = state, pulling.released(state, self._vertices_of(state))
+        return self._let_go[1]
 
     def _drag(
         self,

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages
-from ..deformer import checked_vertex
+from ..deformer import checked_place
 from ..geometry import decimated, lids_of
-from ..mesh import Mesh, require_mesh
+from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions
 from ..solver import VolumeConstraint, scale_to_volume, total_volume
@@ -78,17 +78,17 @@ class StandIn:
 
     def pulled(
         self,
-        vertex: int,
+        vertex: int | ArrayLike | SurfacePoint,
         to: ArrayLike,
         *,
         radius: float | None = None,
         locality: float | None = None,
     ) -> FloatArray:
         """Return the mesh (n, 3) pulled from rest; the arguments are those of `Session.pull`."""
-        vertex, motion = checked_vertex(self.mesh, vertex), pulling.checked_motion(self.mesh, to)
-        own = int(self.cluster[vertex])
+        point, motion = checked_place(self.mesh, vertex), pulling.checked_motion(self.mesh, to)
+        own = int(self.cluster[point.vertex])
         if motion.shape == (3,):
-            motion = self.session.mesh.vertices[own] + (motion - self.mesh.vertices[vertex])
+            motion = self.session.mesh.vertices[own] + (motion - point.at(self.mesh.vertices))
         solution = self.session.pull(
             own, motion, radius=radius, locality=locality, max_steps=_MOST_STEPS
         )

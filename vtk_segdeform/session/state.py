@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
 from ..checks import all_of, require, require_sequence, shown
-from ..deformer import checked_constraints
+from ..deformer import checked_constraints, checked_place
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
@@ -161,8 +161,8 @@ class Pose(Frozen):
 class Locality(Frozen):
     """The part of the surface that the last pull deforms; see `Deformer.local`."""
 
-    vertex: int
-    """The grabbed vertex."""
+    point: SurfacePoint
+    """The grabbed point."""
     reach: float
     """In the mesh's unit; infinite if all of the surface is free."""
     spread: float
@@ -364,8 +364,7 @@ def _checked_finished(
 def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:
     start = _checked_pose(cages, [], [], Pose(locality.cage_vertices, {}))
     _require_plausible(mesh, start)
-    if not is_whole(locality.vertex, 0, mesh.n_vertices - 1):
-        raise ConstraintError(f"there is no vertex {shown(locality.vertex)} to have been pulled")
+    point = checked_place(mesh, require(locality.point, SurfacePoint, "state.locality.point"))
     reach = locality.reach
     is_infinite = isinstance(reach, float) and reach == np.inf
     for length in (locality.spread, *([] if is_infinite else [reach])):
@@ -373,7 +372,7 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
             raise ConstraintError(f"the radius of a pull must be positive; got {shown(length)}")
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
-    return replace(locality, cage_vertices=start.cage_vertices)
+    return replace(locality, point=point, cage_vertices=start.cage_vertices)
 
 
 def _checked_places(mesh: Mesh, fixed: IntArray, state: State) -> FloatArray | None:

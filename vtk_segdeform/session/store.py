@@ -44,7 +44,7 @@ from ..checks import as_flag, as_path, require
 from ..errors import SessionError
 from ..files import open_regular, replacing
 from ..importing import imported
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .archive import Archive, write_archive
 from .session import Session
@@ -185,8 +185,10 @@ def _write(
     if state.pulls:  # optional, like what follows
         header["pulls"] = list(state.pulls)
     if state.locality is not None:
-        vertex, reach, *lengths, _ = vars(state.locality).values()
-        header["locality"] = [vertex, None if reach == math.inf else reach, *lengths]
+        point, reach, *lengths, _ = vars(state.locality).values()
+        header["locality"] = [point.vertex, None if reach == math.inf else reach, *lengths]
+        if not point.is_vertex:
+            header["pulled_point"] = [point.corners, point.shares]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
     if pose is not None and pose.finished is not None:
         header["n_finished_held"] = len(pose.finished.held)
@@ -263,7 +265,11 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         vertex, reach, spread, follows = entries
         kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
         reach = math.inf if reach is None else reach
-        locality = Locality(_whole(vertex, "locality"), reach, spread, follows, tuple(kept))
+        point = SurfacePoint.at_vertex(_whole(vertex, "locality"))
+        if "pulled_point" in header:
+            corners, shares = _list(header, "pulled_point")
+            point = SurfacePoint(tuple(corners), tuple(shares))
+        locality = Locality(point, reach, spread, follows, tuple(kept))
     handles = dict(zip(sizes, ids, strict=True))
     more = {"pivots": header["pivots"]} if "pivots" in header else {}
     if header.get("fixed_in_pose"):

@@ -40,7 +40,7 @@ from .volume_constraints import (
     region_volumes,
     total_volume,
 )
-from .waypoints import LONGEST_MOVE, is_half_turn, waypoints
+from .waypoints import LONGEST_MOVE, waypoints
 from .weights import WeightContinuation
 
 __all__ = [
@@ -66,7 +66,6 @@ __all__ = [
     "are_met",
     "connected_sets",
     "errors_at",
-    "is_half_turn",
     "moved_along",
     "position_term",
     "region_volumes",

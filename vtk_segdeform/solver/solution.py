@@ -42,6 +42,10 @@ class Status(enum.Enum):
         "the cages cannot reach this pose: add cage vertices, move less, or leave more room "
         "between handle and fixed vertices"
     )
+    ALL_HELD = (
+        "all vertices are fixed or in handles, so nothing is free to move: subdivide the mesh, or "
+        "leave vertices between handle and fixed vertices free"
+    )
 
     def __str__(self) -> str:
         return self.value

@@ -9,10 +9,10 @@ screw motion, a rotation about a line and a translation along it (Chasles), and 
 a, theta are the axis and angle of R and c is a point on the axis.  The rest of a handle's motion,
 which is not rigid, is rotated along and added in proportion to s.
 
-Half a turn can be made in either sense.  The rule: of all points of the handle, the farthest from
-its mean along the axis of rotation is in the positive direction of the axis.  So the sense depends
-on the handle only.  `Deformer` makes half a turn from rest again from there, so that the pose does
-not depend on the path by which the handle came.
+The angle is at most half a turn, the shorter way: whoever wants more gives targets on the way.
+Exactly half a turn can be made in either sense.  The rule: of all points of the handle, the
+farthest from its mean along the axis of rotation is in the positive direction of the axis.  So the
+sense depends on the handle only, and not on rounding.
 """
 
 from __future__ import annotations
@@ -61,14 +61,6 @@ def waypoints(
     return [*way, end]
 
 
-def is_half_turn(start: FloatArray, end: FloatArray, handles: list[IntArray]) -> bool:
-    """Tell whether the motion of any handle from *start* to *end*, (k, 3) each, is half a turn."""
-    if np.array_equal(start, end):
-        return False
-    samples = (h[:: max(1, len(h) // _SAMPLE)] for h in handles if len(h) > 1)
-    return any(_ScrewMotion(start[h], end[h]).is_half_turn for h in samples)
-
-
 def _is_short(start: FloatArray, end: FloatArray, share: float) -> bool:
     """Tell whether a motion is so short that it needs no waypoint; faster than `_ScrewMotion`.
 
@@ -94,8 +86,7 @@ class _ScrewMotion:
         rotvec = turn.as_rotvec()
         self._angle = float(np.linalg.norm(rotvec))
         self._axis = rotvec / self._angle if self._angle > 0.0 else np.zeros(3)
-        self.is_half_turn = self._angle > np.pi - _HALF_TURN
-        if self.is_half_turn:
+        if self._angle > np.pi - _HALF_TURN:
             self._axis = self._axis * _side(self._axis, start)
         # c: the point nearest the origin with R c + t = c + (a . t) a.
         across = self._shift - self._axis * (self._axis @ self._shift)

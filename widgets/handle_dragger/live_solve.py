@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from statistics import median
 
 from vtk_segdeform.session import Session
@@ -85,6 +85,17 @@ class LiveSolve:
             self.is_refused = False
         self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
+
+    def lead(self, moves: Sequence[Callable[..., Solution]]) -> None:
+        """Call each of *moves* as `solve` does, but until its targets are reached."""
+        with self._view.guarded(only_refusals=True):
+            for move in moves:
+                move(within=_WITHIN)
+
+    def has_reached(self) -> bool:
+        """Whether the pose has reached the last targets."""
+        solution = self._session.solution
+        return not self.is_refused and solution is not None and solution.targets is None
 
     def resume(self) -> None:
         """Refine the current pose if it stopped at the step limit; otherwise stop refining.

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vtk_segdeform.arrays import BoolArray, FloatArray
+from vtk_segdeform.mesh import SurfacePoint
 
 from ..scene import Pointer, SurfaceDisplay
 from .line_of_sight import intersections
@@ -31,6 +32,8 @@ class Hit:
     face: int
     vertex: int
     """The corner of the face that is nearest to the point."""
+    place: SurfacePoint
+    """The point, wherever the surface moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,4 +151,5 @@ class Picker:
     def _hit(self, point: FloatArray, face: int) -> Hit:
         corners = self._mesh.faces[face]
         distances = np.linalg.norm(self._surface.points[corners] - point, axis=1)
-        return Hit(point, face, int(corners[distances.argmin()]))
+        place = SurfacePoint.in_face(self._surface.points, corners, point)
+        return Hit(point, face, int(corners[distances.argmin()]), place)

@@ -7,8 +7,7 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
     shift + wheel, [ ]  smaller, larger radius
     while pulling:
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
-    r           turn the surface around the point instead of moving it, about the line of sight or
-                the axis of x, y, z; again: move it
+    r           turn the surface around the point, about the line of sight or x, y, z; again: move
     control     pull in steps of about 1 % of the diagonal, turn in steps of 5 degrees
     shift       pull slowly; with control in finer steps
     a number, enter             pull by exactly that much along the axis, or in the direction so far
@@ -29,7 +28,7 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session, automatic_locality
+from vtk_segdeform.session import Change, Session, SurfacePoint, automatic_locality
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
@@ -47,6 +46,7 @@ _SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
 GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
+_TOO_COARSE = "No vertex near this point. Enlarge the radius, or subdivide the mesh"
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
 LOCKED = "{} is locked. Clear Lock in the list of handles to move it"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
@@ -205,17 +205,18 @@ class Puller(Widget):
         if self.waiting.has_pull and (marker is not None or hit is not None):
             return self._refuse(_NOT_YET)
         if marker is not None:
-            vertex = self._markers.vertex(marker)
-            point = np.array(self._surface.points[vertex])
+            point = SurfacePoint.at_vertex(self._markers.vertex(marker))
         elif hit is not None:
-            vertex, point = hit.vertex, hit.point
+            point = hit.place
         else:
             return None
-        name = self.session.grabbed(vertex, self.radius)
+        name = self.session.grabbed(point, self.radius)
         if name is not None and self.is_locked(name):
             return self._refuse(LOCKED.format(name))
-        is_fixed = bool(np.isin(vertex, self.session.fixed))
-        return self._refuse(_FIXED) if is_fixed else self._pull(vertex, point, press)
+        if np.isin(point.vertex, self.session.fixed):
+            return self._refuse(_FIXED)
+        can_grab = self.session.can_grab(point, self.radius)
+        return self._pull(point, press) if can_grab else self._refuse(_TOO_COARSE)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
         """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
@@ -252,15 +253,14 @@ class Puller(Widget):
         return True
 
     # Gestures.
-    def _pull(self, vertex: int, point: FloatArray, press: Pointer) -> Gesture:
-        """Pull *vertex*; *point*, on the surface near it, stays under the pointer."""
+    def _pull(self, point: SurfacePoint, press: Pointer) -> Gesture:
+        """Pull *point*, so that it stays under the pointer."""
         session = self.session
         session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
         self._live.begin()
-        start = np.array(self._surface.points[vertex])
-        step = step_of(session.mesh.diagonal)
-        motion = self._motion = PullMotion(self.view, point, press, self._gizmo.size, step)
-        pull = partial(session.pull, vertex, radius=self.radius, locality=self.locality)
+        start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
+        motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
+        pull = partial(session.pull, point, radius=self.radius, locality=self.locality)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
         try:
@@ -282,14 +282,14 @@ class Puller(Widget):
                 else:
                     self._live.begin()
                     self.waiting.begin()
-                    self.waiting.follow(vertex, to, self.radius, self.locality)
+                    self.waiting.follow(point, to, self.radius, self.locality)
             if pointer.phase is Phase.RELEASE:
                 if to is not None and not has_moved:
                     self._pull_later(partial(pull, to))
                 elif to is None and motion.entry.text:
                     self.remark = _NO_DIRECTION
                 elif to is None and press.shift:
-                    self._toggle_pin(vertex)
+                    self._toggle_pin(point.vertex)
                 session.commit("pull")
                 committed = True
         finally:

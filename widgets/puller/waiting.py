@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.session import StandIn
+from vtk_segdeform.session import StandIn, SurfacePoint
 
 from ..scene import Stop, SurfaceDisplay
 
@@ -82,10 +82,12 @@ class Waiting:
             self._stop = self._surface.view.every(_POLL, self._tick)
             self._changed()
 
-    def follow(self, vertex: int, to: FloatArray, radius: float, locality: float | None) -> None:
+    def follow(
+        self, point: SurfacePoint, to: FloatArray, radius: float, locality: float | None
+    ) -> None:
         """Show the stand-in pulled like this, now or later; see `StandIn.pulled`."""
         self._wanted = partial(
-            StandIn.pulled, vertex=vertex, to=to, radius=radius, locality=locality
+            StandIn.pulled, vertex=point, to=to, radius=radius, locality=locality
         )
         self._update()
 

@@ -10,6 +10,7 @@ import pytest
 from campaign import every
 from hands import Hand, draw_seldom, picture, plain_view
 from scenes import sausage
+from scipy.spatial.transform import Rotation
 from solids import rotation
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
@@ -236,6 +237,48 @@ def test_a_ring_rotates_by_the_angle_on_the_screen(ring, parallel):
     hand.release(there)
     assert bench.session.undo_label == "rotate handle 1"
     assert not hand.failures
+
+
+def turned_along(session, axis):
+    """Return the angle about *axis* in which each slice of the body is turned, degrees."""
+    x, y = SCENE.mesh.vertices, session.vertices
+    slices = np.digitize(x[:, 0], np.linspace(-2.8, 2.8, 12))
+    fits = (rigid_fit(x[slices == k], y[slices == k])[0] for k in range(slices.max() + 1))
+    turns = [Rotation.from_matrix(R).as_rotvec() @ axis for R in fits]
+    return np.degrees(np.unwrap(turns))
+
+
+@pytest.mark.parametrize("degrees", ["180", "-180"])
+def test_a_typed_turn_winds_the_body_in_its_direction(degrees):
+    bench = Bench((0.0, -12.0, 0.0), parallel=True)
+    hand, session = bench.hand, bench.session
+    session.remove_handle(TOP)
+    hand.press(bench.aim(VIEW_RING))
+    for key in ("x", *degrees.replace("-", ""), *("minus" for _ in degrees if _ == "-")):
+        hand.key(key)
+    hand.key("Return")
+    session.refine()
+    along = turned_along(session, np.array([1.0, 0.0, 0.0]))
+    assert along[-1] - along[0] == pytest.approx(float(degrees), abs=45.0)
+    assert abs(session.volume_change) < 1e-12
+    assert not hand.failures
+
+
+def test_between_angles_half_a_turn_or_more_apart_there_are_stops(bench):
+    grip = Grip(np.zeros(3), np.zeros(3), np.eye(3), 1.0, 0.1)
+    press = Pointer(Phase.PRESS, 220.0, 190.0)
+    motion = Motion(bench.view, Part(Kind.ROTATION, 2), grip, press)
+    motion.exact(720.0)
+    assert np.degrees(motion.turn) == pytest.approx(720.0)
+    counts = [len(motion.way(np.radians(since))) for since in (900, 720, 541, 540, 360, 0)]
+    assert counts == [1, 0, 0, 1, 3, 7]
+    (half,) = motion.way(np.radians(540.0))
+    assert np.allclose(half, motion.exact(630.0))
+    motion.exact(0.0)
+    assert len(motion.way(2.0 * np.pi)) == 3
+    shift = Motion(bench.view, Part(Kind.AXIS, 2), grip, press)
+    shift.exact(1e3)
+    assert (shift.turn, shift.way(0.0)) == (0.0, [])
 
 
 def test_when_the_pointer_returns_so_do_the_targets(bench):

@@ -11,10 +11,11 @@ from solids import icosphere
 from vtk_segdeform import Session
 from vtk_segdeform.errors import ArgumentError, ConstraintError
 from vtk_segdeform.geometry import rigid_fit
-from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.widgets.picking.surface_ring import SurfaceRing
 from vtk_segdeform.widgets.puller.caption import Caption
 from vtk_segdeform.widgets.puller.puller import Puller
+from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -93,6 +94,27 @@ def test_a_pull_is_one_step_and_every_frame_has_the_volume(bench):
     hand.key("Escape")
     hand.release()
     assert session.state.pose is None
+
+
+def test_the_point_under_the_pointer_is_pulled_also_between_vertices(bench):
+    session, hand = bench.session, bench.hand
+    place = bench.on()[0] + [9, 4]
+    hit = bench.puller._picker.hit(Pointer(Phase.HOVER, *place))
+    corners = session.mesh.faces[hit.face]
+    point = SurfacePoint.in_face(session.vertices, corners, hit.point)
+    assert len(point.corners) == 3
+    hand.press(place)
+    hand.move(place + [0, 40])
+    while bench.puller.is_refining:
+        hand.tick()
+    assert np.abs(hand.at(point.at(session.vertices)) - place - [0, 40]).max() < 1.0
+    assert session.state.locality.point.corners == point.corners
+    hand.release()
+    bench.puller.radius = 1e-3 * session.mesh.diagonal
+    hand.press(bench.on(0.0)[0] + [5, 3])
+    assert session.undo_label == "pull"
+    hand.release()
+    assert "subdivide the mesh" in bench.puller.remark
 
 
 def test_shift_click_pins_and_unpins_and_markers_are_grabbed(bench):
@@ -188,7 +210,8 @@ def test_r_turns_about_the_point_and_a_number_is_degrees(bench):
     ids = bench.session.handles["pull 1"]
     assert len(ids) > 3
     before = SCENE.mesh.vertices[ids] - SCENE.mesh.vertices[vertex]
-    after = bench.session.targets["pull 1"] - SCENE.mesh.vertices[vertex]
+    after = bench.session.targets["pull 1"]
+    after = after - after[ids == vertex]  # the centre is the point under the pointer
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     np.testing.assert_allclose(after, before @ [[c, 0, -s], [0, 1, 0], [s, 0, c]], atol=1e-9)
     assert bench.session.undo_label == "pull"
