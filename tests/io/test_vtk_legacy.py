@@ -67,6 +67,8 @@ def with_an_array_of_two_uses():
 @pytest.mark.parametrize("grid", [False, True])
 def test_all_versions_are_read_as_vtk_reads_them(tmp_path, grid, make, binary, version):
     surface = make().cast_to_unstructured_grid() if grid else make()
+    if not binary and pv.vtk_version_info < (9, 7) and make in (rich, with_an_array_of_two_uses):
+        pytest.skip("this VTK reads neither inf nor nan in a text")
     path = tmp_path / "a.vtk"
     plain = read_plain_legacy(written(path, surface, binary=binary, version=version))
     assert plain is not None
