@@ -74,7 +74,16 @@ def test_one_extra_installs_the_whole_desktop_program(setup_cfg):
     assert '!=6.12.0; python_version<"3.12"' in app
 
 
-@pytest.mark.skipif("SEGDEFORM_LOWEST" not in os.environ, reason="make test-lowest")
+@pytest.mark.campaign
+@pytest.mark.parametrize("versions", ["lowest", "newest"])
+def test_the_suite_passes_with_the_lowest_and_with_the_newest_versions(versions):
+    subprocess.run(["make", f"test-{versions}", f"VENV={sys.prefix}"], cwd=ROOT, check=True)
+
+
+# The newest Pythons have no wheels of the lowest versions.
+@pytest.mark.skipif(
+    "SEGDEFORM_LOWEST" not in os.environ or sys.version_info >= (3, 13), reason="make test-lowest"
+)
 def test_the_lowest_versions_are_those_that_are_tested(setup_cfg):
     lists = [setup_cfg["options"]["install_requires"]]
     lists += [setup_cfg["options.extras_require"][extra] for extra in ("meshlab", "app", "web")]
