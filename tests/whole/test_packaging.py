@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
 from importlib import metadata
 from pathlib import Path
@@ -168,9 +169,55 @@ def test_the_wheel_contains_both_packages_and_the_licence(tmp_path):
     assert vtk_segdeform.__version__ in wheel.name
 
 
+def test_the_sdist_contains_what_builds_the_package_and_no_pictures(tmp_path):
+    pytest.importorskip("setuptools", minversion="77", reason="an older one needs wheel")
+    source = tmp_path / "source"
+    git = shutil.which("git")
+    listed = subprocess.run([git, "ls-files", "-z"], cwd=ROOT, capture_output=True) if git else None
+    if listed is None or listed.returncode:
+        pytest.skip("no repository")
+    for name in filter(None, listed.stdout.decode().split("\0")):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        copied(str(ROOT / name), str(source / name))
+    build = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    done = subprocess.run(
+        [sys.executable, "-c", build, str(tmp_path)], cwd=source, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()}
+        about = archive.extractfile(
+            next(each for each in archive if each.name.endswith("/PKG-INFO"))
+        )
+        assert_it_can_be_shown_anywhere(about.read().decode())
+    ours = {
+        each
+        for each in listed.stdout.decode().split("\0")
+        if each.startswith(("vtk_seg", "widgets/"))
+    }
+    assert ours <= inside
+    assert {"setup.cfg", "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md"} <= inside
+    assert [name for name in inside if re.search(r"\.(png|gif|jpe?g)$|^(docs|tests)/", name)] == []
+
+
+def assert_it_can_be_shown_anywhere(about: str) -> None:
+    """Check the description for a package index, where only whole addresses lead anywhere."""
+    fields, _, text = about.partition("\n\n")
+    (author,) = re.findall(r"- name: (.+)", (ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert f"\nAuthor: {author}\n" in fields
+    assert re.findall(r"\]\((?!https://)", text) == []
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    paragraph = text.strip().partition("\n\n")[0]
+    assert paragraph in readme
+    (code,) = re.findall(r"```python\n.*?```", text, re.DOTALL)
+    assert code in readme
+
+
 def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_cfg):
     recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
     assert re.findall(r'version: "(.+)"', recipe) == [vtk_segdeform.__version__]
+    assert re.search(r"\n  url: https://\S+\.tar\.gz\n  sha256: ", recipe)  # of a release
     listed = re.findall(r"(?m)^    - (\S+) (>=\S+)$", recipe.partition("\n  run:\n")[2])
     required = (
         setup_cfg["options"]["install_requires"]
