@@ -217,7 +217,7 @@ def assert_it_can_be_shown_anywhere(about: str) -> None:
 def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_cfg):
     recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
     assert re.findall(r'version: "(.+)"', recipe) == [vtk_segdeform.__version__]
-    assert re.search(r"\n  url: https://\S+\.tar\.gz\n  sha256: ", recipe)  # of a release
+    assert re.search(r"\n  url: https://.+\.tar\.gz\n  sha256: ", recipe)  # of a release
     listed = re.findall(r"(?m)^    - (\S+) (>=\S+)$", recipe.partition("\n  run:\n")[2])
     required = (
         setup_cfg["options"]["install_requires"]
