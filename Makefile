@@ -5,6 +5,8 @@
 #   make soak       random input for an hour; SECONDS=900 for less
 #   make lint       ruff, nothing changed      make format     ruff, files rewritten
 #   make test-paraview   the plugin in a real ParaView
+#   make test-lowest     the suite with the lowest versions that setup.cfg allows
+#   make test-newest     and with the newest; TESTS=tests/io for a part of it
 #   make docs       the documentation, docs/build/html/index.html
 #   make drag-film  the animation of the README
 #   make types      mypy --strict              make bench      a report of timings
@@ -25,9 +27,9 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview campaign soak docs drag-film lint format types bench bench-history clean
+.PHONY: help demo test test-paraview test-lowest test-newest campaign soak docs drag-film lint format types bench bench-history clean
 help:
-	@sed -n '3,11s/^# *//p' Makefile
+	@sed -n '3,13s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
@@ -47,13 +49,30 @@ test: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
+# In environments of their own.  uv reads the lowest versions from setup.cfg, which pip cannot do;
+# no library is compiled.
+TESTS ?= tests
+test-lowest: export SEGDEFORM_LOWEST := true
+test-lowest: resolution := lowest-direct
+test-newest: resolution := highest
+test-lowest test-newest: $(BIN)/python
+	$(PIP) install uv
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python build/$@
+	$(BIN)/uv pip install --quiet --python build/$@ --resolution $(resolution) \
+	  --only-binary :all: --no-binary vtk-segdeform --editable '.[test,app,meshlab]'
+	build/$@/bin/python -m pytest -n 2 --dist worksteal $(TESTS)
+
 # In a real ParaView, whose own numpy and scipy may be too old: newer ones are put beside it.
-test-paraview: $(VENV)/installed-test
+test-paraview: build/paraview/installed
+	SEGDEFORM_PARAVIEW=$(CURDIR)/build/paraview $(BIN)/python -m pytest tests/filters/test_paraview_plugin.py
+
+build/paraview/installed: setup.cfg | $(VENV)/installed-test
 	@command -v pvpython >/dev/null || { \
-	  echo "There is no pvpython here. On Debian and Ubuntu: apt-get install paraview" >&2; exit 1; }
+	  echo "There is no pvpython here. On Debian and Ubuntu:" \
+	       "apt-get install paraview python3-paraview" >&2; exit 1; }
 	$(PIP) install --target build/paraview --upgrade --only-binary=:all: --python-version \
 	  `pvpython -c 'import sys; print("%d.%d" % sys.version_info[:2])'` numpy scipy
-	SEGDEFORM_PARAVIEW=$(CURDIR)/build/paraview $(BIN)/python -m pytest tests/filters/test_paraview_plugin.py
+	@touch $@
 
 campaign: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m campaign

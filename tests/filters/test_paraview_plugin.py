@@ -1,8 +1,14 @@
-"""The plugin in pvpython gives the results of the Python API.  `make test-paraview`."""
+"""The plugin in pvpython gives the results of the Python API (`make test-paraview`).
+
+That ParaView's loader can execute its file, and what it says where it cannot work, is tested
+without ParaView, whose decorators are then replaced.
+"""
 
 from __future__ import annotations
 
+import configparser
 import os
+import re
 import runpy
 import shutil
 import subprocess
@@ -14,13 +20,33 @@ import pytest
 from numpy.testing import assert_allclose
 
 import vtk_segdeform as sd
+from vtk_segdeform.cages import suggested_size
 
 ROOT = Path(__file__).resolve().parents[2]
 PLUGIN = ROOT / "vtk_segdeform" / "filters" / "paraview_plugin.py"
+LIBRARIES = os.pathsep.join(each for each in sys.path if each.endswith("site-packages"))
+
+# As ParaView does: the file alone, under its own name.
+LOAD = """
+import importlib.util, platform, sys
+platform.python_version = lambda: sys.argv[2]
+spec = importlib.util.spec_from_file_location("paraview_plugin", sys.argv[1])
+plugin = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(plugin)
+print(plugin.SegmentedCageDeform.__mro__[1].__module__)
+"""
+DECORATORS = """
+class Decorators:
+    def __getattr__(self, name):
+        return lambda *given, **options: lambda decorated: decorated
+smdomain = smhint = smproperty = smproxy = Decorators()
+"""
 
 SCRIPT = """
-import inspect, json, sys
-inspect.getargspec = getattr(inspect, "getargspec", inspect.getfullargspec)  # ParaView 5.11
+import inspect
+inspect.getargspec = inspect.getfullargspec
+
+import sys
 import numpy as np
 from paraview.simple import *
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -81,8 +107,15 @@ def test_its_results_are_those_of_the_api(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     assert "no point array 'nothing'" in done.stdout + done.stderr
     got = np.load(tmp_path / "out.npz")
+    regions = sd.segment(mesh)
+    cages = sd.fit_cages(mesh, regions, suggested_size(regions))
+
+    def solved(targets):
+        deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle)
+        return deformer.solve(targets)
+
     shift = np.array([0.25, 0.0, -0.05])
-    shifted = sd.deform(mesh, fixed, handle, mesh.vertices[handle] + shift, refine=False)
+    shifted = solved(mesh.vertices[handle] + shift)
     assert_allclose(got["shifted"], shifted.vertices, rtol=0, atol=1e-9)
     assert abs(got["volume"]) < 1e-12
     centre, angle = mesh.vertices[handle].mean(axis=0), np.radians(30.0)
@@ -90,7 +123,7 @@ def test_its_results_are_those_of_the_api(tmp_path):
         [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
     )
     targets = (mesh.vertices[handle] - centre) @ turn.T + centre + shift
-    turned = sd.deform(mesh, fixed, handle, targets, refine=False)
+    turned = solved(targets)
     assert_allclose(got["turned"], turned.vertices, rtol=0, atol=1e-9)
     assert (got["again"] == got["turned"]).all()
 
@@ -99,14 +132,86 @@ def test_its_results_are_those_of_the_api(tmp_path):
 def test_a_scipy_that_is_too_old_is_an_error(tmp_path):
     (tmp_path / "scipy.py").write_text("__version__ = '1.10.1'")
     script = tmp_path / "script.py"
-    script.write_text(
-        "import inspect, sys, importlib.util as u\n"
-        "inspect.getargspec = inspect.getfullargspec\n"
-        "s = u.spec_from_file_location('plugin', sys.argv[1])\n"
-        "s.loader.exec_module(u.module_from_spec(s))\n"
+    script.write_text(SCRIPT)
+    path = f"{tmp_path}{os.pathsep}{os.environ['SEGDEFORM_PARAVIEW']}"
+    done = pvpython(script, PLUGIN, "unread.vtp", "unwritten.npz", PYTHONPATH=path)
+    assert done.returncode != 0
+    assert (
+        "scipy 1.15 or newer; ParaView's Python has 1.10.1: pip inst" in done.stdout + done.stderr
     )
-    done = pvpython(script, PLUGIN, PYTHONPATH=str(tmp_path))
-    assert "has scipy 1.10.1, vtk_segdeform needs 1.13" in done.stdout + done.stderr
+
+
+@pytest.fixture
+def loaded(tmp_path):
+    """Return a function that executes a plugin file in a fresh Python, without its site-packages.
+
+    It returns the standard output, or the last line of the error.
+    """
+    module = tmp_path / "stand-in" / "paraview" / "util" / "vtkAlgorithm.py"
+    module.parent.mkdir(parents=True)
+    module.write_text(DECORATORS)
+
+    def load(plugin, *folders, python="3.11.2"):
+        path = os.pathsep.join(map(str, (tmp_path / "stand-in", *folders)))
+        done = subprocess.run(
+            [sys.executable, "-S", "-c", LOAD, str(plugin), python], cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        return done.stderr.strip().split("\n")[-1] or done.stdout.strip()
+
+    return load
+
+
+OURS = "vtk_segdeform.filters.deform_filter"
+
+
+def test_the_file_in_the_package_finds_the_package_that_contains_it(loaded, tmp_path):
+    (tmp_path / "vtk_segdeform").mkdir()  # as a checkout in the current folder: not the package
+    assert loaded(PLUGIN, LIBRARIES) == OURS
+
+
+def test_a_copy_needs_the_package_in_the_path(loaded, tmp_path):
+    (tmp_path / "vtk_segdeform").mkdir()
+    copy = shutil.copy(PLUGIN, tmp_path / "vtk_segdeform" / "copy.py")
+    assert loaded(copy, ROOT, LIBRARIES) == OURS
+    text = loaded(copy)
+    assert text.startswith("RuntimeError: the plugin needs the package vtk_segdeform, which ParaV")
+    assert "paraview_plugin --path prints" in text
+    assert "PYTHONPATH=FOLDER" in text
+
+
+@pytest.mark.parametrize(
+    ("library", "source", "found"),
+    [("numpy", "__version__ = '1.24.2'", "has 1.24.2"),
+     ("scipy", "__version__ = '1.10.1'", "has 1.10.1"),
+     ("scipy", "import nothing", "cannot import it (No module named 'nothing')")],
+)  # fmt: skip
+def test_a_library_that_is_too_old_or_missing_is_named(loaded, tmp_path, library, source, found):
+    for name in ("numpy", "scipy"):
+        (tmp_path / "stand-in" / f"{name}.py").write_text("__version__ = '9.0.0rc1'")
+    (tmp_path / "stand-in" / f"{library}.py").write_text(source)
+    text = loaded(PLUGIN)
+    assert re.search(
+        rf"needs {library} [\d.]+ or newer; ParaView's Python {re.escape(found)}: pip", text
+    )
+    assert "pip install --target FOLDER numpy scipy with Python 3.11.2" in text
+
+
+def test_a_python_that_is_too_old_is_named(loaded):
+    assert "a ParaView with Python 3.10 or newer; this one has 3.9.18" in loaded(
+        PLUGIN, python="3.9.18"
+    )
+
+
+def test_the_lowest_versions_are_those_of_setup_cfg():
+    setup = configparser.ConfigParser()
+    setup.read(ROOT / "setup.cfg", encoding="utf-8")
+    requires = (
+        f"{setup['options']['install_requires']}\npython{setup['options']['python_requires']}"
+    )
+    lowest = dict(re.findall(r"(?m)^([\w-]+)>=([\d.]+)", requires))
+    written = re.findall(r'"(\w+)": "([\d.]+)"', PLUGIN.read_text(encoding="utf-8"))
+    assert written == [(name, lowest[name]) for name in ("python", "numpy", "scipy")]
 
 
 def test_the_plugin_prints_its_path(monkeypatch, capsys):

@@ -79,7 +79,8 @@ def test_every_array_is_preserved_by_a_deformation_and_by_vtk_files(tmp_path, su
         assert_array_equal(again.point_data[name], cube.point_data[name])
     assert_array_equal(again.cell_data["part"], cube.cell_data["part"])
     assert list(again.field_data["maker"]) == ["nobody"]
-    assert again.point_data.active_texture_coordinates_name == "uv"
+    if suffix != ".vtkhdf" or pv.vtk_version_info >= (9, 7):  # which stores what is active
+        assert again.point_data.active_texture_coordinates_name == "uv"
 
 
 def test_a_ply_file_preserves_colours_texture_and_numbers(tmp_path):

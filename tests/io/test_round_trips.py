@@ -17,6 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, TETRAHEDRON
+from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform.io.array_names import get_names, set_names
 from vtk_segdeform.io.convert import read_polydata, write_mesh
@@ -205,7 +206,7 @@ def test_cell_arrays_follow_their_cells_beside_points_lines_and_strips(tmp_path,
     assert group[:others] == list(range(others))
     group = group[others:]
     assert group[:6] == list(range(3, 9))  # after points and lines
-    lengths = np.diff(mixed.strip_offsets) - 2
+    lengths = np.diff(vtk_to_numpy(mixed.GetStrips().GetOffsetsArray())) - 2
     assert group[6:] == np.repeat(np.arange(9, 9 + len(lengths)), lengths).tolist()
 
 

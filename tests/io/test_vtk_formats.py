@@ -151,6 +151,8 @@ def test_all_codings_in_xml_are_read_as_vtk_reads_them(
 @pytest.mark.parametrize("grid", [False, True])
 def test_all_legacy_versions_are_read_as_vtk_reads_them(tmp_path, grid, make, binary, version):
     surface = make().cast_to_unstructured_grid() if grid else make()
+    if not binary and pv.vtk_version_info < (9, 7) and make in (rich, with_an_array_of_two_uses):
+        pytest.skip("this VTK reads neither inf nor nan in a text")
     path = tmp_path / "a.vtk"
     written_legacy(path, surface, binary=binary, version=version)
     assert contents(read_in_child(path)) == contents(pv.read(path))

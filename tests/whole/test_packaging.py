@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import configparser
 import importlib
+import os
 import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 from test_architecture import FILES, imports  # parsed once for both
 
 import vtk_segdeform
+from vtk_segdeform.cli import application
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARY_OF = {
@@ -69,6 +73,29 @@ def test_one_extra_installs_the_whole_desktop_program(setup_cfg):
     app = setup_cfg["options.extras_require"]["app"]
     assert {"PySide6-Essentials", "pyvistaqt", "qtpy"} <= names_in(app)
     assert '!=6.12.0; python_version<"3.12"' in app
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("versions", ["lowest", "newest"])
+def test_the_suite_passes_with_the_lowest_and_with_the_newest_versions(versions):
+    subprocess.run(["make", f"test-{versions}", f"VENV={sys.prefix}"], cwd=ROOT, check=True)
+
+
+# The newest Pythons have no wheels of the lowest versions.
+@pytest.mark.skipif(
+    "SEGDEFORM_LOWEST" not in os.environ or sys.version_info >= (3, 13), reason="make test-lowest"
+)
+def test_the_lowest_versions_are_those_that_are_tested(setup_cfg):
+    lists = [setup_cfg["options"]["install_requires"]]
+    lists += [setup_cfg["options.extras_require"][extra] for extra in ("meshlab", "app", "web")]
+    lines = [
+        line.partition("#")[0].partition(";")[0] for each in lists for line in each.splitlines()
+    ]
+    lowest = dict(re.findall(r"([\w-]+)>=([\w.]+)", "\n".join(lines)))
+    assert len(lowest) > 15
+    tested = {name: metadata.version(name) for name in lowest}
+    short = {name: re.sub(r"(\.0)+$", "", version) for name, version in tested.items()}
+    assert short == {name: re.sub(r"(\.0)+$", "", version) for name, version in lowest.items()}
 
 
 def test_every_folder_with_code_is_a_declared_package(setup_cfg):
@@ -142,9 +169,55 @@ def test_the_wheel_contains_both_packages_and_the_licence(tmp_path):
     assert vtk_segdeform.__version__ in wheel.name
 
 
+def test_the_sdist_contains_what_builds_the_package_and_no_pictures(tmp_path):
+    pytest.importorskip("setuptools", minversion="77", reason="an older one needs wheel")
+    source = tmp_path / "source"
+    git = shutil.which("git")
+    listed = subprocess.run([git, "ls-files", "-z"], cwd=ROOT, capture_output=True) if git else None
+    if listed is None or listed.returncode:
+        pytest.skip("no repository")
+    for name in filter(None, listed.stdout.decode().split("\0")):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        copied(str(ROOT / name), str(source / name))
+    build = "import sys; from setuptools import build_meta; build_meta.build_sdist(sys.argv[1])"
+    done = subprocess.run(
+        [sys.executable, "-c", build, str(tmp_path)], cwd=source, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    (sdist,) = tmp_path.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()}
+        about = archive.extractfile(
+            next(each for each in archive if each.name.endswith("/PKG-INFO"))
+        )
+        assert_it_can_be_shown_anywhere(about.read().decode())
+    ours = {
+        each
+        for each in listed.stdout.decode().split("\0")
+        if each.startswith(("vtk_seg", "widgets/"))
+    }
+    assert ours <= inside
+    assert {"setup.cfg", "pyproject.toml", "README.md", "LICENSE", "CHANGELOG.md"} <= inside
+    assert [name for name in inside if re.search(r"\.(png|gif|jpe?g)$|^(docs|tests)/", name)] == []
+
+
+def assert_it_can_be_shown_anywhere(about: str) -> None:
+    """Check the description for a package index, where only whole addresses lead anywhere."""
+    fields, _, text = about.partition("\n\n")
+    (author,) = re.findall(r"- name: (.+)", (ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert f"\nAuthor: {author}\n" in fields
+    assert re.findall(r"\]\((?!https://)", text) == []
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    paragraph = text.strip().partition("\n\n")[0]
+    assert paragraph in readme
+    (code,) = re.findall(r"```python\n.*?```", text, re.DOTALL)
+    assert code in readme
+
+
 def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_cfg):
     recipe = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
     assert re.findall(r'version: "(.+)"', recipe) == [vtk_segdeform.__version__]
+    assert re.search(r"\n  url: https://.+\.tar\.gz\n  sha256: ", recipe)  # of a release
     listed = re.findall(r"(?m)^    - (\S+) (>=\S+)$", recipe.partition("\n  run:\n")[2])
     required = (
         setup_cfg["options"]["install_requires"]
@@ -153,6 +226,45 @@ def test_the_conda_recipe_builds_this_version_with_the_same_requirements(setup_c
     )
     lowest = dict(re.findall(r"(?m)^([\w-]+)(>=[\d.]+)", required))
     assert dict(listed) == lowest
+
+
+PACKAGE = r"lib[a-z0-9.+-]*[0-9]"
+
+
+def packages_for_the_desktop() -> set[str]:
+    """Return the Debian packages that .ci/run installs for the desktop program."""
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    return set(re.search(r"desktop=\((.*?)\)", script, re.S)[1].split())
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorial/desktop.rst"])
+def test_the_packages_for_the_desktop_are_the_same_everywhere(page):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    line = re.search(rf"apt-get install (libdbus-1-3(?:[\s\\]+{PACKAGE})+)", text)[1]
+    assert set(re.findall(PACKAGE, line)) == packages_for_the_desktop()
+
+
+@pytest.mark.skipif(not shutil.which("dpkg-query"), reason="no Debian")
+def test_the_packages_for_the_desktop_contain_every_library_of_qt():
+    plugins = application._platform_plugins()
+    if not plugins:
+        pytest.skip("no Qt with its own plugins")
+    query = ["dpkg-query", "-W", "-f=${Package}:${Depends}, ${Pre-Depends}\n"]
+    lines = subprocess.run(query, capture_output=True, text=True, check=True).stdout.splitlines()
+    depends = {
+        name: {re.split(r"[ :|(]", each.strip())[0] for each in rest.split(",")}
+        for name, _, rest in (line.partition(":") for line in lines)
+    }
+    installed, new = set(), packages_for_the_desktop()
+    while new:
+        installed |= new
+        new = set().union(*(depends.get(name, set()) for name in new)) - installed
+    ldd = subprocess.run(["ldd", *plugins], capture_output=True, text=True, check=True).stdout
+    libraries = re.findall(r"(?m)^\s*(lib\S+) => /(?:usr/)?lib", ldd)
+    assert len(libraries) > 20
+    query = ["dpkg-query", "-S", *(f"*-linux-gnu*/{library}" for library in libraries)]
+    owners = subprocess.run(query, capture_output=True, text=True, check=True).stdout
+    assert set(re.findall(r"(?m)^([^:]+):", owners)) <= installed
 
 
 def test_the_newest_release_of_the_changelog_is_this_version():

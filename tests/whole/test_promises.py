@@ -207,7 +207,7 @@ def test_the_botsch_sorkine_poses_preserve_the_volume_that_arap_loses(
     seconds = time.perf_counter() - begin
     lost = signed_volume(pose, mesh.faces) / signed_volume(mesh.vertices, mesh.faces)
     print(
-        f"{name}: ARAP volume {lost - 1:+.3f}, 200 iterations, {seconds:.2f} s, "
+        f"{name}: ARAP volume {100 * (lost - 1):+.1f} %, 200 iterations, {seconds:.2f} s, "
         f"distortion {distortion(mesh, pose):.4f}"
     )
     assert abs(change) <= 1e-12

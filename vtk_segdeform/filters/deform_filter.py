@@ -12,9 +12,10 @@ Regions come from a point array of labels or from automatic segmentation.  Fixed
 handle are point arrays, where nonzero, or point indices.  The handle moves to given targets, or is
 rotated about its centre and translated.  Points at a seam follow one vertex of the mesh.
 
-The output depends on inputs and settings only, not on earlier executions; it equals that of
-`vtk_segdeform.deform` without `refine`.  Polygons are cut into triangles by VTK.  Only the parts
-that changed are computed again: new targets need a solve, a new handle some milliseconds more, and
+The output depends on inputs and settings only, not on earlier executions: it is the solution of a
+`Deformer` with the regions of `segment` and the cages of `fit_cages`.  (`vtk_segdeform.deform` has
+regions that depend on the handle.)  Polygons are cut into triangles by VTK.  Only the parts that
+changed are computed again: new targets need a solve, a new handle some milliseconds more, and
 only a new surface, regions, cages or stretch resistance needs a new binding (counted by `rebinds`).
 
 Errors are reported as in VTK, by an ErrorEvent with a text or in the output window, and the output

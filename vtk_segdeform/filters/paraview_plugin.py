@@ -16,7 +16,9 @@ If vtk_segdeform is not installed in it, the package that contains this file is 
 
 from __future__ import annotations
 
+import platform
 import sys
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -26,20 +28,56 @@ if __name__ == "__main__":  # run from a shell, without ParaView
         sys.exit(0)
     sys.exit("python -m vtk_segdeform.filters.paraview_plugin --path")
 
-import scipy
 from paraview.util.vtkAlgorithm import smdomain, smhint, smproperty, smproxy
 
-if tuple(map(int, scipy.__version__.split(".")[:2])) < (1, 13):
-    raise ImportError(
-        f"ParaView's Python has scipy {scipy.__version__}; vtk_segdeform needs 1.13 or newer: "
-        "pip install --target FOLDER numpy scipy, then start ParaView with PYTHONPATH=FOLDER"
-    )
+LOWEST = {"python": "3.10", "numpy": "1.26", "scipy": "1.15"}  # those of setup.cfg
 
-if find_spec("vtk_segdeform") is None:
-    # Last in the path, so that no module of ParaView is replaced.
-    sys.path.append(str(Path(__file__).resolve().parent.parent))
 
-from .deform_filter import SegmentedCageDeformFilter
+def _missing() -> str:
+    """Return what ParaView's Python lacks, and what to do about it."""
+    package, python = Path(__file__).resolve().parent.parent, platform.python_version()
+    if not _is_found() and (package / "__init__.py").is_file():
+        sys.path.append(str(package.parent))  # last, so that no module of ParaView is replaced
+    if not _is_found():
+        return (
+            f"the package vtk_segdeform, which ParaView's Python {python} does not find: load the "
+            "file that python -m vtk_segdeform.filters.paraview_plugin --path prints, or start "
+            "ParaView with PYTHONPATH=FOLDER, where FOLDER contains the package"
+        )
+    if _is_older(python, LOWEST["python"]):
+        return f"a ParaView with Python {LOWEST['python']} or newer; this one has {python}"
+    for name in ("numpy", "scipy"):
+        try:
+            version = import_module(name).__version__
+        except ImportError as error:
+            found = f"cannot import it ({error})"
+        else:
+            if not _is_older(version, LOWEST[name]):
+                continue
+            found = f"has {version}"
+        return (
+            f"{name} {LOWEST[name]} or newer; ParaView's Python {found}: "
+            f"pip install --target FOLDER numpy scipy with Python {python}, then start ParaView "
+            "with PYTHONPATH=FOLDER"
+        )
+    return ""
+
+
+def _is_found() -> bool:
+    spec = find_spec("vtk_segdeform")
+    return spec is not None and spec.origin is not None  # no folder that is merely named so
+
+
+def _is_older(version: str, lowest: str) -> bool:
+    return [*map(int, version.split(".")[:2])] < [*map(int, lowest.split("."))]
+
+
+if missing := _missing():
+    # After an ImportError ParaView would load the file in a second way, and show how that failed.
+    raise RuntimeError(f"the plugin needs {missing}")
+
+# By its full name: ParaView executes this file alone, outside of the package.
+from vtk_segdeform.filters import SegmentedCageDeformFilter  # noqa: E402
 
 paraview_plugin_version = "0.1"
 

@@ -74,8 +74,10 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     if len(surfaces) > 1:  # of several grids nothing is restored
         surfaces = [_without_types(each) for each in surfaces]
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
-    if suffix == ".vtkhdf":  # it does not store which arrays are active
-        _activate_normals(surface)
+    if suffix == ".vtkhdf":  # before VTK 9.7 it does not store which arrays are active
+        _activate(surface.point_data, "Normals", "normals", 3)
+        _activate(surface.cell_data, "Normals", "normals", 3)
+        _activate(surface.point_data, "TextureCoordinates", "texture_coordinates", 2)
     elif suffix == ".vtk":
         _set_title(surface, begin)
     return surface
@@ -90,12 +92,12 @@ def _set_title(surface: pv.PolyData, begin: bytes) -> None:
         set_names(surface, HEADER, [title])
 
 
-def _activate_normals(surface: pv.PolyData) -> None:
-    for attributes in (surface.point_data, surface.cell_data):
-        normals = attributes.get("Normals")
-        found = normals is not None and normals.shape[1:] == (3,) and normals.dtype.kind == "f"
-        if found and attributes.active_normals_name is None:
-            attributes.active_normals_name = "Normals"
+def _activate(attributes: pv.DataSetAttributes, name: str, role: str, width: int) -> None:
+    """Give an array the role that its name says, if no other array has it."""
+    values, active = attributes.get(name), f"active_{role}_name"
+    found = values is not None and values.shape[1:] == (width,) and values.dtype.kind == "f"
+    if found and getattr(attributes, active) is None:
+        setattr(attributes, active, name)
 
 
 def _surface(data: pv.DataSet, suffix: str) -> pv.PolyData:

@@ -108,7 +108,8 @@ def _linked(
     tree = keys
     if len(keys) > 1:
         cost = 2.0 - np.abs(total) / np.abs(total).max(initial=1.0)
-        graph = sparse.coo_array((cost, np.divmod(keys, q)), (q, q)).tocsr()
+        ends = np.stack(np.divmod(keys, q)).astype(np.int32)  # as SciPy before 1.16 requires
+        graph = sparse.coo_array((cost, (ends[0], ends[1])), (q, q)).tocsr()
         links = csgraph.minimum_spanning_tree(graph).tocoo()
         tree = links.row.astype(np.int64) * q + links.col
     agree = total[np.searchsorted(keys, tree)] >= 0.0
