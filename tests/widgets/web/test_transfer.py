@@ -41,7 +41,7 @@ def told(tmp_path):
         transfer = Transfer(editor, tmp_path / "uploads", LIMIT, names, lambda: None)
         application = web.Application()
         transfer.add_routes(application)
-        runner = web.AppRunner(application)
+        runner = web.AppRunner(application, shutdown_timeout=0.5)
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
         url = URL(f"http://127.0.0.1:{runner.addresses[0][1]}/upload")
@@ -56,7 +56,7 @@ def told(tmp_path):
             finally:
                 await runner.cleanup()
 
-    return lambda story: asyncio.run(asyncio.wait_for(tell(story), 60.0))
+    return lambda story: asyncio.run(asyncio.wait_for(tell(story), 20.0))
 
 
 class Slow:
