@@ -183,7 +183,9 @@ class Client:
         """Keep why the process has ended; the details are not for the page."""
         self.failure, self.could_not_start = sentence, self.port is None
         # Files may put anything into a message: no escape sequence may reach a terminal.
-        text = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in sentence)
+        text = "".join(
+            letter if letter.isprintable() else ascii(letter)[1:-1] for letter in sentence
+        )
         _log.warning(" ".join([text, *map(ascii, details)]))
 
     async def _live(self, errors: bytearray) -> None:
