@@ -207,10 +207,11 @@ async def _connect(
     try:
         await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        for task in both:
-            task.cancel()
-        ends = await asyncio.gather(*both, return_exceptions=True)
-    for ended in ends:
+        while rest := [task for task in both if not task.done()]:
+            for task in rest:
+                task.cancel()  # which `wait_for` may swallow before Python 3.12
+            await asyncio.wait(rest, timeout=0.1)
+    for ended in await asyncio.gather(*both, return_exceptions=True):
         if isinstance(ended, End):
             return ended
         if isinstance(ended, asyncio.TimeoutError):
