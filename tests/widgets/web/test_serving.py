@@ -428,7 +428,7 @@ def test_a_page_that_does_not_read_is_left(guest, do):
 
 def test_too_many_requests_of_one_client_are_refused(do, tmp_path):
     async def story():
-        async with serving(tmp_path, replace(LIMITS, requests=3)) as (server, visitor):
+        async with serving(tmp_path, replace(LIMITS, requests=3)) as (_, visitor):
             guest = visitor()
             await guest.enter()
             others = [await guest.socket() for _ in range(3)]

@@ -35,7 +35,7 @@ from .run_folder import run_folder
 DEFAULT_PORT = 8765
 _PAGES = ("", "index.html")
 _UPLOAD, _SOCKET = "upload", "ws"
-_LONGEST = 255  # bytes of a path: more than any file of the page has
+_LONGEST = 255  # bytes of a path, as of a name in most file systems
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 _log = logging.getLogger(__name__)
