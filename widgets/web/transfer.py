@@ -4,7 +4,8 @@
     GET  download/SUFFIX       the session, or the surface in its pose
 
 Both need the header ``X-Segdeform``, which a page of another origin cannot send.  A page never
-names a file of the server: of NAME only the suffix is used, and the text is shown.
+names a file of the server: of NAME only the suffix is used, and the text is shown.  One file is
+uploaded at a time, each to a folder of its own.
 """
 
 from __future__ import annotations
@@ -72,6 +73,7 @@ class Transfer:
     ) -> None:
         self._editor, self._folder, self.limit = editor, folder, limit
         self._names, self._changed = names, changed
+        self._is_uploading = False
 
     def add_routes(self, app: Any) -> None:
         """Add the routes to an aiohttp application."""
@@ -88,24 +90,35 @@ class Transfer:
             return _refusal(415, f"{name or 'This file'} is no mesh or session that can be opened.")
         if (request.content_length or 0) > self.limit:
             return self._too_large(name)
+        if self._is_uploading:
+            return _refusal(409, "Another upload is in progress. Wait until it is complete.")
         if self._editor.is_busy:
             return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
-        place = self._new_folder() / f"upload{suffix}"
+        self._is_uploading, folder = True, self._new_folder()
+        place, is_open = folder / f"upload{suffix}", False
+        try:
+            if not await self._store(request, place):
+                return self._too_large(name)
+            self._names.update(dict.fromkeys(map(str, (place, place.with_suffix(_SESSION))), name))
+            error = self._editor.do(opening(place))
+            is_open = error is None
+        except OSError as fault:
+            return _refusal(507, f"{name} could not be stored: {fault.strerror}.")
+        finally:
+            self._is_uploading = False
+            self._remove_folders(all_but=folder if is_open else None)
+        return web.Response() if error is None else _refusal(409, str(error))
+
+    async def _store(self, request: web.Request, place: Path) -> bool:
+        """Write the body to *place*; return False if it is larger than the limit."""
         size = 0
         with replacing(place) as draft, draft.open("wb") as file:
             async for data in request.content.iter_chunked(1 << 18):
                 size += len(data)
                 if size > self.limit:
-                    break
+                    return False
                 file.write(data)
-        if size > self.limit:
-            shutil.rmtree(place.parent)
-            return self._too_large(name)
-        self._remove_older(place)
-        self._names[str(place)] = name
-        self._names[str(place.with_suffix(_SESSION))] = name
-        error = self._editor.do(opening(place))
-        return _refusal(409, str(error)) if error is not None else web.Response()
+        return True
 
     async def download(self, request: web.Request) -> web.Response:
         """Send the session, or the surface in its pose, once that has settled."""
@@ -148,10 +161,10 @@ class Transfer:
         most = f"{self.limit / 1e6:,.0f} MB"
         return _refusal(413, f"{name} is larger than {most}, the limit of this server.")
 
-    def _remove_older(self, place: Path) -> None:
-        """Remove earlier uploads, except the one that is edited, which may be saved to again."""
+    def _remove_folders(self, *, all_but: Path | None) -> None:
+        """Remove uploads, except the one that is edited, which may be saved to again."""
         for path in self._folder.iterdir():
-            if path.is_dir() and path not in (place.parent, self._editor.path.parent):
+            if path.is_dir() and path not in (all_but, self._editor.path.parent):
                 shutil.rmtree(path, ignore_errors=True)
 
 

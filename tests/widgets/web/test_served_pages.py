@@ -119,6 +119,9 @@ def test_the_program_serves_the_editor(tmp_path: Path) -> None:
                 _, plain, headers = await guest.get(f"{guest.path}index.html", **only)
                 assert "Content-Encoding" not in headers
                 assert plain == text
+            async with session.head(guest.base + guest.path + "index.html", headers={
+                "Cookie": guest.cookie}) as answer:  # fmt: skip
+                assert answer.status == 200
             (client,) = program.children
             loaded = [Path(f"/proc/{k}/maps").read_text() for k in (client, program.process.pid)]
             for library in ("numpy", "vtkmodules"):

@@ -185,6 +185,7 @@ def test_a_process_that_takes_too_much_memory_is_ended_by_name(do, tmp_path):
         ([sys.executable, "-c", "import time; time.sleep(1000)"], "The editor did not start", 1),
         ([sys.executable, "-c", "1 / 0"], "The editor could not be started.", 1),
         ([sys.executable, "-c", "print('hello')"], "The editor could not be started.", 1),
+        ([sys.executable, "-c", r"""print('{"error": "Not \\u001b[31mred."}')"""], "[31mred.", 1),
         (["/no/such/program"], "The editor could not be started.", 1),
     ],
 )
@@ -210,6 +211,7 @@ def test_a_process_that_cannot_start_says_why_in_the_page(
 
     do(story())
     assert reason in caplog.text
+    assert "\x1b" not in caplog.text
 
 
 def children():

@@ -100,6 +100,65 @@ def test_a_finished_pose_is_sent_with_its_offsets_and_dragged_on_without(stream)
     assert kinds(stream.due(LOOK)) == [Kind.OFFSETS, Kind.CAGES]  # none any more
 
 
+class Page:
+    """What a page draws after all messages so far: W p, and the offsets."""
+
+    def __init__(self, stream: SurfaceStream) -> None:
+        self.stream = stream
+        self.reload()
+
+    def reload(self) -> None:
+        """Forget everything."""
+        self.stream.reset()
+        self.moves, self.offsets = None, 0.0
+
+    def error(self) -> float:
+        """Receive what is due; return the largest distance from the session's pose, in diagonals.
+
+        W~ is exact here; `test_encoding` tests what is sent of it.
+        """
+        for data in self.stream.due(LOOK):
+            (kind,) = kinds([data])
+            if kind is Kind.CAGES:
+                self.moves = np.frombuffer(data, "<f4", offset=20).reshape(-1, 3)
+            elif kind is Kind.OFFSETS:
+                rest = np.frombuffer(data, "<i2", offset=20).reshape(-1, 3)  # padded
+                self.offsets = np.frombuffer(data, "<f4", 1, 16) * rest if len(rest) else 0.0
+        surface, session = self.stream.surface, self.stream.session
+        p = surface.cages + surface.scale * self.moves
+        ends = np.cumsum([cage.n_vertices for cage in session.cages])[:-1]
+        at_cages = session.deformer.surface(np.split(p, ends))[surface.order]
+        x = at_cages + surface.scale * self.offsets
+        return float(np.abs(x - session.vertices[surface.order]).max() / surface.scale)
+
+
+def test_the_page_follows_poses_that_were_finished_and_dragged_on(stream):
+    session, errors, largest = stream.session, [], 0.0
+    page = Page(stream)
+    end = session.targets["end"]
+    steps = [
+        session.undo,
+        lambda: session.move_handle("end", end + [-1.0, 1.0, 0.5]),
+        session.commit,
+        session.finish,
+        page.reload,
+        *(lambda k=k: session.move_handle("end", end + [-1.0, 1.0 + 0.2 * k, 0.5]) for k in (1, 2)),
+        session.commit,
+        session.finish,  # with other offsets
+        session.undo,
+        session.undo,
+        session.redo,
+        session.redo,
+        session.reset_pose,
+    ]
+    for step in steps:
+        step()
+        errors.append(page.error())
+        largest = max(largest, float(np.abs(page.offsets).max()))
+    assert max(errors) <= 1.1e-4, errors  # which is not seen
+    assert largest > 0.03
+
+
 def test_a_new_page_is_sent_everything(stream):
     stream.reset()
     assert kinds(stream.due(LOOK)) == [Kind.SURFACE, Kind.LOOK, Kind.CAGES]

@@ -151,6 +151,29 @@ def test_colours_and_moves_reach_the_page(page, scene):
     compare(page, here)
 
 
+def test_a_finished_pose_is_drawn_with_its_offsets_while_it_has_them(page):
+    session = sausage_session()
+    here = InProcess(session)
+    session.move_handle("end", session.targets["end"] + [-1.0, 1.0, 0.5])
+    session.commit()
+    session.finish()
+    offsets = session.vertices - session.deformer.surface(session.cage_vertices)
+    assert np.abs(offsets).max() > 0.03 * session.mesh.diagonal  # some 10 pixels
+    for _ in range(2):  # and another page
+        here.stream.reset()
+        assert set(send(page, here.due())) == {""}
+        compare(page, here)
+    session.move_handle("end", session.targets["end"] + [0.0, 0.4, 0.3])
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)
+    session.revert()
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)
+    session.undo()
+    assert set(send(page, here.due())) == {""}
+    compare(page, here)
+
+
 def test_a_turn_in_the_page_is_that_of_the_view(page, scene):
     here = scene.here
     camera = here.view.camera

@@ -13,10 +13,6 @@ const address = (path) => new URL(path, window.location.href.replace(/[^/]*([?#]
 
 const isTouch = window.matchMedia('(pointer: coarse)');
 const LOST = 'The connection to the server was lost.';
-const SENTENCES = {
-  1008: 'The page sent more events than the server accepts, and was disconnected.',
-  1009: 'A message of the page was too large, and the page was disconnected.',
-};
 const NAMES = { '?': 'question', Escape: 'escape' };
 
 const Page = {
@@ -63,8 +59,7 @@ const Page = {
       this.press('history', place);
     },
     end(event) {
-      const reason = event?.code === 4000 && event.reason;
-      this.ended ||= reason || SENTENCES[event?.code] || LOST;
+      this.ended ||= event?.reason || LOST;
     },
     reload() { window.location.reload(); },
     // Keys of the page, before the view gets them: help, and the way into the toolbar.

@@ -10,6 +10,7 @@ The server passes on what a page may do, and reads no files itself.  The files, 
     secret          the client's side: its secret, life and port; pages of notebooks
     client          one client process and its folder
     clients         all clients: number, memory, absence
+    connections     connections of all visitors: number, and time for a request
     proxy           requests and WebSockets, passed on with limits
     run_folder      the private folder of one run
     server          addresses, start and end

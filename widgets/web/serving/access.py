@@ -28,7 +28,9 @@ _ERRORS = {
     400: web.HTTPBadRequest,
     403: web.HTTPForbidden,
     404: web.HTTPNotFound,
+    408: web.HTTPRequestTimeout,
     409: web.HTTPConflict,
+    429: web.HTTPTooManyRequests,
     502: web.HTTPBadGateway,
     503: web.HTTPServiceUnavailable,
 }
@@ -87,7 +89,8 @@ class Access:
         @web.middleware
         async def checked(request: web.Request, handler: Handler) -> web.StreamResponse:
             hosts = request.headers.getall(hdrs.HOST, [])
-            if len(hosts) != 1 or not self._is_ours(hosts[0]):
+            named = request.rel_url.raw_authority or request.headers.get(hdrs.HOST, "")
+            if len(hosts) != 1 or not (self._is_ours(hosts[0]) and self._is_ours(named)):
                 refuse(403, "This server does not answer under this host name.")
             if request.method == hdrs.METH_POST or hdrs.UPGRADE in request.headers:
                 origins = request.headers.getall(hdrs.ORIGIN, [])

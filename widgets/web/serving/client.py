@@ -81,6 +81,16 @@ class Client:
         return self._task is not None and not self._task.done()
 
     @property
+    def is_closed(self) -> bool:
+        """Whether it has ended for good."""
+        return self._is_closed
+
+    @property
+    def visits(self) -> int:
+        """Requests and WebSockets in progress."""
+        return self._visits
+
+    @property
     def absent(self) -> float:
         """Seconds since the last request was answered or the last WebSocket closed."""
         return 0.0 if self._visits else asyncio.get_running_loop().time() - self._seen
@@ -132,7 +142,7 @@ class Client:
         """Return why the process has ended, which is known a moment after its connections close."""
         if self._task is not None:
             await asyncio.wait([self._task], timeout=_MOMENT)
-        return self.failure or "The editor has ended; reload the page."
+        return self.failure or "The editor has closed the connection; reload the page."
 
     async def end(self, reason: str) -> None:
         """Kill the process, and wait until it is gone; the page shows the *reason*."""
@@ -146,7 +156,7 @@ class Client:
     async def close(self) -> None:
         """End for good, and delete the folder."""
         self._is_closed = True
-        await self.end("The server has ended this client.")
+        await self.end("The server has ended.")
         shutil.rmtree(self.folder, ignore_errors=True)
 
     async def _run(self) -> None:
@@ -167,7 +177,11 @@ class Client:
     def _fail(self, sentence: str, *details: str) -> None:
         """Keep why the process has ended; the details are not for the page."""
         self.failure, self.could_not_start = sentence, self.port is None
-        _log.warning(" ".join([sentence, *map(ascii, details)]))
+        # Files may put anything into a message: no escape sequence may reach a terminal.
+        text = "".join(
+            letter if letter.isprintable() else ascii(letter)[1:-1] for letter in sentence
+        )
+        _log.warning(" ".join([text, *map(ascii, details)]))
 
     async def _live(self, errors: bytearray) -> None:
         """Run the process until it ends, which is an error, or this task is cancelled.

@@ -27,3 +27,9 @@ class Limits:
     """Messages of a page that its client process has not handled yet."""
     start: float = 120.0
     """Seconds in which a client process must start."""
+    requests: int = 64
+    """Requests and WebSockets of one client at the same time."""
+    waiting: int = 256
+    """Connections of all visitors on which no request of a client is being answered."""
+    patience: float = 30.0
+    """Seconds to wait for a request, for the next part of an upload, and for a page that reads."""

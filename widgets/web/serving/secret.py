@@ -105,7 +105,8 @@ def below(secret: str, application: web.Application) -> web.Application:
 
 def _compressed(request: web.Request, response: web.StreamResponse) -> web.StreamResponse:
     """Return *response*: a whole file of the page is compressed if the browser accepts it."""
-    if not isinstance(response, web.FileResponse) or hdrs.RANGE in request.headers:
+    is_whole = request.method == hdrs.METH_GET and hdrs.RANGE not in request.headers
+    if not isinstance(response, web.FileResponse) or not is_whole:
         return response
     if PurePosixPath(request.path).suffix in _COMPRESSED:
         response.headers[hdrs.VARY] = hdrs.ACCEPT_ENCODING

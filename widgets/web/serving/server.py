@@ -12,27 +12,33 @@ from __future__ import annotations
 import asyncio
 import errno
 import html
+import logging
 import signal
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import unquote
 
-from aiohttp import hdrs, web
+from aiohttp import WSCloseCode, hdrs, web
+from aiohttp.http import HttpProcessingError
 
 from .access import ANY, LOOPBACK, Access, add_headers, refuse
 from .client import Client, client_command
 from .clients import Clients
+from .connections import Connections
 from .limits import Limits
-from .proxy import new_session, pass_request, pass_socket
+from .proxy import End, new_session, pass_request, pass_socket, refuse_socket
 from .run_folder import run_folder
 
 DEFAULT_PORT = 8765
 _PAGES = ("", "index.html")
 _UPLOAD, _SOCKET = "upload", "ws"
+_LONGEST = 255  # bytes of a path, as of a name in most file systems
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+_log = logging.getLogger(__name__)
 
 _NOTE = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>segdeform</title>
@@ -50,6 +56,15 @@ def _note(text: str, status: int, *, refresh: bool = False) -> web.Response:
     return web.Response(status=status, text=body, content_type="text/html")
 
 
+def _is_own_fault(record: logging.LogRecord) -> bool:
+    """Return whether a message of aiohttp is about an error of this program, not of a visitor."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, HttpProcessingError | web.RequestPayloadError | ConnectionError)
+
+
+_log.addFilter(_is_own_fault)
+
+
 @dataclass
 class Server:
     """A running server, see `running`."""
@@ -59,6 +74,7 @@ class Server:
     limits: Limits
     host: str
     port: int
+    connections: Connections = field(init=False)
 
     def __post_init__(self) -> None:
         self._session = new_session()
@@ -106,25 +122,40 @@ class Server:
         return response
 
     async def _below(self, request: web.Request) -> web.StreamResponse:
-        client = self.clients.get(request.match_info["id"])
+        client, name = self.clients.get(request.match_info["id"]), request.match_info["tail"]
+        is_socket = name == _SOCKET and hdrs.UPGRADE in request.headers
+        is_socket = is_socket and request.method == hdrs.METH_GET
         if client is None or not self.access.has_key(request, client.key):
-            refuse(
-                403,
+            sentence = (
                 "This client has ended, or belongs to another browser. Open the address that "
-                "segdeform serve printed.",
+                "segdeform serve printed."
             )
-        tail = request.rel_url.raw_path.split("/", 3)[3]
-        if ".." in unquote(tail).replace("\\", "/").split("/"):
-            refuse(404, "There is no such file.")
-        with client.visit():
-            if tail == _SOCKET and hdrs.UPGRADE in request.headers:
+            if is_socket:
+                return await refuse_socket(request, End(WSCloseCode.POLICY_VIOLATION, sentence))
+            refuse(403, sentence)
+        if client.visits >= self.limits.requests:
+            sentence = "There are too many requests at the same time. Close other pages."
+            if is_socket:
+                return await refuse_socket(request, End(WSCloseCode.TRY_AGAIN_LATER, sentence))
+            refuse(429, sentence)
+        with self.connections.answering(request):
+            if is_socket:
                 with client.page():
                     return await pass_socket(self._session, client, request, self.limits)
-            if request.method == hdrs.METH_POST:
-                return await self._upload(client, request, tail)
-            if tail in _PAGES and (note := await self._start(client)):
-                return note
-            return await self._pass(client, request, tail)
+            with client.visit():
+                return await self._answer(client, request)
+
+    async def _answer(self, client: Client, request: web.Request) -> web.StreamResponse:
+        tail = request.rel_url.raw_path.split("/", 3)[3]
+        if len(tail) > _LONGEST or ".." in unquote(tail).replace("\\", "/").split("/"):
+            refuse(404, "There is no such file.")
+        if request.match_info["tail"] == _SOCKET:
+            refuse(400, "This is no request for a WebSocket.")
+        if request.method == hdrs.METH_POST:
+            return await self._upload(client, request, tail)
+        if tail in _PAGES and (note := await self._start(client)):
+            return note
+        return await self._pass(client, request, tail)
 
     async def _start(self, client: Client) -> web.Response | None:
         """Start the process of a page; return what the page shows meanwhile.
@@ -187,13 +218,20 @@ async def running(
         number = int(listening.getsockname()[1])
         clients = Clients(command, folder, limits)
         server = Server(Access(host, number), clients, limits, host, number)
-        runner = web.AppRunner(server.application(), access_log=None, shutdown_timeout=2.0)
+        runner = web.AppRunner(
+            server.application(), access_log=None, logger=_log, shutdown_timeout=2.0
+        )
         await runner.setup()
-        watching = asyncio.create_task(clients.watch())
+        assert runner.server is not None
+        server.connections = Connections(runner.server, limits)
+        watching = asyncio.gather(clients.watch(), server.connections.watch())
+        accepting = await asyncio.get_running_loop().create_server(
+            server.connections, sock=listening
+        )
         try:
-            await web.SockSite(runner, listening).start()
             yield server
         finally:
+            accepting.close()
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)
             await server.end()

@@ -1,0 +1,160 @@
+"""Uploads of a page: each arrives as a whole, apart from all others, or is refused."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("trame")
+from aiohttp import ClientSession, web
+from yarl import URL
+
+from vtk_segdeform.widgets.web.transfer import Transfer
+
+LIMIT = 1000  # bytes
+HEADERS = {"X-Segdeform": "upload"}
+
+
+class Editor:
+    """Instead of an editor: it notes what each file that it is to open contains."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.is_busy, self.opened = path, False, []
+
+    def do(self, action):
+        action(SimpleNamespace(open=self._open))
+
+    def _open(self, path: Path) -> None:
+        self.path = path
+        self.opened.append(path.read_bytes())
+
+
+@pytest.fixture
+def told(tmp_path):
+    """Return a function that runs a story with an editor, its names and ``send(name, body)``."""
+
+    async def tell(story):
+        editor, names = Editor(tmp_path / "first.ply"), {}
+        transfer = Transfer(editor, tmp_path / "uploads", LIMIT, names, lambda: None)
+        application = web.Application()
+        transfer.add_routes(application)
+        runner = web.AppRunner(application, shutdown_timeout=0.5)
+        await runner.setup()
+        await web.TCPSite(runner, "127.0.0.1", 0).start()
+        url = URL(f"http://127.0.0.1:{runner.addresses[0][1]}/upload")
+        async with ClientSession(headers=HEADERS) as session:
+
+            async def send(name, body):
+                async with session.post(url % {"name": name}, data=body) as answer:
+                    return answer.status, await answer.text()
+
+            try:
+                await story(editor, names, send)
+            finally:
+                await runner.cleanup()
+
+    return lambda story: asyncio.run(asyncio.wait_for(tell(story), 20.0))
+
+
+class Slow:
+    """A body that arrives in two parts, the second one when it is let."""
+
+    def __init__(self, first: bytes, second: bytes) -> None:
+        self._parts, self.begun, self.rest = (first, second), asyncio.Event(), asyncio.Event()
+
+    async def parts(self):
+        yield self._parts[0]
+        self.begun.set()
+        await self.rest.wait()
+        yield self._parts[1]
+
+
+def test_of_two_uploads_at_once_the_second_is_refused_and_the_first_arrives_whole(told, tmp_path):
+    async def story(editor, names, send):
+        slow = Slow(b"first ", b"file")
+        first = asyncio.create_task(send("one.ply", slow.parts()))
+        await slow.begun.wait()
+        while not [*(tmp_path / "uploads").rglob(".segdeform-*")]:  # until it is being stored
+            await asyncio.sleep(0.005)
+        assert await send("two.ply", b"second file") == (
+            409, "Another upload is in progress. Wait until it is complete."
+        )  # fmt: skip
+        slow.rest.set()
+        assert await first == (200, "")
+        assert editor.opened == [b"first file"]
+        assert names[str(editor.path)] == "one.ply"
+        assert (await send("two.ply", b"second file"))[0] == 200
+        assert editor.opened == [b"first file", b"second file"]
+        assert names[str(editor.path)] == "two.ply"
+
+    told(story)
+
+
+def test_a_file_is_kept_until_another_one_is_open(told, tmp_path):
+    async def story(editor, names, send):
+        assert (await send("one.ply", b"first"))[0] == 200
+        first = editor.path
+        for name, body, status in (("two.exe", b"x", 415), ("two.ply", bytes(LIMIT + 1), 413)):
+            assert (await send(name, body))[0] == status
+        editor.is_busy = True
+        assert (await send("two.ply", b"second"))[0] == 409
+        editor.is_busy = False
+        editor.do, do = lambda _: ValueError("Finish the drag first."), editor.do
+        assert await send("two.ply", b"second") == (409, "Finish the drag first.")
+        editor.do = do
+        assert first.read_bytes() == b"first"
+        assert [*(tmp_path / "uploads").iterdir()] == [first.parent]
+        assert (await send("two.ply", b"second"))[0] == 200
+        assert [*(tmp_path / "uploads").iterdir()] == [editor.path.parent]
+
+    told(story)
+
+
+def test_an_upload_that_breaks_off_leaves_nothing_and_the_next_one_works(told, tmp_path):
+    async def story(editor, names, send):
+        slow = Slow(b"first ", b"file")
+        first = asyncio.create_task(send("one.ply", slow.parts()))
+        await slow.begun.wait()
+        first.cancel()
+        await asyncio.wait([first])
+        while [*(tmp_path / "uploads").glob("*")]:
+            await asyncio.sleep(0.005)
+        assert (await send("two.ply", b"second"))[0] == 200
+        assert editor.opened == [b"second"]
+
+    told(story)
+
+
+@pytest.mark.parametrize(
+    "name", ["\x1b[31mred\x9b.ply", "a\nb\r\t\0.ply", "\u202egpj.ply", "../../x.ply", "/etc/x.ply"]
+)
+def test_names_are_shown_without_control_characters_and_name_no_file(told, tmp_path, name):
+    async def story(editor, names, send):
+        before = {*tmp_path.iterdir()}
+        assert (await send(name, b"mesh"))[0] == 200
+        assert names[str(editor.path)].isprintable()
+        assert "/" not in names[str(editor.path)]
+        assert editor.path.name == "upload.ply"
+        assert editor.path.parents[1] == tmp_path / "uploads"
+        assert {*tmp_path.iterdir()} - before <= {tmp_path / "uploads"}
+
+    told(story)
+
+
+def test_a_full_disk_is_told(told, monkeypatch):
+    from vtk_segdeform.widgets.web import transfer
+
+    def refuse(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    async def story(editor, names, send):
+        monkeypatch.setattr(transfer, "replacing", refuse)
+        assert await send("one.ply", b"mesh") == (
+            507, "one.ply could not be stored: No space left on device."
+        )  # fmt: skip
+        assert editor.opened == []
+
+    told(story)
