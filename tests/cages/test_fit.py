@@ -12,17 +12,15 @@ from real_meshes import read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.cages import fit
-from vtk_segdeform.cages.cage import Cage, cage_faults
+from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages, suggested_size
 from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
-from vtk_segdeform.cages.simplify import roundness, simplify
+from vtk_segdeform.cages.simplify import roundness
 from vtk_segdeform.cages.spacing import thickness
 from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, RegionError
 from vtk_segdeform.mesh.inside import (
     distance_to_surface,
-    inside_nodes,
-    inside_points,
     winding_number,
 )
 from vtk_segdeform.mesh.mesh import Mesh
@@ -271,47 +269,6 @@ def test_progress_increases_to_one_and_can_cancel():
         fit_cages(mesh, thirds(mesh), 60, progress=cancel)
 
 
-@pytest.mark.parametrize(("solid", "genus"), [(icosphere(4), 0), (torus(), 1)])
-def test_simplifying_preserves_the_topology_and_reaches_n_vertices(solid, genus):
-    for n in (300, 77, 20):
-        vertices, faces = simplify(*solid, n)
-        assert len(vertices) == n
-        assert len(vertices) - len(faces) // 2 == 2 - 2 * genus
-        assert cage_faults(vertices, faces) == ()
-        assert roundness(vertices, faces).min() > 0.1
-
-
-def test_simplifying_stops_where_every_component_is_a_tetrahedron():
-    vertices, faces = simplify(*two_components(), 3)
-    assert len(vertices) == 8
-    assert cage_faults(vertices, faces) == ()
-
-
-def test_a_simplified_ball_keeps_its_size():
-    vertices, faces = simplify(*icosphere(4), 60)
-    radius = np.linalg.norm(vertices[faces].mean(axis=1), axis=1)
-    assert radius.min() > 0.9
-    assert radius.max() < 1.05
-
-
-def test_counting_crossings_agrees_with_the_winding_number(mesh):
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    points = np.random.default_rng(0).uniform(low, high, (300, 3))
-    points = np.concatenate([points, 0.5 * (mesh.vertices + mesh.vertices.mean(axis=0))])
-    expected = winding_number(points, mesh.vertices, mesh.faces) > 0.5
-    assert_array_equal(inside_points(points, mesh.vertices, mesh.faces), expected)
-
-
-def test_columns_through_vertices_and_edges_are_counted_once():
-    vertices, faces = CUBE
-    inside = inside_nodes(4.0 * vertices + [1.0, 1.0, 1.5], faces, (8, 8, 8))
-    node = np.indices((8, 8, 8)).transpose(1, 2, 3, 0)
-    well_in = ((node > [1, 1, 1.5]) & (node < [5, 5, 5.5])).all(axis=-1)
-    well_out = ((node < [1, 1, 1.5]) | (node > [5, 5, 5.5])).any(axis=-1)
-    assert inside[well_in].all()
-    assert not inside[well_out].any()
-
-
 @pytest.mark.parametrize(
     ("name", "part"), every(6, [(name, k) for name in ("cactus", "cylinder") for k in (1, 0, 2)])
 )
@@ -323,14 +280,6 @@ def test_cages_of_a_real_mesh_are_valid_and_tight(name, part):
     assert cage.n_vertices == 67
     assert_holds(cage, mesh, members)
     assert distance_to_cage(cage, mesh, members).mean() < 0.03 * mesh.diagonal
-
-
-def test_simplifying_a_rough_surface_inverts_no_face():
-    ball, faces = icosphere(4)
-    rough = ball * np.random.default_rng(0).uniform(0.5, 1.5, (len(ball), 1))
-    vertices, faces = simplify(rough, faces, 300)
-    a, b, c = vertices[faces.T]
-    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), a + b + c) > 0).all()
 
 
 def test_the_contour_is_exact_beyond_single_precision():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import tracemalloc
 
@@ -13,7 +14,7 @@ from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
-from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Kind
 from vtk_segdeform.mesh.topology import HalfEdges
@@ -437,3 +438,51 @@ def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
     row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
     _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
     assert (stops <= starts).all()
+
+
+def test_the_connectivity_of_a_cage_has_the_faults_of_its_faces():
+    vertices, faces = CUBE
+    n = len(vertices)
+    assert connectivity_faults(n, faces) == []
+    assert connectivity_faults(3, faces[:3]) == ["a closed surface needs at least 4 faces; got 3"]
+    repeating = faces.copy()
+    repeating[:2, 2] = repeating[:2, 0]
+    assert connectivity_faults(n, repeating) == ["2 faces repeat a vertex"]
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        once = faces.copy()
+        once[4, a] = once[4, b]
+        assert connectivity_faults(n, once) == ["1 face repeats a vertex"]
+    assert connectivity_faults(n, faces[1:]) == ["3 edges border only one face: the cage is open"]
+    turned = np.vstack([faces[:1, ::-1], faces[1:]])
+    assert connectivity_faults(n, turned) == ["3 edges have faces of opposite orientation"]
+    assert connectivity_faults(n + 2, faces) == ["2 vertices are in no face"]
+    assert connectivity_faults(n + 1, faces[1:]) == [
+        "3 edges border only one face: the cage is open",
+        "1 vertex is in no face",
+    ]
+    fin = np.vstack([faces, [[0, 1, n]]])
+    assert connectivity_faults(n + 1, fin) == [
+        "2 edges border only one face: the cage is open",
+        "1 edge borders three or more faces",
+    ]
+    vertices, corner = together(CUBE, (CUBE[0] + 1.0, CUBE[1]))
+    assert connectivity_faults(len(vertices), corner) == [
+        "1 vertex joins several surfaces at one point"
+    ]
+
+
+def test_points_far_from_most_others_are_a_fault_if_they_are_in_a_face():
+    vertices, faces = icosphere(2)
+    n = len(vertices)
+    for axis, sign in itertools.product(range(3), (1.0, -1.0)):
+        far = vertices.copy()
+        far[5, axis] = sign * 1e20
+        loose = np.vstack([vertices, far[5:6]])
+        report = find_faults(far, faces)
+        assert [(each.kind, each.examples) for each in report.faults if each.count == 1][:1] == [
+            (Kind.OUTLYING, (5,))
+        ]
+        assert find_faults(loose, faces).count(Kind.OUTLYING) == 0
+        assert find_faults(loose, faces).count(Kind.UNREFERENCED) == 1
+    assert find_faults(vertices + 1e6, faces).count(Kind.OUTLYING) == 0
+    assert find_faults(np.where(np.arange(n)[:, None] == 5, 3.0, vertices), faces).ok
