@@ -11,7 +11,9 @@ import pytest
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
 from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
@@ -486,3 +488,25 @@ def test_points_far_from_most_others_are_a_fault_if_they_are_in_a_face():
         assert find_faults(loose, faces).count(Kind.UNREFERENCED) == 1
     assert find_faults(vertices + 1e6, faces).count(Kind.OUTLYING) == 0
     assert find_faults(np.where(np.arange(n)[:, None] == 5, 3.0, vertices), faces).ok
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range(
+    compiled, monkeypatch
+):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if compiled:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    vertices, faces = CUBE
+    found = search.Search(np.vstack([vertices, [[9.0, 9, 9]]]), faces)
+    assert found.n_repeating == 0
+    assert found.used.tolist() == [True] * 8 + [False]
+    assert found.extent == 1.0
+    assert search.Search(vertices, np.vstack([faces, [[1, 1, 2], [3, 3, 3]]])).n_repeating == 2
+    for wrong in ([0, 1, 8], [-1, 2, 3]):
+        found = search.Search(vertices, np.vstack([faces[:1], [wrong]]))
+        assert found.n_repeating is None
+        assert found.used.tolist() == [True] * 3 + [False] * 5
+        assert found.n_components == 0
