@@ -46,9 +46,8 @@ def tests_of(path: Path) -> list[str]:
     """Return the tests of a module: its own file first, its examples, and those of its folder."""
     folder = folder_of(path)
     files = (ROOT / "tests" / folder).glob("**/test_*.py" if folder else "test_*.py")
-    tests = sorted(
-        (str(file.relative_to(ROOT)) for file in files), key=lambda t: path.stem not in t
-    )
+    tests = [str(file.relative_to(ROOT)) for file in files]
+    tests.sort(key=lambda test: (not test.endswith(f"/test_{path.stem}.py"), test))
     if ">>> " in path.read_text("utf-8"):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         name = name if name.startswith("vtk_segdeform") else f"vtk_segdeform.{name}"
@@ -178,7 +177,7 @@ def main() -> int:
     given = parser.parse_args()
     files = [path for top in ("vtk_segdeform", "widgets") for path in (ROOT / top).rglob("*.py")]
     lines = _changed_lines(given.base) if given.base else None
-    known = {row.rpartition(" | ")[0] for row in EQUIVALENT.read_text("utf-8").splitlines()}
+    known = {row.rpartition(" :: ")[0] for row in EQUIVALENT.read_text("utf-8").splitlines()}
     by_folder: dict[str, list[Mutant]] = {}
     for path in sorted(path for path in files if path.name not in given.without):
         folder = folder_of(path)

@@ -59,11 +59,11 @@ class Mutant(NamedTuple):
     def place(self) -> str:
         """The file and the line of code, which stay the same if lines are moved."""
         code = self.path.read_text("utf-8").splitlines()[self.line - 1].strip()
-        return f"{self.path.relative_to(ROOT)} | {code}"
+        return f"{self.path.relative_to(ROOT)} :: {code}"
 
     def __str__(self) -> str:
         texts = (" ".join(ast.unparse(node).split())[:80] for node in (self.node, self.changed))
-        return f"{self.place} | {'  ->  '.join(texts)}"
+        return f"{self.place} :: {'  ->  '.join(texts)}"
 
     def source(self) -> str:
         """Return the source of the changed module."""
