@@ -11,11 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from real_meshes import read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform import sizes
 from vtk_segdeform.cages import fit
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages, suggested_size
-from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
+from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes, solid_field
 from vtk_segdeform.cages.simplify import roundness
 from vtk_segdeform.cages.spacing import thickness
 from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, RegionError
@@ -328,3 +329,91 @@ def test_regions_that_are_parts_get_twice_as_many_cage_vertices_as_whole_bodies(
     masks = [np.kron(np.arange(12) == k, half) for k in range(12) for half in halves]
     assert suggested_size(Regions(balls, np.array(masks, dtype=bool))) == 24 * 30
     assert suggested_size(Regions.single(balls)) == 155
+
+
+def test_cages_of_a_large_mesh_are_fitted_to_a_decimated_one_and_enclose_it(monkeypatch):
+    monkeypatch.setattr(sizes, "DECIMATED", 500)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 250)
+    mesh = Mesh(*icosphere(3))
+    regions, x = thirds(mesh), mesh.vertices[:, 0]
+    shares = []
+    for fixed in ((), x < -0.2):
+        cages = fit_cages(mesh, regions, 90, fixed=fixed)
+        assert sum(cage.n_vertices for cage in cages) == 90
+        for cage, members in zip(cages, regions.membership, strict=True):
+            assert cage.contains(mesh.vertices[members]).all()
+            assert distance_to_cage(cage, mesh, members).mean() < 0.5
+        corners = np.concatenate([cage.vertices for cage in cages])
+        shares.append(np.mean(corners[:, 0] > 0.0))
+    assert shares[0] == pytest.approx(0.5, abs=0.1)
+    assert shares[1] > shares[0] + 0.1
+
+
+def test_the_regions_of_another_pose_are_fitted_at_this_one():
+    mesh = Mesh(*icosphere(2))
+    away = mesh.with_vertices(mesh.vertices + [100.0, 0.0, 0.0])
+    (cage,) = fit_cages(mesh, Regions.single(away), 40)
+    assert cage.contains(mesh.vertices).all()
+
+
+@pytest.mark.parametrize("offset", [1e-13, 1e7, 0.0, np.nan])
+def test_offsets_beyond_the_limits_are_refused(offset):
+    mesh = Mesh(*icosphere(2))
+    with pytest.raises(CageError, match="offset must be"):
+        fit_cages(mesh, Regions.single(mesh), 40, offset=offset * mesh.diagonal)
+
+
+def test_numbers_of_vertices_grow_with_the_root_of_the_area_and_are_equal_for_equal_regions():
+    ball, faces = icosphere(2)
+    radii, n = [1.0, 1.0, 2.0, 4.0], len(ball)
+    at = np.cumsum([0.0, 4.0, 6.0, 12.0])
+    x = np.concatenate([r * ball + [shift, 0, 0] for r, shift in zip(radii, at, strict=True)])
+    mesh = Mesh(x, np.concatenate([faces + k * n for k in range(4)]))
+    regions = Regions(mesh, mesh.components == np.arange(4)[:, None])
+    patches = [Patch.of(Surface.of(mesh), members) for members in regions.membership]
+    numbers = fit._distributed(patches, 800, None)
+    assert numbers.sum() == 800
+    assert numbers[0] == numbers[1]
+    assert_allclose((numbers - 12) / (numbers[0] - 12), radii, rtol=0.01)
+    assert_array_equal(fit._distributed(patches, 8 * 4, None), [8] * 4)
+    spacing = np.repeat([0.5, 0.25, 1.0, 1.0], n)
+    numbers = fit._distributed(patches, 500, spacing)
+    assert numbers.sum() == 500
+    assert_allclose((numbers - 8) / (numbers[0] - 8), [1.0, 4.0, 1.0, 4.0], rtol=0.01)
+
+
+def test_the_quality_of_a_cage_is_one_where_it_is_round_and_away_from_the_surface():
+    mesh = Mesh(*icosphere(3))
+    patch = Patch.of(Surface.of(mesh), np.ones(mesh.n_vertices, dtype=bool))
+    field = solid_field(patch, 0.3, 0.1, most_nodes=3e5, stretch=None)
+    ball, faces = icosphere(2)
+
+    def quality(radius, faces=faces):
+        return fit._quality(field.grid.to_nodes(radius * ball), faces, field)
+
+    assert quality(1.4) >= 1.0
+    assert quality(1.05) < quality(1.1) < 1.0
+    close = distance_to_surface(mesh.vertices, 1.1 * ball, faces).min() / 0.3 / 0.2
+    assert quality(1.1) == pytest.approx(close, rel=1e-6)
+    far = field.grid.to_nodes(1.4 * ball)
+    assert fit._fault(far, faces, field, len(ball)) == ""
+    assert (
+        fit._fault(field.grid.to_nodes(1.4 * ball), faces, field, 7) == "it has 66 vertices, not 7"
+    )
+    assert fit._fault(field.grid.to_nodes(0.9 * ball), faces, field, 66) == (
+        "part of the region is outside"
+    )
+    assert "inside-out" in fit._fault(field.grid.to_nodes(1.4 * ball), faces[:, ::-1], field, 66)
+
+
+def test_faces_too_close_are_moved_away_and_others_stay():
+    mesh = Mesh(*icosphere(3))
+    patch = Patch.of(Surface.of(mesh), np.ones(mesh.n_vertices, dtype=bool))
+    field = solid_field(patch, 0.3, 0.1, most_nodes=3e5, stretch=None)
+    ball, faces = icosphere(2)
+    far = field.grid.to_nodes(1.4 * ball)
+    assert_array_equal(fit._cleared(far, faces, field), far)
+    cleared = field.grid.to_points(fit._cleared(field.grid.to_nodes(1.02 * ball), faces, field))
+    assert_allclose(cleared / np.linalg.norm(cleared, axis=1, keepdims=True), ball, atol=0.05)
+    assert distance_to_surface(mesh.vertices, cleared, faces).min() > 0.4 * 0.3
+    assert np.linalg.norm(cleared, axis=1).max() < 1.35
