@@ -91,10 +91,9 @@ class NormalTransport:
         )
         lost = np.flatnonzero((np.diff(around.indptr) == 0) & (np.diff(every.indptr) > 0))
         if len(lost):
-            place = csr_array(
-                (np.ones(len(lost)), (lost, np.arange(len(lost)))), (shape[0], len(lost))
-            )
-            around = csr_array(around + place @ self._beside(every[lost], sound, len(points)))
+            entries = np.ones(len(lost)), (lost, np.arange(len(lost)))
+            into = csr_array(entries, shape=(shape[0], len(lost)))
+            around = csr_array(around + into @ self._beside(every[lost], sound, len(points)))
         around.sum_duplicates()
         around.data[:] = 1.0
         self._around = around[group]  # of each normal
