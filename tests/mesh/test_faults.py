@@ -417,7 +417,12 @@ def test_benchmark_meshes_have_no_faults(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["koala.obj", "armadilloman.obj", "armadilloman_cages_triangulated.obj"]
+    "name",
+    [
+        pytest.param("koala.obj", marks=pytest.mark.campaign),  # large, and like the next one
+        "armadilloman.obj",
+        "armadilloman_cages_triangulated.obj",
+    ],
 )
 def test_benchmark_meshes_in_obj_files_have_no_faults(name):
     lines = [line.split() for line in path_of(name).read_text().splitlines()]
