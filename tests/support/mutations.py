@@ -148,7 +148,8 @@ def _changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             if not (isinstance(value, ast.Constant) and value.value is None):
                 yield "return", ast.Return(ast.Constant(None))
         case ast.Call(args=[one, other, *rest]) if _name(node.func) not in _SYMMETRIC:
-            if not isinstance(one, ast.Starred) and not isinstance(other, ast.Starred):
+            is_either = isinstance(one, ast.Starred) or isinstance(other, ast.Starred)
+            if not is_either and ast.dump(one) != ast.dump(other):
                 yield "arguments", ast.Call(node.func, [other, one, *rest], node.keywords)
     match node:
         case ast.Expr(value=ast.Call()) | ast.Raise() | ast.AugAssign():

@@ -59,6 +59,7 @@ def test_an_operator_changes_one_thing(code, changes, tmp_path, monkeypatch):
         "x = compiled_checks(n)",
         "x.__dict__['name'] = a + 1",
         "x = np.minimum(a, b)",
+        "x = f(a, a)",
         "@decorated(1)\ndef f(): ...",
     ],
 )
