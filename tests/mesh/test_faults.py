@@ -18,7 +18,7 @@ from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
 from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
-from vtk_segdeform.mesh.report import Kind
+from vtk_segdeform.mesh.report import Fault, Kind
 from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.mesh_repair.repair import repair
 
@@ -515,3 +515,24 @@ def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_r
         assert found.n_repeating is None
         assert found.used.tolist() == [True] * 3 + [False] * 5
         assert found.n_components == 0
+
+
+def test_the_text_of_a_fault_counts_it_and_shows_a_few_places():
+    edge, face = Kind.OPEN_EDGE, Kind.ZERO_AREA
+    assert str(Fault(edge, 1, ((3, 7),))) == "1 open edge (3-7)"
+    assert str(Fault(edge, 2, ((3, 7), (4, 5)))) == "2 open edges (3-7, 4-5)"
+    assert str(Fault(face, 3, (3, 7))) == "3 faces without area (face 3, 7, ...)"
+    assert str(Fault(Kind.COMPONENTS, 2)) == "2 components"
+    assert str(Fault(Kind.EMPTY, 1)) == "empty mesh"
+    report = find_faults(*SPHERE)
+    assert report.count(edge) == 0
+    size = f"{N} vertices, {len(SPHERE[1])} faces, 1 component"
+    assert str(report) == f"{size}: a closed, outward oriented two-manifold"
+    assert "; " in str(find_faults(SPHERE[0], SPHERE[1][1:]))
+    open_text = str(find_faults(SPHERE[0], SPHERE[1][1:])).splitlines()
+    assert open_text[0].endswith("1 component: can be deformed")
+    assert all(line.startswith("  note: ") for line in open_text[1:])
+    turned = np.vstack([SPHERE[1][:1, ::-1], SPHERE[1][1:]])
+    assert "has faults\n  fault: 3 inconsistently oriented edges" in str(
+        find_faults(SPHERE[0], turned)
+    )
