@@ -25,6 +25,7 @@ import sys
 import tempfile
 import time
 import traceback
+from collections.abc import Iterable
 from pathlib import Path
 
 from mutations import ROOT, Mutant, mutants_of
@@ -42,11 +43,11 @@ def folder_of(path: Path) -> str:
     return "/".join(parts if parts[0] == "widgets" else parts[1:])
 
 
-def tests_of(path: Path) -> list[str]:
+def chosen_tests(path: Path, left_out: Iterable[str] = ()) -> list[str]:
     """Return the tests of a module: its own file first, its examples, and those of its folder."""
     folder = folder_of(path)
     files = (ROOT / "tests" / folder).glob("**/test_*.py" if folder else "test_*.py")
-    tests = [str(file.relative_to(ROOT)) for file in files]
+    tests = [str(file.relative_to(ROOT)) for file in files if file.name not in left_out]
     tests.sort(key=lambda test: (not test.endswith(f"/test_{path.stem}.py"), test))
     if ">>> " in path.read_text("utf-8"):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
@@ -129,12 +130,13 @@ def _tested(tree: Path, tests: list[str], seconds: int) -> int:
     return code if all(Path(file).is_relative_to(tree) for file in files) else 70
 
 
-def results_of(chosen: list[Mutant], n_processes: int) -> list[str]:
+def results_of(chosen: list[Mutant], n_processes: int, left_out: Iterable[str] = ()) -> list[str]:
     """Return "killed", "timeout" or "survived" for each of the mutants of a folder."""
     results = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
         bench = Bench(Path(place), n_processes)
-        bench.start(None, list(dict.fromkeys(t for m in chosen for t in tests_of(m.path))), 3600)
+        every = [test for mutant in chosen for test in chosen_tests(mutant.path, left_out)]
+        bench.start(None, list(dict.fromkeys(every)), 3600)
         _, status, usual, tree = bench.wait()
         if status:
             sys.exit(f"The tests fail without any mutant:\n{(tree / 'pytest.log').read_text()}")
@@ -142,7 +144,7 @@ def results_of(chosen: list[Mutant], n_processes: int) -> list[str]:
         while len(results) < len(chosen):
             while waiting and len(chosen) - len(waiting) - len(results) < n_processes:
                 mutant = waiting.pop()
-                bench.start(mutant, tests_of(mutant.path), int(2 * usual) + 5)
+                bench.start(mutant, chosen_tests(mutant.path, left_out), int(2 * usual) + 5)
             mutant, status, _, _ = bench.wait()
             was_stopped = os.WIFSIGNALED(status) and os.WTERMSIG(status) != signal.SIGSEGV
             results.append("timeout" if was_stopped else "killed" if status else "survived")
@@ -171,7 +173,9 @@ def main() -> int:
     parser.add_argument("-n", type=int, default=30, help="mutants of each folder")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--base", help="only lines changed since this revision")
-    parser.add_argument("--without", nargs="*", default=(), help="files to leave out")
+    parser.add_argument(
+        "--without", nargs="*", default=(), help="files of code or tests to leave out"
+    )
     parser.add_argument("--least", type=float, default=0.0, help="per cent to be killed, or fail")
     parser.add_argument("--processes", type=int, default=2)
     given = parser.parse_args()
@@ -194,7 +198,7 @@ def main() -> int:
     table = []
     for folder, mutants in by_folder.items():
         chosen = random.Random(given.seed).sample(mutants, min(given.n, len(mutants)))
-        results = results_of(chosen, given.processes) if chosen else []
+        results = results_of(chosen, given.processes, given.without) if chosen else []
         table.append((folder or "(top)", len(mutants), results))
     table.append(("all", sum(n for _, n, _ in table), [r for _, _, rs in table for r in rs]))
     print(f"\n{'folder':24}  mutants  tested  killed  timeout  survived  kill rate")

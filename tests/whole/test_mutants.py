@@ -69,12 +69,12 @@ def test_on_what_only_speed_or_text_depends_nothing_is_changed(code, tmp_path, m
 
 def test_the_tests_of_a_module_are_those_of_its_folder_and_its_own_come_first():
     path = mutants.ROOT / "vtk_segdeform" / "mesh" / "topology.py"
-    tests = mutants.tests_of(path)
+    tests = mutants.chosen_tests(path)
     assert mutants.folder_of(path) == "mesh"
     assert tests[0] == "tests/mesh/test_topology.py"
     assert "tests/mesh/test_soup.py" in tests
     path = mutants.ROOT / "vtk_segdeform" / "mesh" / "mesh.py"
-    assert mutants.tests_of(path)[1].endswith("[vtk_segdeform.mesh.mesh]")
+    assert mutants.chosen_tests(path)[1].endswith("[vtk_segdeform.mesh.mesh]")
     assert mutants.folder_of(mutants.ROOT / "widgets" / "scene" / "view.py") == "widgets/scene"
 
 
