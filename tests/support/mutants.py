@@ -61,7 +61,7 @@ class Bench:
     """Copies of the tree in which mutants are tested, each in a fork of this process."""
 
     def __init__(self, folder: Path, n_copies: int, *, of_kernels: bool = False) -> None:
-        ignored = shutil.ignore_patterns(".git", ".venv", "build", "docs", "*_cache", "*-output")
+        ignored = shutil.ignore_patterns(".git", ".venv", "build", "*_cache", "*-output")
         self._free = [folder / str(i) for i in range(n_copies)]
         for tree in self._free:
             shutil.copytree(ROOT, tree, ignore=ignored)  # with times: kernels stay compiled
