@@ -65,7 +65,7 @@ SECONDS ?= 3600
 soak: $(VENV)/installed-test
 	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/whole/test_soak.py -k hands
 
-# Tested on copies of the tree.  Most folders take ten minutes for 60 mutants on two cores.
+# Tested on copies of the tree: 60 mutants of a folder take some minutes on two cores.
 N    ?= 30
 SEED ?= 0
 BASE ?= origin/main
