@@ -10,6 +10,9 @@
 #   make docs       the documentation, docs/build/html/index.html
 #   make drag-film  the animation of the README
 #   make types      mypy --strict              make bench      a report of timings
+#   make mutants    how many small faults in the code the tests find, in samples of each folder;
+#                   FOLDER="mesh io" N=60 SEED=1 for some
+#   make mutants-changed   the same for the lines changed since BASE=origin/main
 #   make bench-history   plot the timings of earlier runs of make bench
 #
 # The first call makes a virtual environment in .venv; choose its Python with
@@ -27,9 +30,9 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview test-lowest test-newest campaign soak docs drag-film lint format types bench bench-history clean
+.PHONY: help demo test test-paraview test-lowest test-newest campaign soak mutants mutants-changed docs drag-film lint format types bench bench-history clean
 help:
-	@sed -n '3,13s/^# *//p' Makefile
+	@sed -n '3,16s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
@@ -80,6 +83,17 @@ campaign: $(VENV)/installed-test
 SECONDS ?= 3600
 soak: $(VENV)/installed-test
 	SEGDEFORM_SOAK=$(SECONDS) $(BIN)/python -m pytest -m campaign -s tests/whole/test_soak.py -k hands
+
+# Tested on copies of the tree: 60 mutants of a folder take some minutes on two cores.
+N    ?= 30
+SEED ?= 0
+BASE ?= origin/main
+mutants: $(VENV)/installed-test
+	$(BIN)/python tests/support/mutants.py $(FOLDER) -n $(N) --seed $(SEED)
+
+# Fails if less than 60 % are found: a few of them change nothing that a test could see.
+mutants-changed: $(VENV)/installed-test
+	$(BIN)/python tests/support/mutants.py $(FOLDER) -n $(N) --seed $(SEED) --base $(BASE) --least 60
 
 # Pictures and gallery are drawn again where the code is newer.
 docs: $(VENV)/installed-docs

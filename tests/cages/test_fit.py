@@ -11,18 +11,17 @@ from numpy.testing import assert_allclose, assert_array_equal
 from real_meshes import read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform import sizes
 from vtk_segdeform.cages import fit
-from vtk_segdeform.cages.cage import Cage, cage_faults
+from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.contour import contour_surface
 from vtk_segdeform.cages.fit import fit_cage, fit_cages, suggested_size
-from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes
-from vtk_segdeform.cages.simplify import roundness, simplify
+from vtk_segdeform.cages.region_solid import Patch, Surface, _filled, principal_axes, solid_field
+from vtk_segdeform.cages.simplify import roundness
 from vtk_segdeform.cages.spacing import thickness
 from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, RegionError
 from vtk_segdeform.mesh.inside import (
     distance_to_surface,
-    inside_nodes,
-    inside_points,
     winding_number,
 )
 from vtk_segdeform.mesh.mesh import Mesh
@@ -271,47 +270,6 @@ def test_progress_increases_to_one_and_can_cancel():
         fit_cages(mesh, thirds(mesh), 60, progress=cancel)
 
 
-@pytest.mark.parametrize(("solid", "genus"), [(icosphere(4), 0), (torus(), 1)])
-def test_simplifying_preserves_the_topology_and_reaches_n_vertices(solid, genus):
-    for n in (300, 77, 20):
-        vertices, faces = simplify(*solid, n)
-        assert len(vertices) == n
-        assert len(vertices) - len(faces) // 2 == 2 - 2 * genus
-        assert cage_faults(vertices, faces) == ()
-        assert roundness(vertices, faces).min() > 0.1
-
-
-def test_simplifying_stops_where_every_component_is_a_tetrahedron():
-    vertices, faces = simplify(*two_components(), 3)
-    assert len(vertices) == 8
-    assert cage_faults(vertices, faces) == ()
-
-
-def test_a_simplified_ball_keeps_its_size():
-    vertices, faces = simplify(*icosphere(4), 60)
-    radius = np.linalg.norm(vertices[faces].mean(axis=1), axis=1)
-    assert radius.min() > 0.9
-    assert radius.max() < 1.05
-
-
-def test_counting_crossings_agrees_with_the_winding_number(mesh):
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    points = np.random.default_rng(0).uniform(low, high, (300, 3))
-    points = np.concatenate([points, 0.5 * (mesh.vertices + mesh.vertices.mean(axis=0))])
-    expected = winding_number(points, mesh.vertices, mesh.faces) > 0.5
-    assert_array_equal(inside_points(points, mesh.vertices, mesh.faces), expected)
-
-
-def test_columns_through_vertices_and_edges_are_counted_once():
-    vertices, faces = CUBE
-    inside = inside_nodes(4.0 * vertices + [1.0, 1.0, 1.5], faces, (8, 8, 8))
-    node = np.indices((8, 8, 8)).transpose(1, 2, 3, 0)
-    well_in = ((node > [1, 1, 1.5]) & (node < [5, 5, 5.5])).all(axis=-1)
-    well_out = ((node < [1, 1, 1.5]) | (node > [5, 5, 5.5])).any(axis=-1)
-    assert inside[well_in].all()
-    assert not inside[well_out].any()
-
-
 @pytest.mark.parametrize(
     ("name", "part"), every(6, [(name, k) for name in ("cactus", "cylinder") for k in (1, 0, 2)])
 )
@@ -323,14 +281,6 @@ def test_cages_of_a_real_mesh_are_valid_and_tight(name, part):
     assert cage.n_vertices == 67
     assert_holds(cage, mesh, members)
     assert distance_to_cage(cage, mesh, members).mean() < 0.03 * mesh.diagonal
-
-
-def test_simplifying_a_rough_surface_inverts_no_face():
-    ball, faces = icosphere(4)
-    rough = ball * np.random.default_rng(0).uniform(0.5, 1.5, (len(ball), 1))
-    vertices, faces = simplify(rough, faces, 300)
-    a, b, c = vertices[faces.T]
-    assert (np.einsum("fi,fi->f", np.cross(b - a, c - a), a + b + c) > 0).all()
 
 
 def test_the_contour_is_exact_beyond_single_precision():
@@ -379,3 +329,91 @@ def test_regions_that_are_parts_get_twice_as_many_cage_vertices_as_whole_bodies(
     masks = [np.kron(np.arange(12) == k, half) for k in range(12) for half in halves]
     assert suggested_size(Regions(balls, np.array(masks, dtype=bool))) == 24 * 30
     assert suggested_size(Regions.single(balls)) == 155
+
+
+def test_cages_of_a_large_mesh_are_fitted_to_a_decimated_one_and_enclose_it(monkeypatch):
+    monkeypatch.setattr(sizes, "DECIMATED", 500)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 250)
+    mesh = Mesh(*icosphere(3))
+    regions, x = thirds(mesh), mesh.vertices[:, 0]
+    shares = []
+    for fixed in ((), x < -0.2):
+        cages = fit_cages(mesh, regions, 90, fixed=fixed)
+        assert sum(cage.n_vertices for cage in cages) == 90
+        for cage, members in zip(cages, regions.membership, strict=True):
+            assert cage.contains(mesh.vertices[members]).all()
+            assert distance_to_cage(cage, mesh, members).mean() < 0.5
+        corners = np.concatenate([cage.vertices for cage in cages])
+        shares.append(np.mean(corners[:, 0] > 0.0))
+    assert shares[0] == pytest.approx(0.5, abs=0.1)
+    assert shares[1] > shares[0] + 0.1
+
+
+def test_the_regions_of_another_pose_are_fitted_at_this_one():
+    mesh = Mesh(*icosphere(2))
+    away = mesh.with_vertices(mesh.vertices + [100.0, 0.0, 0.0])
+    (cage,) = fit_cages(mesh, Regions.single(away), 40)
+    assert cage.contains(mesh.vertices).all()
+
+
+@pytest.mark.parametrize("offset", [1e-13, 1e7, 0.0, np.nan])
+def test_offsets_beyond_the_limits_are_refused(offset):
+    mesh = Mesh(*icosphere(2))
+    with pytest.raises(CageError, match="offset must be"):
+        fit_cages(mesh, Regions.single(mesh), 40, offset=offset * mesh.diagonal)
+
+
+def test_numbers_of_vertices_grow_with_the_root_of_the_area_and_are_equal_for_equal_regions():
+    ball, faces = icosphere(2)
+    radii, n = [1.0, 1.0, 2.0, 4.0], len(ball)
+    at = np.cumsum([0.0, 4.0, 6.0, 12.0])
+    x = np.concatenate([r * ball + [shift, 0, 0] for r, shift in zip(radii, at, strict=True)])
+    mesh = Mesh(x, np.concatenate([faces + k * n for k in range(4)]))
+    regions = Regions(mesh, mesh.components == np.arange(4)[:, None])
+    patches = [Patch.of(Surface.of(mesh), members) for members in regions.membership]
+    numbers = fit._distributed(patches, 800, None)
+    assert numbers.sum() == 800
+    assert numbers[0] == numbers[1]
+    assert_allclose((numbers - 12) / (numbers[0] - 12), radii, rtol=0.01)
+    assert_array_equal(fit._distributed(patches, 8 * 4, None), [8] * 4)
+    spacing = np.repeat([0.5, 0.25, 1.0, 1.0], n)
+    numbers = fit._distributed(patches, 500, spacing)
+    assert numbers.sum() == 500
+    assert_allclose((numbers - 8) / (numbers[0] - 8), [1.0, 4.0, 1.0, 4.0], rtol=0.01)
+
+
+def test_the_quality_of_a_cage_is_one_where_it_is_round_and_away_from_the_surface():
+    mesh = Mesh(*icosphere(3))
+    patch = Patch.of(Surface.of(mesh), np.ones(mesh.n_vertices, dtype=bool))
+    field = solid_field(patch, 0.3, 0.1, most_nodes=3e5, stretch=None)
+    ball, faces = icosphere(2)
+
+    def quality(radius, faces=faces):
+        return fit._quality(field.grid.to_nodes(radius * ball), faces, field)
+
+    assert quality(1.4) >= 1.0
+    assert quality(1.05) < quality(1.1) < 1.0
+    close = distance_to_surface(mesh.vertices, 1.1 * ball, faces).min() / 0.3 / 0.2
+    assert quality(1.1) == pytest.approx(close, rel=1e-6)
+    far = field.grid.to_nodes(1.4 * ball)
+    assert fit._fault(far, faces, field, len(ball)) == ""
+    assert (
+        fit._fault(field.grid.to_nodes(1.4 * ball), faces, field, 7) == "it has 66 vertices, not 7"
+    )
+    assert fit._fault(field.grid.to_nodes(0.9 * ball), faces, field, 66) == (
+        "part of the region is outside"
+    )
+    assert "inside-out" in fit._fault(field.grid.to_nodes(1.4 * ball), faces[:, ::-1], field, 66)
+
+
+def test_faces_too_close_are_moved_away_and_others_stay():
+    mesh = Mesh(*icosphere(3))
+    patch = Patch.of(Surface.of(mesh), np.ones(mesh.n_vertices, dtype=bool))
+    field = solid_field(patch, 0.3, 0.1, most_nodes=3e5, stretch=None)
+    ball, faces = icosphere(2)
+    far = field.grid.to_nodes(1.4 * ball)
+    assert_array_equal(fit._cleared(far, faces, field), far)
+    cleared = field.grid.to_points(fit._cleared(field.grid.to_nodes(1.02 * ball), faces, field))
+    assert_allclose(cleared / np.linalg.norm(cleared, axis=1, keepdims=True), ball, atol=0.05)
+    assert distance_to_surface(mesh.vertices, cleared, faces).min() > 0.4 * 0.3
+    assert np.linalg.norm(cleared, axis=1).max() < 1.35

@@ -8,11 +8,13 @@ from solids import CUBE, SOLIDS, icosphere, rotation, torus
 from vtk_segdeform.geometry.differential import (
     area_gradients,
     cotangent_laplacian,
+    inner_vertices,
     mean_curvature_normals,
     mixed_voronoi_areas,
     with_least_areas,
 )
-from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation
+from vtk_segdeform.geometry.intrinsic import IntrinsicTriangulation, areas, cotangents
+from vtk_segdeform.mesh import Mesh
 
 
 def face_areas(vertices, faces):
@@ -106,3 +108,37 @@ def test_vertex_areas_are_at_least_a_twentieth_of_their_neighbours():
     around = np.unique(faces[(faces == 50).any(axis=1)])
     around = around[around != 50]
     assert_allclose(with_least_areas(speck, faces)[50], 0.05 * areas[around].mean(), rtol=1e-12)
+
+
+def test_inner_vertices_are_those_without_border_or_branch_except_on_strips():
+    assert inner_vertices(Mesh(*icosphere(2))).all()
+    vertices, faces = icosphere(2)
+    hole = faces[1:]
+    inner = inner_vertices(Mesh(vertices, hole))
+    assert set(np.flatnonzero(~inner)) == set(faces[0])
+    fin = np.vstack([faces, [[*faces[0, :2], len(vertices)]]])
+    inner = inner_vertices(Mesh(np.vstack([vertices, [[2.0, 2, 2]]]), fin))
+    assert set(np.flatnonzero(~inner)) == {*faces[0, :2], len(vertices)}
+    strip = np.array([[k, k % 2, 0.0] for k in range(8)])
+    turns = np.array([[k, k + 1, k + 2] if k % 2 else [k, k + 2, k + 1] for k in range(6)])
+    assert inner_vertices(Mesh(strip, turns)).all()
+    both = np.vstack([vertices, strip + 5.0]), np.vstack([hole, turns + len(vertices)])
+    inner = inner_vertices(Mesh(*both))
+    assert set(np.flatnonzero(~inner)) == set(faces[0])
+
+
+def test_areas_and_cotangents_of_known_triangles():
+    lengths = np.array([[3.0, 4.0, 5.0], [1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [1.0, 1.0, 1e-9]])
+    assert_allclose(areas(lengths), [6.0, np.sqrt(3.0) / 4.0, 0.0, 0.5e-9], rtol=1e-14)
+    for turn in range(3):
+        found = cotangents(np.roll(lengths, turn, axis=1))
+        expected = np.roll([[4 / 3, 3 / 4, 0.0], [3**-0.5] * 3, [0.0] * 3], turn, axis=1)
+        assert_allclose(found[:3], expected, atol=1e-15)
+        assert_allclose(np.roll(found[3], -turn), [0.0, 0.0, 1e9], rtol=1e-9, atol=1e-9)
+
+
+def test_the_least_area_is_a_twentieth_of_the_mean_over_the_faces_around():
+    faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+    areas = np.array([1e-3, 6.0, 12.0, 18.0])
+    assert_allclose(with_least_areas(areas, faces), [0.05 * 12.0, 6.0, 12.0, 18.0])
+    assert with_least_areas(np.zeros(5), faces).min() > 0.0

@@ -3,9 +3,13 @@ from __future__ import annotations
 import threading
 
 import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, somewhere
 
-from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
+from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.geometry import kmeans
+from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts, farthest_points
 from vtk_segdeform.kernels import threads
 
 
@@ -49,3 +53,47 @@ def test_small_sets_of_points_are_clustered_without_starting_threads(monkeypatch
     clusters = cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
     assert len(np.unique(clusters)) >= 200
     assert not started
+
+
+def test_each_of_the_farthest_points_is_the_farthest_from_all_before_it():
+    points = somewhere(200, seed=4) + 7.0
+    chosen = farthest_points(points, 12)
+    apart = np.linalg.norm(points[:, None] - points[chosen], axis=2)
+    first = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    assert chosen[0] == first.argmax()
+    for k in range(1, 12):
+        assert chosen[k] == apart[:, :k].min(axis=1).argmax()
+
+
+def test_centres_are_the_means_of_their_points_after_enough_rounds():
+    points = somewhere(400, seed=5)
+    clusters = cluster_positions(points, 12, rounds=60)
+    centres = np.array([points[clusters == k].mean(axis=0) for k in range(clusters.max() + 1)])
+    apart = np.linalg.norm(points[:, None] - centres, axis=2)
+    assert_array_equal(apart.argmin(axis=1), clusters)
+    few = cluster_positions(points, 12, rounds=1)
+    spread = [
+        sum(np.var(points[c == k], axis=0).sum() * (c == k).sum() for k in range(c.max() + 1))
+        for c in (few, cluster_positions(points, 12), clusters)
+    ]
+    assert spread[0] > spread[1] >= spread[2]
+
+
+def test_the_clusters_of_many_points_are_those_of_a_sample(monkeypatch):
+    monkeypatch.setattr(kmeans, "_SAMPLE", 500)
+    points = somewhere(4000, seed=6)
+    for seeded in (True, False):
+        clusters = cluster_positions(points, 20, seeded=seeded)
+        assert clusters.max() == 19
+        assert np.bincount(clusters).min() > 40
+        assert np.bincount(clusters).max() < 600
+
+
+def test_the_number_of_clusters_within_parts_is_whole_and_positive():
+    for wrong in (0, -1, 1.5):
+        with pytest.raises(ArgumentError, match="must be a whole number, 1 or more"):
+            cluster_within_parts(somewhere(), np.zeros(50, dtype=int), wrong)
+    clusters = cluster_within_parts(somewhere(), np.zeros(50, dtype=int), 10, quick=True)
+    assert set(clusters) == set(range(10))
+    every = cluster_within_parts(somewhere(), np.arange(50) % 3, 1000)
+    assert len(set(every)) == 50

@@ -9,7 +9,7 @@ import pytest
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from open_surfaces import moebius
-from solids import icosphere, rotation
+from solids import CUBE, icosphere, rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 
@@ -170,3 +170,23 @@ def test_those_of_some_vertices_are_theirs_among_all(has_one_side, count):
 def test_only_surfaces_with_one_side_have_turned_corners():
     for mesh in (MESHES["torus"](), cut_ball(), finned_ball()):
         assert not len(VertexNormals(mesh).turned)
+
+
+def test_normals_of_a_cube_are_the_unit_sums_of_the_normals_of_its_faces():
+    mesh = Mesh(3.0 * CUBE[0], CUBE[1])
+    total = np.zeros((8, 3))
+    for face in CUBE[1]:
+        a, b, c = CUBE[0][face]
+        total[face] += np.cross(b - a, c - a)
+    expected = total / np.linalg.norm(total, axis=1, keepdims=True)
+    normals = VertexNormals(mesh)
+    assert_allclose(normals.of(mesh.vertices), expected, atol=1e-6)
+    for some in ([0], [3, 1], list(range(8))):
+        found = normals.subset(np.array(some))
+        assert_allclose(found(mesh.vertices), expected[some], atol=1e-6)
+        assert_allclose(
+            found(mesh.vertices * [1.0, 1.0, -1.0]),
+            normals.of(mesh.vertices * [1.0, 1.0, -1.0])[some],
+            atol=1e-6,
+        )
+        assert_array_equal(found(np.zeros((8, 3))), np.zeros((len(some), 3)))

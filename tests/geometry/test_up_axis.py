@@ -24,10 +24,39 @@ def test_a_cactus_and_a_dinosaur_stand_on_their_feet(name, enough, monkeypatch):
         assert guess_up_axis(x[:, [1, 2, 0]]) == 1
 
 
+def pyramid(base, top, height, n=12):
+    """Return the points of a frustum that stands along z on the larger of two squares."""
+    s = np.linspace(0.0, 1.0, n)
+    size = base + (top - base) * s[:, None, None]
+    corners = np.array([[-1.0, -1], [-1, 1], [1, -1], [1, 1]])
+    xy = size * corners
+    return np.concatenate([xy, np.broadcast_to(height * s[:, None, None], (n, 4, 1))], axis=2)
+
+
+@pytest.mark.parametrize("turn", [False, True])
+def test_a_body_stands_on_its_larger_end_or_else_along_its_longer_side(turn):
+    def guess(points):
+        points = points.reshape(-1, 3)
+        return guess_up_axis(points[:, [1, 2, 0]] if turn else points)
+
+    up, other = (1, 2) if turn else (2, 1)
+    assert guess(pyramid(1.0, 0.5, 2.0)) == up
+    assert guess(pyramid(1.0, 0.9, 2.0)) == up
+    upside_down = pyramid(1.0, 0.5, 2.0) * [1.0, 1.0, -1.0]
+    assert guess(upside_down) == other
+    bar = pyramid(1.0, 1.0, 5.0)
+    assert guess(bar) == up
+    assert guess(bar[..., [0, 2, 1]]) == other
+    for scale in (1e-3, 50.0):
+        assert guess(scale * pyramid(1.0, 0.9, 2.0)) == up
+
+
 def test_few_points_and_flat_ones_have_an_axis():
     line = np.linspace([0.0, 0.0, 0.0], [0.0, 1.0, 0.0], 5)
     for points in (line, line[:1], np.eye(3)):
         assert guess_up_axis(points) in (1, 2)
+    assert guess_up_axis(line) == 1
+    assert guess_up_axis(line[:, [0, 2, 1]]) == 2
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 from solids import CUBE, SOLIDS, TETRAHEDRON, icosphere, rotation, somewhere, torus
 
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import (
+    outer_components,
     signed_volume,
     step_to_volume,
     volume_along,
     volume_gradient,
 )
+from vtk_segdeform.kernels import dispatch
 
 MESHES = {**SOLIDS, "sphere": icosphere(3), "torus": torus()}
 
@@ -18,6 +21,23 @@ MESHES = {**SOLIDS, "sphere": icosphere(3), "torus": torus()}
 @pytest.fixture(params=MESHES, ids=str)
 def mesh(request):
     return MESHES[request.param]
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_compiled_kernels_and_numpy_give_the_volumes_of_known_solids(compiled, monkeypatch):
+    if compiled:
+        pytest.importorskip("numba")
+        monkeypatch.setattr(sizes, "COMPILED", 0)
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    vertices, faces = CUBE[0] + 7.0, CUBE[1]
+    assert signed_volume(vertices, faces) == pytest.approx(1.0, rel=1e-14)
+    # Moved by t along the outward diagonal of every corner, the cube has sides 1 + 2 t.
+    terms = volume_along(vertices, 2.0 * CUBE[0] - 1.0, faces)
+    assert_allclose(terms, [1.0, 6.0, 12.0, 8.0], rtol=1e-13)
+    gradient = volume_gradient(vertices, faces)
+    assert_allclose(gradient.sum(axis=0), 0.0, atol=1e-15)
+    assert np.vdot(gradient, 2.0 * CUBE[0] - 1.0) == pytest.approx(6.0, rel=1e-14)
 
 
 def test_known_solids_have_their_known_volumes():
@@ -169,3 +189,17 @@ def test_the_step_is_exact_for_a_path_with_a_vanishing_initial_slope():
 def test_a_target_at_an_extremum_of_the_cubic_is_found():
     # (t - 1)^2 (t + 2) = t^3 - 3 t + 2: a double root at 1, complex after rounding.
     assert step_to_volume(np.array([2.0, -3.0, 0.0, 1.0]), 0.0) == pytest.approx(1.0, abs=1e-7)
+
+
+def test_a_cavity_is_in_the_smallest_body_around_it():
+    ball, _ = icosphere(1)
+    sizes_of = [4.0, 2.0, -1.0, -3.0, 1.0, -0.5, -0.5]  # negative: a cavity of that radius
+    places = np.array(
+        [[0, 0, 0], [0, 0, 0], [0.2, 0, 0], [0, 0.1, 0], [9, 0, 0], [9, 0, 0], [30, 0, 0]]
+    )
+    x = np.concatenate([abs(r) * ball + at for r, at in zip(sizes_of, places, strict=True)])
+    component = np.repeat(np.arange(7), len(ball))
+    volumes = np.array(sizes_of) ** 3
+    found = outer_components(x, component, volumes)
+    assert found.tolist() == [0, 1, 1, 0, 4, 4, 6]
+    assert outer_components(x, component, np.abs(volumes)).tolist() == list(range(7))

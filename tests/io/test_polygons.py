@@ -9,9 +9,22 @@ from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io import polygons
-from vtk_segdeform.io.polygons import _failed, cut_into_triangles, polydata_of, triangles_of
+from vtk_segdeform.io.polygons import (
+    _failed,
+    cells_of,
+    corner_values,
+    cut_into_triangles,
+    padded_corners,
+    polydata_of,
+    polygons_of,
+    rows,
+    triangles_of,
+    unstripped,
+)
+from vtk_segdeform.kernels import dispatch
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -45,6 +58,16 @@ SHAPES = {
 }  # fmt: skip
 
 
+@pytest.fixture(params=["numba", "numpy"])
+def either(request, monkeypatch):
+    """Run with and without compiled kernels, whatever the size."""
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if request.param == "numba":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+
+
 def cut(points, *polygons):
     counts = np.array([len(polygon) for polygon in polygons])
     return cut_into_triangles(points, counts, np.concatenate(polygons))
@@ -55,6 +78,7 @@ def area_vectors(points, triangles):
     return 0.5 * np.cross(b - a, c - a)
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("scale", every(3, [1.0, 1e-6, 1e6]))
 def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, scale):
@@ -74,6 +98,7 @@ def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, sc
             assert_allclose(up.sum(axis=0), sign * area * np.array([0, 0, 1.0]) @ TURN, rtol=1e-9)
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_triangles_have_the_boundary_of_the_polygon_also_where_it_is_not_planar(name):
     rng = np.random.default_rng(2)
@@ -90,6 +115,7 @@ def test_the_triangles_have_the_boundary_of_the_polygon_also_where_it_is_not_pla
     assert_array_equal(total, expected - expected.T)
 
 
+@pytest.mark.usefixtures("either")
 def test_polygons_that_cannot_be_cut_by_ears_lose_nothing():
     frame = np.array([0, 1, 2, 3, 0, 4, 5, 6, 7, 4])  # around a hole, with a bridge passed twice
     points = flat((0, 0), (4, 0), (4, 4), (0, 4), (1, 1), (1, 3), (3, 3), (3, 1))
@@ -146,6 +172,7 @@ def test_no_polygons_have_no_triangles():
     assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1
 
 
+@pytest.mark.usefixtures("either")
 def test_polygons_that_were_cut_wrongly_are_found():
     dart = flat((0, 0), (2, 0), (0.5, 0.5), (0, 2))
     bent = dart + np.outer([0, 0, 1, 0], [0.0, 0.0, 0.5])
@@ -165,6 +192,7 @@ def test_polygons_that_were_cut_wrongly_are_found():
     assert _failed(dart, *args).tolist() == []
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("size", [4, 5, 7])
 @pytest.mark.parametrize("apart", [False, True])
 def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_at(size, apart):
@@ -186,6 +214,7 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("size", [5, 6, 7, 24])
 @pytest.mark.parametrize("height", [0.0, 0.05])
 def test_convex_polygons_are_cut_along_their_shortest_diagonals(monkeypatch, size, height):
@@ -211,6 +240,7 @@ def test_convex_polygons_are_cut_along_their_shortest_diagonals(monkeypatch, siz
         assert set(cut.tolist()) in [set(face) for face in own.tolist()]
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", SHAPES)
 def test_others_than_convex_polygons_are_left_to_ear_clipping(name):
     points = SHAPES[name] @ TURN
@@ -231,6 +261,7 @@ def test_the_same_corners_in_another_order_are_another_polygon():
     assert_allclose(area_vectors(square, triangles[owner == 1])[:, 2], 0.5)
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("scale", [1.0, 1e-3])
 @pytest.mark.parametrize("height", [0.0, 1.0])
 def test_quads_are_cut_as_by_vtk(monkeypatch, scale, height):
@@ -248,3 +279,48 @@ def test_quads_are_cut_as_by_vtk(monkeypatch, scale, height):
     expected, owner = cut_into_triangles(points, counts, corners)
     assert_array_equal(polygon, owner)
     assert_array_equal(faces, expected)
+
+
+def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
+    points = np.arange(24.0).reshape(8, 3) ** 2
+    given = pv.PolyData()
+    given.points = points
+    given.verts = [1, 5]
+    given.lines = [2, 0, 1]
+    given.faces = [3, 0, 1, 2, 4, 4, 5, 6, 7]
+    given.strips = [4, 0, 1, 2, 3, 3, 7, 6, 5]
+    counts, corners = polygons_of(given)
+    assert_array_equal(counts, [3, 4, 3, 3, 3])
+    expected = [0, 1, 2, 4, 5, 6, 7, 0, 1, 2, 2, 1, 3, 7, 6, 5]
+    assert_array_equal(corners, expected)
+    assert_array_equal(cells_of(given), [2, 3, 4, 4, 5])
+    assert rows(counts, corners)[:2] == [[0, 1, 2], [4, 5, 6, 7]]
+    assert rows(np.array([2, 2]), np.arange(4)) == [[0, 1], [2, 3]]
+    assert rows(np.array([], int), np.array([], int)) == []
+    again = polydata_of(points, counts, corners)
+    assert_array_equal(again.faces, [3, 0, 1, 2, 4, 4, 5, 6, 7, 3, 0, 1, 2, 3, 2, 1, 3, 3, 7, 6, 5])
+    with pytest.raises(MeshError, match="faces use vertices 0 to 8, but there are 8"):
+        polydata_of(points, np.array([3]), np.array([0, 1, 8]))
+
+
+def test_strips_are_cut_into_triangles_of_the_same_orientation():
+    found = unstripped(np.array([5, 3, 6]), np.array([0, 1, 2, 3, 4, 7, 8, 9, 0, 1, 2, 2, 3, 4]))
+    expected = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [7, 8, 9], [0, 1, 2], [3, 2, 4]]
+    assert_array_equal(found, expected)
+
+
+def test_values_of_corners_are_padded_and_read_back():
+    counts = np.array([3, 5, 4])
+    for width in (2, 3):
+        values = np.random.default_rng(0).random((12, width))
+        wide = padded_corners(counts, values)
+        assert wide.shape == (3, 5 * width)
+        assert_array_equal(wide[0, : 3 * width], values[:3].ravel())
+        assert np.isnan(wide[0, 3 * width :]).all()
+        assert_array_equal(corner_values(wide, counts, width), values)
+        assert corner_values(wide[:, :-1], counts, width) is None
+        assert corner_values(wide[:, :-width], counts, width) is None
+        assert corner_values(wide[:2], counts, width) is None
+        assert corner_values(np.zeros(wide.shape, dtype=int), counts, width) is None
+    assert corner_values(None, counts) is None
+    assert padded_corners(counts[:0], np.empty((0, 2))).shape == (0, 0)

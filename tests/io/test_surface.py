@@ -9,7 +9,7 @@ from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, torus
 
 import vtk_segdeform as sd
-from vtk_segdeform.errors import ConstraintError, MeshError
+from vtk_segdeform.errors import ArgumentError, ConstraintError, MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.mesh import Kind
@@ -179,3 +179,24 @@ def test_computed_seams_and_poles_are_closed_also_after_writing(tmp_path, kind, 
     assert again.mesh.is_closed
     assert again.mesh.n_vertices == mesh.n_vertices
     assert_array_equal(np.unique(again.mesh.vertices, axis=0), np.unique(bent, axis=0))
+
+
+def test_a_surface_of_a_known_mesh_is_the_same_surface_and_others_do_not_fit(tmp_path):
+    given = pv.Cube().triangulate()
+    stray = pv.PolyData(np.vstack([given.points, [[9.0, 9.0, 9.0]]]), given.faces)
+    surface = sd.Surface(stray)
+    again = sd.Surface.of(stray, surface._soup)
+    assert again.mesh is surface.mesh
+    assert_array_equal(again.loose, [len(given.points)])
+    assert_array_equal(again.vertex_of, surface.vertex_of)
+    assert again.workarounds == surface.workarounds
+    with pytest.raises(MeshError, match="the mesh of 9 points is not one of 8 points"):
+        sd.Surface.of(given, surface._soup)
+    pose = 2.0 * surface.mesh.vertices + [1.0, 0.0, 0.0]
+    again.write(tmp_path / "a.ply", pose)
+    assert_array_equal(sd.io.read_polydata(tmp_path / "a.ply").points, surface.moved(pose).points)
+    for values, count in ((np.zeros(7), 8), (3.0, 8)):
+        with pytest.raises(ArgumentError, match=f"one row for each vertex of the mesh, {count}"):
+            surface.at_points(values)
+    with pytest.raises(ArgumentError, match="one row for each given point, 9"):
+        surface.at_vertices(np.zeros(8))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import tracemalloc
 
@@ -10,12 +11,14 @@ import pytest
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import faults as search
 from vtk_segdeform.mesh import shells, topology
-from vtk_segdeform.mesh.faults import find_faults
+from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
-from vtk_segdeform.mesh.report import Kind
+from vtk_segdeform.mesh.report import Fault, Kind
 from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.mesh_repair.repair import repair
 
@@ -414,7 +417,12 @@ def test_benchmark_meshes_have_no_faults(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["koala.obj", "armadilloman.obj", "armadilloman_cages_triangulated.obj"]
+    "name",
+    [
+        pytest.param("koala.obj", marks=pytest.mark.campaign),  # large, and like the next one
+        "armadilloman.obj",
+        "armadilloman_cages_triangulated.obj",
+    ],
 )
 def test_benchmark_meshes_in_obj_files_have_no_faults(name):
     lines = [line.split() for line in path_of(name).read_text().splitlines()]
@@ -437,3 +445,94 @@ def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
     row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
     _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
     assert (stops <= starts).all()
+
+
+def test_the_connectivity_of_a_cage_has_the_faults_of_its_faces():
+    vertices, faces = CUBE
+    n = len(vertices)
+    assert connectivity_faults(n, faces) == []
+    assert connectivity_faults(3, faces[:3]) == ["a closed surface needs at least 4 faces; got 3"]
+    repeating = faces.copy()
+    repeating[:2, 2] = repeating[:2, 0]
+    assert connectivity_faults(n, repeating) == ["2 faces repeat a vertex"]
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        once = faces.copy()
+        once[4, a] = once[4, b]
+        assert connectivity_faults(n, once) == ["1 face repeats a vertex"]
+    assert connectivity_faults(n, faces[1:]) == ["3 edges border only one face: the cage is open"]
+    turned = np.vstack([faces[:1, ::-1], faces[1:]])
+    assert connectivity_faults(n, turned) == ["3 edges have faces of opposite orientation"]
+    assert connectivity_faults(n + 2, faces) == ["2 vertices are in no face"]
+    assert connectivity_faults(n + 1, faces[1:]) == [
+        "3 edges border only one face: the cage is open",
+        "1 vertex is in no face",
+    ]
+    fin = np.vstack([faces, [[0, 1, n]]])
+    assert connectivity_faults(n + 1, fin) == [
+        "2 edges border only one face: the cage is open",
+        "1 edge borders three or more faces",
+    ]
+    vertices, corner = together(CUBE, (CUBE[0] + 1.0, CUBE[1]))
+    assert connectivity_faults(len(vertices), corner) == [
+        "1 vertex joins several surfaces at one point"
+    ]
+
+
+def test_points_far_from_most_others_are_a_fault_if_they_are_in_a_face():
+    vertices, faces = icosphere(2)
+    n = len(vertices)
+    for axis, sign in itertools.product(range(3), (1.0, -1.0)):
+        far = vertices.copy()
+        far[5, axis] = sign * 1e20
+        loose = np.vstack([vertices, far[5:6]])
+        report = find_faults(far, faces)
+        assert [(each.kind, each.examples) for each in report.faults if each.count == 1][:1] == [
+            (Kind.OUTLYING, (5,))
+        ]
+        assert find_faults(loose, faces).count(Kind.OUTLYING) == 0
+        assert find_faults(loose, faces).count(Kind.UNREFERENCED) == 1
+    assert find_faults(vertices + 1e6, faces).count(Kind.OUTLYING) == 0
+    assert find_faults(np.where(np.arange(n)[:, None] == 5, 3.0, vertices), faces).ok
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range(
+    compiled, monkeypatch
+):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if compiled:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    vertices, faces = CUBE
+    found = search.Search(np.vstack([vertices, [[9.0, 9, 9]]]), faces)
+    assert found.n_repeating == 0
+    assert found.used.tolist() == [True] * 8 + [False]
+    assert found.extent == 1.0
+    assert search.Search(vertices, np.vstack([faces, [[1, 1, 2], [3, 3, 3]]])).n_repeating == 2
+    for wrong in ([0, 1, 8], [-1, 2, 3]):
+        found = search.Search(vertices, np.vstack([faces[:1], [wrong]]))
+        assert found.n_repeating is None
+        assert found.used.tolist() == [True] * 3 + [False] * 5
+        assert found.n_components == 0
+
+
+def test_the_text_of_a_fault_counts_it_and_shows_a_few_places():
+    edge, face = Kind.OPEN_EDGE, Kind.ZERO_AREA
+    assert str(Fault(edge, 1, ((3, 7),))) == "1 open edge (3-7)"
+    assert str(Fault(edge, 2, ((3, 7), (4, 5)))) == "2 open edges (3-7, 4-5)"
+    assert str(Fault(face, 3, (3, 7))) == "3 faces without area (face 3, 7, ...)"
+    assert str(Fault(Kind.COMPONENTS, 2)) == "2 components"
+    assert str(Fault(Kind.EMPTY, 1)) == "empty mesh"
+    report = find_faults(*SPHERE)
+    assert report.count(edge) == 0
+    size = f"{N} vertices, {len(SPHERE[1])} faces, 1 component"
+    assert str(report) == f"{size}: a closed, outward oriented two-manifold"
+    assert "; " in str(find_faults(SPHERE[0], SPHERE[1][1:]))
+    open_text = str(find_faults(SPHERE[0], SPHERE[1][1:])).splitlines()
+    assert open_text[0].endswith("1 component: can be deformed")
+    assert all(line.startswith("  note: ") for line in open_text[1:])
+    turned = np.vstack([SPHERE[1][:1, ::-1], SPHERE[1][1:]])
+    assert "has faults\n  fault: 3 inconsistently oriented edges" in str(
+        find_faults(SPHERE[0], turned)
+    )

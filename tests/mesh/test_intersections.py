@@ -1,10 +1,79 @@
 """Pairs of faces that intersect: what touches at an edge only does not."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from solids import OCTAHEDRON, icosphere
+from vtkmodules.vtkCommonDataModel import vtkTriangle
 
+from vtk_segdeform import sizes
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import Crossings, new_crossings, self_intersections
+from vtk_segdeform.mesh.intersections import flat_faces, intersections_of
+from vtk_segdeform.mesh.near_faces import _near_centres, near_faces
+
+
+@pytest.fixture(params=["numba", "numpy"])
+def either(request, monkeypatch):
+    """Run with and without compiled kernels, whatever the size."""
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if request.param == "numba":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+
+
+def joined(*solids):
+    """Return several solids as one surface."""
+    starts = np.cumsum([0] + [len(points) for points, _ in solids])
+    faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
+    return np.concatenate([points for points, _ in solids]), np.concatenate(faces)
+
+
+def triangles(n=150, spread=0.5, seed=6):
+    """Return random triangles that share no corners."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(-1, 1, (n, 1, 3)) + spread * rng.normal(size=(n, 3, 3))
+    return corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3)
+
+
+@pytest.mark.usefixtures("either")
+def test_the_intersections_of_some_faces_are_those_of_all_that_involve_them():
+    points, faces = triangles()
+    every = self_intersections(points, faces)
+    some = np.random.default_rng(1).permutation(len(faces))[:40]
+    found = intersections_of(points, faces, some)
+    both = np.concatenate([every, every[:, ::-1]])
+    expected = both[np.isin(both[:, 0], some)]
+    assert_array_equal(np.unique(found, axis=0), np.unique(expected, axis=0))
+    assert len(found) == len(expected) > 50
+    assert not len(intersections_of(points, faces, some[:0]))
+
+
+@pytest.mark.usefixtures("either")
+def test_near_faces_include_all_whose_boxes_touch_each_pair_once():
+    points, faces = triangles(80, 0.2)
+    size = np.repeat(2.0 ** np.random.default_rng(2).integers(-3, 3, 80), 3)[:, None]
+    middle = np.repeat(points.reshape(-1, 3, 3).mean(axis=1), 3, axis=0)
+    points = middle + size * (points - middle)
+    asked = np.arange(80) % 3 == 0
+    pairs = np.concatenate(list(near_faces(points, faces, asked)))
+    assert asked[pairs[:, 0]].all()
+    unordered = {tuple(sorted(pair)) for pair in pairs.tolist()}
+    assert len(unordered) == len(pairs)
+    meeting = {tuple(pair) for pair in self_intersections(points, faces).tolist()}
+    assert {pair for pair in meeting if asked[list(pair)].any()} <= unordered
+    low, high = points[faces].min(axis=1), points[faces].max(axis=1)
+    for i, j in unordered:
+        assert ((low[i] <= high[j]) & (low[j] <= high[i])).all()
+
+
+def test_needles_have_no_plane():
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, 1e-3, 0], [0.5, 1e-17, 0], [3, 3, 3]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [4, 4, 4], [0, 1, 4]])
+    assert_array_equal(flat_faces(1e-3 * corners, faces), [1, 2])
 
 
 def test_coplanar_faces_beside_an_edge_do_not_intersect_however_they_are_oriented():
@@ -43,3 +112,104 @@ def test_crossings_of_one_pose_after_another_are_those_of_each(seed):
         assert_array_equal(crossings.at(pose), new_crossings(pose, rest, faces))
     assert not len(crossings.at(rest))
     assert max(len(crossings.at(pose)) for pose in poses) > 10
+
+
+def test_a_face_folded_over_its_neighbour_is_found():
+    vertices, faces = OCTAHEDRON
+    a, b, c = faces[0]
+    middle = vertices[[a, b, c]].mean(axis=0)
+    split = np.vstack([faces[1:], [[a, b, 6], [b, c, 6], [c, a, 6]]])
+    assert not len(self_intersections(np.vstack([vertices, middle]), split))
+    beyond = vertices[c] + 0.3 * (vertices[c] - middle)  # in the same plane, past the corner
+    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
+    beyond = vertices[[a, b]].mean(axis=0) * 1.3 - 0.3 * vertices[c]  # past the edge
+    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
+
+
+def test_faces_that_share_a_corner_may_touch_only_there():
+    fan = np.array([[0, 1, 2], [0, 3, 4]])
+    corner, wide = [0, 0, 0], [[2, -1, 0], [2, 1, 0]]
+
+    def meet(p, q):
+        return len(self_intersections(np.array([corner, *wide, p, q], float), fan)) == 1
+
+    assert meet([1, 0, -1], [1, 0, 1])  # pierced across
+    assert meet([4, 0, -1], [4, 0, 1])  # the other one is pierced
+    assert meet([1, 0, 0], [1, 3, 0])  # in one plane, overlapping
+    assert meet([1, 0.1, 0], [1, -0.1, 0])  # in one plane, inside
+    assert not meet([-1, 0, -1], [-1, 0, 1])
+    assert not meet([-2, 1, 0], [-2, -1, 0])
+    assert not meet([1, 0, 1], [1, 1, 1])
+    assert not meet([1, 0, 1e-6], [1, 1, 1e-6])
+    assert not meet([2, 1.5, 0], [2, 3, 0])  # in one plane, side by side
+
+
+def test_faces_that_share_an_edge_may_not_fold_over_one_another():
+    pair = np.array([[0, 1, 2], [1, 0, 3]])
+
+    def meet(apex):
+        return (
+            len(self_intersections(np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0], apex]), pair)) == 1
+        )
+
+    assert meet([0.3, 0.5, 0.0])
+    assert not meet([0.3, -0.5, 0.0])
+    assert not meet([0.3, 0.5, 1e-6])
+
+
+def test_both_sides_of_one_triangle_are_not_a_surface():
+    pillow = np.array([[0, 1, 2], [2, 1, 0]])
+    assert len(self_intersections(np.eye(3), pillow)) == 1
+
+
+def test_faces_that_share_nothing_may_not_even_touch():
+    pair = np.array([[0, 1, 2], [3, 4, 5]])
+    flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+
+    def meet(*other):
+        return len(self_intersections(np.array([*flat, *other], float), pair)) == 1
+
+    assert meet([0.2, 0.2, 0], [0.2, 0.2, 1], [0.3, 0.2, 1])  # a corner on the face
+    assert meet([0.5, 0.5, -1], [0.5, 0.5, 1], [1, 1, 0])  # an edge on the edge
+    assert meet([0, 0, 0], [0, 0, 1], [-1, 0, 1])  # a corner on the corner
+    assert meet([1, 0, 0], [2, 0, 0], [1, 1, 0])  # in one plane, corner on corner
+    assert meet([0.1, 0.1, 0], [0.2, 0.1, 0], [0.1, 0.2, 0])  # in one plane, inside
+    assert not meet([0.2, 0.2, 1e-9], [0.2, 0.2, 1], [0.3, 0.2, 1])
+    assert not meet([0.51, 0.51, 0], [1, 0.5, 0], [0.5, 1, 0])
+    assert not meet([0.6, 0.6, -1], [0.6, 0.6, 1], [1, 1, 0])
+
+
+@pytest.mark.usefixtures("either")
+@pytest.mark.parametrize("spread", [0.15, 0.5])
+def test_intersections_of_random_triangles_agree_with_vtk(spread):
+    n = 150
+    points, faces = triangles(n, spread)
+    corners = points.reshape(-1, 3, 3)
+    found = self_intersections(points, faces)
+    expected = [
+        (i, j)
+        for i in range(n)
+        for j in range(i + 1, n)
+        if vtkTriangle.TrianglesIntersect(*corners[i], *corners[j])
+    ]
+    assert 10 < len(expected) < n * (n - 1) / 4
+    assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_intersections_do_not_depend_on_axes_or_on_batches(axis, monkeypatch):
+    ball, faces = icosphere(1)
+    vertices, faces = joined((ball, faces), (ball + [0.7, 0.1, 0.2], faces))
+    expected = self_intersections(vertices, faces)
+    assert len(expected) > 20
+    rolled = np.roll(vertices, axis, axis=1) * [1, 10, 1]
+    monkeypatch.setattr("vtk_segdeform.mesh.intersections._BATCH", 97)
+    assert_array_equal(self_intersections(rolled, faces), expected)
+
+
+def test_the_number_of_tested_pairs_is_proportional_to_the_number_of_faces():
+    def pairs_per_face(solid):
+        found = _near_centres(*solid, np.ones(len(solid[1]), dtype=bool))
+        return sum(len(pairs) for pairs in found) / len(solid[1])
+
+    assert pairs_per_face(icosphere(4)) < 1.5 * pairs_per_face(icosphere(2))

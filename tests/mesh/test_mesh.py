@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import copy
+import itertools
 import pickle
 import time
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, torus, two_components
 
 import vtk_segdeform as sd
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh.faults import find_faults
 from vtk_segdeform.mesh.mesh import Mesh
 
@@ -200,3 +203,34 @@ def test_the_mesh_of_some_components_has_their_vertices_faces_and_borders():
         assert_array_equal(part.faces, single.faces)
         assert_array_equal(part.boundary, single.boundary)
         assert_array_equal(part.edges, single.edges)
+        assert part.is_two_manifold == single.is_two_manifold == (which == 0)
+        assert part.is_closed == single.is_closed
+        assert_array_equal(part.components, np.zeros(part.n_vertices))
+        assert part.n_faces == len(single.faces)
+        assert part.diagonal == single.diagonal
+    assert_array_equal(mesh.of_components([0, 1])[1], np.arange(mesh.n_vertices))
+    with pytest.raises(MeshError, match="which is empty"):
+        mesh.of_components([])
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_areas_and_adjacency_are_those_of_the_faces_with_and_without_kernels(compiled, monkeypatch):
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if compiled:
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    box = CUBE[0] * [2.0, 3.0, 4.0]
+    mesh = Mesh(box, CUBE[1])
+    assert_allclose(np.sort(mesh.face_areas), np.repeat([3.0, 4.0, 6.0], 4))
+    a, b, c = box[CUBE[1]].transpose(1, 0, 2)
+    assert_allclose(mesh.face_areas, 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    assert mesh.vertex_areas.sum() == pytest.approx(52.0)
+    first = (CUBE[1] == 0).any(axis=1)
+    assert mesh.vertex_areas[0] == pytest.approx(mesh.face_areas[first].sum() / 3.0)
+    lengths = np.zeros((8, 8))
+    for face in CUBE[1]:
+        for i, j in itertools.permutations(face, 2):
+            lengths[i, j] = np.linalg.norm(box[i] - box[j])
+    assert_allclose(mesh.adjacency.toarray(), lengths)
+    assert mesh.adjacency.nnz == 2 * len(mesh.edges) == 36

@@ -243,3 +243,20 @@ def test_volumes_known_after_flipping_are_those_of_the_flipped_shells():
     fin = np.append(faces, [[*faces[0, :2], len(x)]], axis=0)
     half_edges = HalfEdges(fin, len(x) + 1)
     assert faces_to_flip(np.append(x, [[9.0, 9, 9]], axis=0), half_edges)[1] is None  # it branches
+
+
+@pytest.mark.usefixtures("with_and_without_numba")
+def test_a_ball_in_the_hole_of_a_ring_is_not_inside_it():
+    ring, ball = torus(24, 12), (0.3 * SPHERE[0], SPHERE[1])
+    for height, around_ball in ((0.0, 1), (2.5, 1), (9.0, 0)):
+        points, faces = together(
+            (3.0 * SPHERE[0], SPHERE[1]),
+            (ring[0] @ TURN, ring[1]),
+            (ball[0] + [0.0, 0.0, height], ball[1]),
+            (0.1 * SPHERE[0] + [0.0, 0.0, height], SPHERE[1]),
+        )
+        half_edges = HalfEdges(faces, len(points))
+        depth = shell_depths(points, half_edges, np.ones(4, dtype=bool))
+        assert_array_equal(depth, [0, 1, around_ball, around_ball + 1])
+        depth = shell_depths(points, half_edges, np.arange(4) == 3)
+        assert_array_equal(depth, [0, 0, 0, around_ball + 1])

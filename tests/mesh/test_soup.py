@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
 from vtk_segdeform import sizes
-from vtk_segdeform.errors import MeshError
+from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh import Kind, find_faults, mesh_of
 from vtk_segdeform.mesh import soup as soup_module
@@ -366,3 +366,48 @@ def test_any_triangles_with_a_face_that_is_not_flat_become_a_mesh(seed):
         areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         if (areas > 1e-9).any():
             checked(vertices, faces)
+
+
+def test_points_of_a_seam_are_one_vertex_and_go_to_the_mean_of_their_targets():
+    points, faces = soup(*CUBE)
+    points = np.vstack([points, [[9.0, 0.0, 0.0], [0.1, 0.0, 0.0]]])  # two in no face
+    found = mesh_of(points, faces)
+    assert_array_equal(found.loose, [36, 37])
+    some = np.array([37, 5, 0, 2, 9, 36])
+    vertices = found.vertices_at(some)
+    assert_array_equal(vertices, np.unique(found.vertex_of[[5, 0, 2, 9]]))
+    mask = np.isin(np.arange(len(points)), some)
+    assert_array_equal(found.vertices_at(mask), vertices)
+    ends = np.random.default_rng(0).normal(size=(len(some), 3))
+    ids, targets = found.targets_at(some, ends)
+    assert_array_equal(ids, vertices)
+    for vertex, target in zip(ids, targets, strict=True):
+        own = [k for k, i in enumerate(some) if found.vertex_of[i] == vertex and i < 36]
+        assert_allclose(target, ends[own].mean(axis=0), rtol=1e-14)
+    every, targets = found.targets_at(np.arange(36), points[:36])
+    assert_array_equal(every, np.arange(8))
+    assert_allclose(targets, found.mesh.vertices)
+    with pytest.raises(ConstraintError, match="no point of the handle is in a face"):
+        found.targets_at([36, 37], ends[:2])
+    assert len(found.targets_at([], np.empty((0, 3)))[0]) == 0
+
+
+def test_values_at_vertices_are_those_of_the_first_of_their_points_in_a_face():
+    points, faces = soup(*CUBE)
+    points = np.vstack([[[9.0, 9.0, 9.0]], points])
+    found = mesh_of(points, faces + 1)
+    values = np.arange(37)
+    first = [np.flatnonzero(found.vertex_of[1:] == vertex)[0] + 1 for vertex in range(8)]
+    assert_array_equal(found.at_vertices(values), first)
+    assert_array_equal(found.at_vertices(points), found.mesh.vertices)
+
+
+def test_loose_points_follow_the_step_of_the_vertex_nearest_to_them():
+    vertices, faces = CUBE
+    points = np.vstack([vertices, [[2.0, 1.0, 1.0], [-1.0, 0.0, 0.1]]])
+    found = mesh_of(points, faces)
+    assert_array_equal(found.vertex_of[8:], [7, 0])
+    posed = found.mesh.vertices * [1.0, 2.0, 3.0] + [5.0, 0.0, 0.0]
+    moved = found.moved(posed)
+    assert_array_equal(moved[:8], posed)
+    assert_allclose(moved[8:], [[7.0, 2.0, 3.0], [4.0, 0.0, 0.1]], rtol=1e-15)

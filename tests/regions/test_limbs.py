@@ -11,6 +11,7 @@ from solids import icosphere
 
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.models.implicit import Limb, implicit_surface
+from vtk_segdeform.regions import limbs as limbs_module
 from vtk_segdeform.regions.coarse import coarsen
 from vtk_segdeform.regions.limbs import find_limbs
 from vtk_segdeform.regions.segmentation import segment
@@ -136,3 +137,45 @@ def test_a_limb_has_the_area_and_the_neck_that_it_has():
     assert legs[0].area == pytest.approx(area[list(BODIES["dog"]).index("left hind leg")], rel=0.25)
     assert legs[0].length == pytest.approx(2.0 * np.pi * 0.035, rel=0.25)
     assert [limb.score for limb in limbs] == sorted(limb.score for limb in limbs)
+
+
+def test_protrusion_and_score_have_the_values_of_the_definitions():
+    length = 2.0 * np.pi * 0.3
+    for area, expected in ((np.pi * 0.09, 1.0), (2.0 * np.pi * 0.09, 2.0), (4.0 * np.pi * 0.09, 4)):
+        assert limbs_module._protrusion(area, length) == pytest.approx(expected)
+    around = np.full(5, length)  # of a tube
+    plane = length * (1.0 + limbs_module._PARALLELS)  # around the foot of a tube on a plane
+    area = 4.0 * np.pi * 0.09
+    assert limbs_module._score(around, around, length, area) == pytest.approx(2.0 / 4.0)
+    assert limbs_module._score(around, plane, length, area) == pytest.approx(2.0 / 64.0 / 4.0)
+    assert limbs_module._score(around, 0.5 * around, length, area) == pytest.approx(0.5)
+    assert limbs_module._score(around, around, length, 9.0 * area) == pytest.approx(2.0 / 6.0)
+    short = np.where(np.arange(5) < 4, around, 0.29 * length)  # beyond the tip
+    assert limbs_module._score(short, plane, length, area) == pytest.approx(2.0 / 1.75**6 / 4.0)
+    at_tip = np.where(np.arange(5) < 4, around, 0.31 * length)
+    assert limbs_module._score(at_tip, plane, length, area) < 2.0 / 1.75**6 / 4.0
+
+
+def test_a_neck_is_one_if_it_is_sharp_and_its_limb_protrudes():
+    inside, length = np.ones(3, dtype=bool), 2.0
+
+    def found(protrusion, score):
+        area = protrusion * length**2 / (4.0 * np.pi)
+        return limbs_module.Limb(inside, area, length, score).found
+
+    assert found(2.51, 0.0999)
+    assert not found(2.49, 0.0999)
+    assert not found(2.51, 0.1001)
+
+
+def test_the_spread_of_a_ring_is_its_radius():
+    mesh = Mesh(*icosphere(4))
+    _, surface = coarsen(mesh, 10**6, np.random.default_rng(0))
+    ring = np.flatnonzero(np.abs(surface.vertices[:, 2]) < 1e-9)
+    assert limbs_module._spread(surface, ring) == pytest.approx(1.0, abs=1e-6)
+    assert limbs_module._spread(surface, ring[:0]) == 0.0
+    away = limbs_module._distance(surface, surface.vertices[:, 2] > 0.0, 0.4)
+    latitude = np.abs(np.arcsin(surface.vertices[:, 2].clip(-1, 1)))
+    near = latitude < 0.35
+    assert (np.abs(away[near] - latitude[near] + 0.1) < 0.12).all()  # from two rings on, on a side
+    assert np.isinf(away[latitude > 0.65]).all()

@@ -4,9 +4,16 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csgraph
 from solids import CUBE, SOLIDS, icosphere, somewhere, torus, two_components
 
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import RegionError
+from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.regions.blending import blend_weights, borders, distance_to_triangles
+from vtk_segdeform.regions.blending import (
+    blend_weights,
+    border_distance,
+    borders,
+    distance_to_triangles,
+)
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights
 
 SPHERE = Mesh(*icosphere(4))
@@ -88,6 +95,73 @@ def test_the_distance_changes_by_at_most_the_length_of_an_edge_along_it():
     assert (np.abs(d[:, i] - d[:, j]) <= length + 1e-12)[both].all()
 
 
+@pytest.fixture(params=["numba", "numpy"])
+def either(request, monkeypatch):
+    """Run with and without compiled kernels, whatever the size."""
+    if request.param == "numba":
+        pytest.importorskip("numba")
+        monkeypatch.setattr(sizes, "COMPILED", 0)
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+
+
+@pytest.mark.usefixtures("either")
+def test_distances_and_weights_of_any_regions_are_shortest_paths_and_their_ratios():
+    mesh = Mesh(*two_components())
+    masks = np.random.default_rng(3).random((9, mesh.n_vertices)) < 0.7
+    masks[8] |= ~masks.any(axis=0) | (mesh.components == 1)
+    regions = Regions(mesh, masks)
+    edge = borders(mesh, masks)
+    for r, members in enumerate(masks):
+        expected = csgraph.dijkstra(mesh.adjacency, indices=np.flatnonzero(edge[r])).min(axis=0)
+        found = regions.border_distance[r]
+        assert_allclose(found, np.where(members, expected, 0.0), rtol=1e-12)
+    assert np.isinf(regions.border_distance[8]).any()
+    wanted = np.arange(0, mesh.n_vertices, 7)
+    some = border_distance(mesh, masks, wanted)
+    assert_allclose(some[:, wanted], regions.border_distance[:, wanted])
+    assert_allclose(regions.weights, blend_weights(masks, regions.border_distance), atol=1e-14)
+
+
+def test_weights_by_the_distance_to_cages_are_their_ratios_as_printed():
+    mesh = Mesh(CUBE[0] - 0.5, CUBE[1])
+    cages = [Mesh(2.0 * mesh.vertices, CUBE[1]), Mesh(4.0 * mesh.vertices, CUBE[1])]
+    left = mesh.vertices[:, 0] < 0.0
+    regions = Regions.from_masks(mesh, [np.ones(8, dtype=bool), left])
+    weights = cage_distance_weights(regions, cages)
+    assert_allclose(weights[:, left], np.repeat([[0.25], [0.75]], 4, axis=1))
+    assert_allclose(weights[:, ~left], np.repeat([[1.0], [0.0]], 4, axis=1))
+    with pytest.raises(RegionError, match="cages must be one cage for each of the 2"):
+        cage_distance_weights(regions, cages[:1])
+
+
+def test_components_tell_where_each_region_has_vertices():
+    mesh = Mesh(*two_components())
+    first, right = mesh.components == 0, mesh.vertices[:, 0] > 0.0
+    regions = Regions.from_masks(mesh, [first, first & right, ~first, np.ones_like(first)])
+    expected = [[True, False], [True, False], [False, True], [True, True]]
+    np.testing.assert_array_equal(regions.components, expected)
+    assert not regions.components.flags.writeable
+    one = Regions.from_labels(SPHERE, thirds(SPHERE)).components
+    np.testing.assert_array_equal(one, np.ones((3, 1), dtype=bool))
+
+
+def test_the_label_of_a_vertex_is_the_region_of_largest_weight_and_the_first_of_equal_ones():
+    mesh = Mesh(*CUBE)
+    halves = Regions.from_masks(mesh, [np.ones(8, dtype=bool), np.ones(8, dtype=bool)])
+    np.testing.assert_array_equal(halves.labels, np.zeros(8))
+    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 4)
+    clear = regions.weights.max(axis=0) > 0.51
+    np.testing.assert_array_equal(regions.labels[clear], regions.weights.argmax(axis=0)[clear])
+    for r in range(3):
+        np.testing.assert_array_equal(regions.members(r), np.flatnonzero(regions.membership[r]))
+    for wrong in (-1, 3, 1.5):
+        with pytest.raises(RegionError, match=r"region must be one of 0\.\.2"):
+            regions.members(wrong)
+    with pytest.raises(RegionError, match="rings must be a whole number"):
+        regions.grow(-1)
+
+
 def test_distance_is_the_shortest_path_over_the_whole_mesh_to_the_border():
     regions = Regions.from_labels(SPHERE, thirds(SPHERE), 3)
     start = np.flatnonzero(borders(SPHERE, regions.membership)[1])
@@ -164,6 +238,17 @@ def test_distance_to_a_cube_is_known():
     depth = np.minimum(x, 1.0 - x).min(axis=1)
     expected = np.where(depth > 0, depth, outside)
     assert_allclose(distance_to_triangles(x, *CUBE), expected, atol=1e-12)
+    for scale in (0.25, 3.0):
+        found = distance_to_triangles(scale * x + 2.0, scale * CUBE[0] + 2.0, CUBE[1])
+        assert_allclose(found, scale * expected, atol=1e-12)
+
+
+def test_the_distance_to_a_needle_is_that_to_its_longest_side():
+    needle = np.array([[0.0, 0, 0], [2, 0, 0], [0.5, 0, 0]])
+    points = np.array([[1.0, 3, 4], [-3, 0, 4], [5, 4, 0], [0.5, 0, 0]])
+    found = distance_to_triangles(points, needle, np.array([[0, 1, 2], [2, 2, 2]]))
+    assert_allclose(found, [5.0, 5.0, 5.0, 0.0], atol=1e-15)
+    assert distance_to_triangles(points[:0], needle, np.array([[0, 1, 2]])).shape == (0,)
 
 
 def test_distance_to_triangles_does_not_depend_on_chunks(monkeypatch):
@@ -180,6 +265,9 @@ def test_distance_to_triangles_does_not_depend_on_chunks(monkeypatch):
         (np.ones((2, 8), dtype=float), "bool"),
         (np.array([[True] * 8, [False] * 8]), "1 region has no vertices: 1;"),
         (np.array([[True] * 6 + [False] * 2]), "2 vertices are in no region: 6, 7;"),
+        (np.array([[True] * 7 + [False]]), "1 vertex is in no region: 7;"),
+        (np.array([[False] * 8] * 2 + [[True] * 8]), "2 regions have no vertices: 0, 1;"),
+        (np.array([[False] * 8] * 9 + [[True] * 8]), "0, 1, 2, 3, 4, 5, 6, 7, ...;"),
     ],
 )
 def test_the_error_lists_empty_regions_and_uncovered_vertices(masks, message):

@@ -8,7 +8,7 @@ from real_meshes import botsch_sorkine
 from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 
-from vtk_segdeform.errors import Cancelled, RegionError
+from vtk_segdeform.errors import ArgumentError, Cancelled, RegionError
 from vtk_segdeform.geometry import sampling
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import borders
@@ -278,6 +278,11 @@ def test_invalid_arguments_are_errors():
     for wrong in (0, -1, 2.5, 7):
         with pytest.raises(RegionError, match=r"whole number in 1\.\.6"):
             segment(Mesh(*OCTAHEDRON), wrong)
+    for wrong in (-1, 1.5):
+        with pytest.raises(RegionError, match="overlap must be a whole number, 0 or more"):
+            segment(Mesh(*OCTAHEDRON), 2, overlap=wrong)
+        with pytest.raises(ArgumentError, match="seed must be a whole number, 0 or more"):
+            segment(Mesh(*OCTAHEDRON), 2, seed=wrong)
 
 
 def test_progress_increases_to_one_and_can_cancel():
@@ -304,3 +309,73 @@ def test_the_benchmark_cactus_is_a_trunk_with_two_arms(n_regions):
     assert np.sort(np.bincount(regions.labels))[:2] / len(vertices) == pytest.approx(
         [0.12, 0.17], abs=0.03
     )
+
+
+def test_the_lines_of_a_coarse_surface_are_edges_and_straight_ways_over_two_triangles():
+    n = 5
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    points = np.stack([x, y, np.zeros(n * n)], axis=1).astype(float)
+    a = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.concatenate([np.stack([a, a + n, a + n + 1], 1), np.stack([a, a + n + 1, a + 1], 1)])
+    cell, surface = coarsen(Mesh(points, faces), 10**6, np.random.default_rng(0))
+    np.testing.assert_array_equal(cell, np.arange(n * n))
+    np.testing.assert_array_equal(surface.graph.toarray(), surface.graph.toarray().T)
+    i, j = surface.lines
+    length = np.linalg.norm(points[i] - points[j], axis=1)
+    np.testing.assert_allclose(surface.graph.toarray()[i, j], length)
+    # edges, both diagonals of each square, and those of each parallelogram of two triangles
+    steps = {tuple(sorted(abs(step))) for step in (points[i] - points[j])[:, :2].astype(int)}
+    assert steps == {(0, 1), (1, 1), (1, 2)}
+    assert len(i) == 2 * (2 * n * (n - 1) + 2 * (n - 1) ** 2 + 2 * (n - 1) * (n - 2))
+    np.testing.assert_allclose(surface.areas.sum(), (n - 1) ** 2)
+    inside = (x < 4) & (np.arange(n * n) != 7)
+    np.testing.assert_array_equal(surface.two_pieces(inside), x < 4)  # the hole is filled
+    apart = (x == 0) | (np.arange(n * n) == n * n - 1)
+    np.testing.assert_array_equal(surface.two_pieces(apart), x == 0)  # the largest piece
+    np.testing.assert_array_equal(surface.two_pieces(x < 2), x < 2)
+    part = surface.part(np.array([12, 7, 6]))
+    np.testing.assert_array_equal(part.vertices, points[[12, 7, 6]])
+    np.testing.assert_array_equal(part.faces, [[2, 0, 1]])
+    assert [len(piece) for piece in surface.pieces(np.isin(x, [0, 3, 4]))] == [10, 5]
+    away = surface.distance(np.array([0]))
+    np.testing.assert_allclose(away[[1, 6, 11, 24]], [1, np.sqrt(2), np.sqrt(5), 4 * np.sqrt(2)])
+    assert np.isinf(surface.distance(np.array([0]), 1.1)[6])
+    borders_of = np.zeros((n * n, n * n))  # from the middle of an edge to those of its triangles
+    for face in faces:
+        for one, other in itertools.permutations(face, 2):
+            middle = 0.5 * (points[one] + points[other])
+            borders_of[one, other] += np.linalg.norm(middle - points[face].mean(axis=0))
+    np.testing.assert_allclose(surface.contact.toarray(), np.pi / 4 * borders_of, atol=1e-12)
+
+
+def test_a_tenth_of_the_area_of_the_largest_component_is_a_region():
+    ball, faces = icosphere(3)
+    n = len(ball)
+    for radius, expected in ((0.7, 2), (0.02, 1)):
+        both = np.concatenate([ball, radius * ball + [1.02 + radius, 0, 0]])
+        mesh = Mesh(both, np.concatenate([faces, faces + n]))
+        assert segment(mesh).n_regions == expected
+
+
+def test_pieces_of_a_part_join_the_part_of_the_nearest_vertex():
+    mesh = limbed()
+    labels = np.digitize(mesh.vertices[:, 2], [3.0, 7.0])
+    stray = labels.copy()
+    stray[np.argmin(mesh.vertices[:, 2])] = 1
+    stray[np.argmin(np.abs(mesh.vertices[:, 2] - 5.0))] = 0
+    np.testing.assert_array_equal(borders.connected_parts(mesh, labels), labels)
+    np.testing.assert_array_equal(borders.connected_parts(mesh, stray), labels)
+
+
+def test_smoothing_shortens_a_border_and_leaves_it_where_it_is():
+    mesh = limbed()
+    z = mesh.vertices[:, 2]
+    wavy = (z > 5.0 + np.random.default_rng(0).uniform(-0.4, 0.4, len(z))).astype(int)
+
+    def length(labels):
+        return np.count_nonzero(np.diff(labels[mesh.edges], axis=1))
+
+    smooth = borders.smooth_borders(mesh, wavy)
+    assert length(smooth) < 0.7 * length(wavy)
+    crossing = mesh.edges[np.diff(smooth[mesh.edges], axis=1)[:, 0] != 0]
+    np.testing.assert_allclose(z[crossing], 5.0, atol=0.3)

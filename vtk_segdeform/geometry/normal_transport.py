@@ -91,7 +91,9 @@ class NormalTransport:
         )
         lost = np.flatnonzero((np.diff(around.indptr) == 0) & (np.diff(every.indptr) > 0))
         if len(lost):
-            around = _replaced(around, lost, self._beside(every[lost], sound, len(points)))
+            entries = np.ones(len(lost)), (lost, np.arange(len(lost)))
+            into = csr_array(entries, shape=(shape[0], len(lost)))
+            around = csr_array(around + into @ self._beside(every[lost], sound, len(points)))
         around.sum_duplicates()
         around.data[:] = 1.0
         self._around = around[group]  # of each normal
@@ -183,14 +185,6 @@ class NormalTransport:
         bad = ~np.isfinite(frames).all(axis=(1, 2)) | (np.abs(np.linalg.det(frames)) == 0)
         frames[bad] = np.eye(3)
         return frames
-
-
-def _replaced(matrix: csr_array, rows: IntArray, new: csr_array) -> csr_array:
-    """Return *matrix* with *new* rows (l, t) at *rows* (l,)."""
-    kept = np.ones(matrix.shape[0])
-    kept[rows] = 0.0
-    place = csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), (len(kept), len(rows)))
-    return csr_array(matrix * kept[:, None] + place @ new)
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

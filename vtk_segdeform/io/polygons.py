@@ -463,7 +463,9 @@ def _least_area(points: FloatArray, polygon: IntArray) -> IntArray:
 
 def rows(counts: IntArray, corners: IntArray) -> list[list[int]]:
     """Return the polygons as lists, for a writer."""
-    if len(counts) and (counts == counts[0]).all():
+    if not len(counts):
+        return []
+    if (counts == counts[0]).all():
         equal: list[list[int]] = corners.reshape(len(counts), -1).tolist()
         return equal
     return [part.tolist() for part in np.split(corners, np.cumsum(counts)[:-1])]

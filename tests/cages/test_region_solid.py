@@ -1,0 +1,119 @@
+"""The distance to the solid of a region, on a grid, and the patch it is made from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
+from solids import CUBE, icosphere, rotation
+
+from vtk_segdeform.cages.region_solid import Patch, Surface, _samples, solid_field
+from vtk_segdeform.mesh import Mesh
+
+BALL = Mesh(*icosphere(4))
+TURN = rotation([1.0, 2.0, 3.0], 0.7).T
+
+
+def field_of(mesh, members=None, offset=0.3, step=0.1, **options):
+    members = np.ones(mesh.n_vertices, dtype=bool) if members is None else members
+    options = {"most_nodes": 3e5, **options}
+    return solid_field(Patch.of(Surface.of(mesh), members), offset, step, **options)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-3])
+def test_the_distance_to_a_ball_is_known_at_every_node(scale):
+    mesh = Mesh(scale * (BALL.vertices @ TURN), BALL.faces)
+    field = field_of(mesh, offset=0.3 * scale, step=0.1 * scale)
+    assert field.grid.step == pytest.approx(0.1 * scale)
+    assert field.offset == pytest.approx(3.0)
+    assert field.n_shells == 1
+    nodes = np.indices(field.distance.shape).reshape(3, -1).T
+    points = field.grid.to_points(nodes)
+    assert_allclose(field.grid.to_nodes(points), nodes, atol=1e-9)
+    radius = np.linalg.norm(points, axis=1) / scale
+    found = field.distance.ravel() * 0.1
+    outside = radius > 1.1
+    assert_allclose(found[outside], radius[outside] - 1.0, atol=0.08)
+    assert (found[radius < 0.95] <= 0.0).all()
+    assert_allclose(found[radius < 0.8], radius[radius < 0.8] - 1.0, atol=0.12)
+    along = points @ field.grid.axes.T / scale
+    for beyond in (-along.min(axis=0), along.max(axis=0)):  # the offset surface and 3.7 steps
+        assert_allclose(beyond, 1.3 + 0.37, atol=0.11)
+    assert_allclose(field.members, field.grid.to_nodes(mesh.vertices), atol=1e-9)
+    assert_array_equal(field.stretch_at(field.members), np.ones(mesh.n_vertices))
+
+
+def test_the_distance_to_a_part_of_a_ball_is_that_to_its_own_half():
+    upper = BALL.vertices[:, 2] > -1e-9
+    field = field_of(BALL, upper)
+    nodes = np.indices(field.distance.shape).reshape(3, -1).T
+    points = field.grid.to_points(nodes)
+    below = (points[:, 2] < -0.15) & (np.linalg.norm(points[:, :2], axis=1) < 0.9)
+    assert_allclose(0.1 * field.distance.ravel()[below], -points[below, 2], atol=0.12)
+    above = (points[:, 2] > 0.1) & (np.linalg.norm(points, axis=1) < 0.9)
+    assert (field.distance.ravel()[above] <= 0.0).all()
+
+
+def test_the_step_follows_the_number_of_nodes_and_the_offset():
+    fine = field_of(BALL, step=0.05, most_nodes=1e6)
+    assert fine.grid.step == pytest.approx(0.05)
+    small = field_of(BALL, step=0.05, most_nodes=2e4)
+    assert np.prod(small.distance.shape) < 3e4
+    assert 0.05 < small.grid.step <= 0.2
+    close = field_of(BALL, offset=0.06, step=0.1, most_nodes=1e6)
+    assert close.grid.step == pytest.approx(0.04)
+    assert close.offset == pytest.approx(1.5)
+    coarse = field_of(BALL, offset=0.01, step=0.1, most_nodes=2e4)
+    assert coarse.offset == pytest.approx(1.5)
+    assert coarse.grid.step * coarse.offset > 0.1
+
+
+def test_a_stretch_divides_the_distance():
+    z = BALL.vertices[:, 2]
+    stretch = np.where(z > 0.0, 2.0, 1.0)
+    plain, field = field_of(BALL, offset=0.2), field_of(BALL, offset=0.2, stretch=stretch)
+    assert_allclose(field.stretch_at(field.members[z > 0.6]), 2.0, atol=0.1)
+    assert_allclose(field.stretch_at(field.members[z < -0.6]), 1.0, atol=0.1)
+    for sign, factor in ((1.0, 2.0), (-1.0, 1.0)):
+        at = np.array([[0.0, 0.0, sign * 1.25]])
+        distance = [
+            each.distance[tuple(np.rint(each.grid.to_nodes(at)[0]).astype(int))]
+            for each in (field, plain)
+        ]
+        assert distance[0] * factor == pytest.approx(distance[1], abs=0.8)
+
+
+@pytest.mark.parametrize("scale", [0.3, 2.0, 9.0])
+def test_no_point_of_a_triangle_is_far_from_its_samples(scale):
+    corners = scale * np.random.default_rng(0).normal(size=(30, 3, 3))
+    corners[:5, 2] = 0.5 * (corners[:5, 0] + corners[:5, 1])  # needles
+    share = np.random.default_rng(1).dirichlet(np.ones(3), (30, 40))
+    longest = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1)
+    for triangle, some, length in zip(corners, share, longest, strict=True):
+        samples = _samples(triangle[None])
+        if length <= 0.7:
+            assert not len(samples)
+            continue
+        away, _ = cKDTree(samples).query(some @ triangle)
+        assert away.max() < 0.6
+        back = np.linalg.lstsq(
+            np.vstack([triangle.T, np.ones(3)]),
+            np.vstack([samples.T, np.ones(len(samples))]),
+            rcond=None,
+        )[0]
+        assert_allclose(triangle.T @ back, samples.T, atol=1e-9 * scale)
+
+
+def test_a_patch_has_the_area_the_spread_and_the_box_of_the_faces_that_touch_it():
+    box = Mesh(CUBE[0] * [6.0, 2.0, 1.0] @ TURN, CUBE[1])
+    patch = Patch.of(Surface.of(box), np.ones(8, dtype=bool))
+    assert patch.area == pytest.approx(2.0 * (12.0 + 6.0 + 2.0))
+    assert_allclose(patch.axes @ patch.axes.T, np.eye(3), atol=1e-12)
+    low, high = patch.box
+    assert (high - low)[0] == pytest.approx(6.0, abs=1.0)
+    assert patch.spread[0] > patch.spread[1] > patch.spread[2] > 0.0
+    one = Patch.of(Surface.of(box), np.arange(8) == 0)
+    touching = (CUBE[1] == 0).any(axis=1)
+    assert one.area == pytest.approx(box.face_areas[touching].sum())
+    assert_array_equal(np.flatnonzero(one.weights), np.unique(CUBE[1][touching]))
