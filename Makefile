@@ -32,7 +32,7 @@ endif
 
 .PHONY: help demo test test-paraview test-lowest test-newest campaign soak mutants mutants-changed docs drag-film lint format types bench bench-history clean
 help:
-	@sed -n '3,16s/^# *//p' Makefile
+	@sed -n '3,17s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
