@@ -1,8 +1,10 @@
-"""Arrays and names that a file format cannot store: replacements and warnings.
+"""Arrays, names and texts that a file format cannot store: replacements and warnings.
 
-An array that a format cannot store is left out; a name that is invalid or reserved in its syntax is
-replaced by another one.  Both are logged as warnings, which the command line prints.  The file
-is valid in any case.
+Every format stores text in UTF-8 without null characters, which end a text in most programs; so
+`with_storable_texts` gives a surface only such text before any writer sees it.  An array that a
+format cannot store is left out; a name that is invalid or reserved in its syntax is replaced by
+another one.  Both are logged as warnings, which the command line prints.  The file is valid in any
+case.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import codecs
 import logging
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pyvista as pv
@@ -42,6 +45,93 @@ def text_bytes(data: bytes) -> bytes:
     if b"\0" in data[:1000]:
         raise MeshError("is UTF-16 text, or not text at all; save it as UTF-8 or ASCII text")
     return data.removeprefix(codecs.BOM_UTF8)
+
+
+def storable(text: str | bytes | None) -> str:
+    """Return *text* as every format can store it: valid in UTF-8, without null characters.
+
+    >>> storable("a\0b"), storable(b"Gr\xf6\xdfe"), storable(None)
+    ('a_b', 'Größe', '')
+    """
+    given = decoded(text) if isinstance(text, bytes) else text or ""
+    return given.replace("\0", "_").encode("utf-8", "replace").decode()
+
+
+def cut(text: str, size: int) -> bytes:
+    """Return at most *size* bytes of *text* in UTF-8, whole characters only."""
+    return text.encode()[:size].decode("utf-8", "ignore").encode()
+
+
+def with_storable_texts(surface: pv.PolyData) -> pv.PolyData:
+    """Return a surface whose names and texts are `storable`: *surface* itself, or a shallow copy.
+
+    Arrays without a name get one, with a warning.
+    """
+    result = surface
+    for sort in ("Point", "Cell", "Field"):
+        attributes = getattr(surface, f"Get{sort}Data")()
+        arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
+        names: list[str] = []
+        for array in arrays:
+            name = storable(array.GetName()) or "unnamed"
+            while name in names:
+                name += "_"
+            names.append(name)
+        pairs = list(zip(arrays, names, strict=True))
+        if all(array.GetName() == name and not _has_other_texts(array) for array, name in pairs):
+            continue
+        warn_renamed(f"{sort.lower()} array", {storable(a.GetName()): name for a, name in pairs})
+        result = surface.copy(deep=False) if result is surface else result
+        replace_arrays(
+            getattr(result, f"Get{sort}Data")(), [_storable_array(*pair) for pair in pairs]
+        )
+    return result
+
+
+def component_names(array: Any) -> list[str]:
+    """Return the names of the components of an array; "" for unnamed ones."""
+    if not array.HasAComponentName():
+        return []
+    return [storable(array.GetComponentName(k)) for k in range(array.GetNumberOfComponents())]
+
+
+def replace_arrays(attributes: Any, arrays: Sequence[Any]) -> None:
+    """Replace all arrays of *attributes* by *arrays*, which remain the active normals, scalars."""
+    parts = [
+        attributes.IsArrayAnAttribute(k) if hasattr(attributes, "IsArrayAnAttribute") else -1
+        for k in range(len(arrays))
+    ]
+    attributes.Initialize()
+    for array, part in zip(arrays, parts, strict=True):
+        place = attributes.AddArray(array)
+        if part >= 0:
+            attributes.SetActiveAttribute(place, part)
+
+
+def _texts_of(array: Any) -> list[str | bytes]:
+    """Return the values of an array of text; none of an array of numbers."""
+    if not array.IsA("vtkStringArray"):
+        return []
+    return [array.GetValue(k) for k in range(array.GetNumberOfValues())]
+
+
+def _has_other_texts(array: Any) -> bool:
+    given: list[Any] = _texts_of(array)
+    if array.HasAComponentName():
+        given += [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
+    return any(text != storable(text) for text in given)
+
+
+def _storable_array(array: Any, name: str) -> Any:
+    """Return a copy of an array with another *name*, and storable texts."""
+    copy = array.NewInstance()
+    copy.DeepCopy(array)
+    copy.SetName(name)
+    for k, part in enumerate(component_names(array)):
+        copy.SetComponentName(k, part)
+    for k, text in enumerate(_texts_of(array)):
+        copy.SetValue(k, storable(text))
+    return copy
 
 
 def plain_names(
@@ -134,11 +224,11 @@ def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:
     array = vtkStringArray()
     array.SetName(key)
     for name in names:
-        array.InsertNextValue(name)
+        array.InsertNextValue(storable(name))
     surface.GetFieldData().AddArray(array)
 
 
 def get_names(surface: pv.PolyData, key: str) -> list[str]:
     """Return the texts of field array *key*; empty if it does not exist or is not text."""
-    values = np.asarray(surface.field_data[key]) if key in surface.field_data else np.empty(0)
-    return [str(name) for name in values.ravel()] if values.dtype.kind == "U" else []
+    array = surface.GetFieldData().GetAbstractArray(key)
+    return [] if array is None else [storable(text) for text in _texts_of(array)]

@@ -32,6 +32,7 @@ from ..errors import MeshError
 from ..files import fault_of, replacing, require_place
 from ..mesh import Mesh
 from . import meshlab
+from .array_names import with_storable_texts
 from .gltf import read_gltf, write_gltf
 from .moving import MovingSurface
 from .off import read_off, write_off
@@ -147,7 +148,7 @@ def write_mesh(path: str | Path, mesh: Mesh | pv.PolyData) -> None:
     path = as_path(path)
     require(mesh, (Mesh, pv.PolyData), "mesh")
     require_writable(path)
-    surface = to_polydata(mesh) if isinstance(mesh, Mesh) else mesh
+    surface = to_polydata(mesh) if isinstance(mesh, Mesh) else with_storable_texts(mesh)
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:

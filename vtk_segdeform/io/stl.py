@@ -23,7 +23,15 @@ import pyvista as pv
 from ..errors import MeshError
 from ..kernels import compiled_checks, inputs
 from ..mesh import first_equal_row
-from .array_names import HEADER, decoded, get_names, set_names, warn_left_out
+from .array_names import (
+    HEADER,
+    cut,
+    decoded,
+    get_names,
+    set_names,
+    warn_left_out,
+    warn_renamed,
+)
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
 _SHORTEST = len("vertex 0 0 0")
@@ -77,9 +85,10 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     if attributes is not None and attributes.dtype == np.uint16 and attributes.ndim == 1:
         rows["more"] = np.asarray(attributes)[cells_of(surface)][polygon]
         kept["cell"].append("Attribute")
-    header = " ".join(get_names(surface, HEADER)).encode("utf-8")[:80]
-    if header.lower().startswith(b"solid"):  # which would be text
-        header = b"_" + header[:79]
+    title = " ".join(get_names(surface, HEADER))
+    sound = f"_{title}" if title.lower().startswith("solid") else title  # it would be text
+    header = cut(sound, 80)
+    warn_renamed("header", {title: header.decode()})
     kept["field"] += [HEADER] if header else []
     warn_left_out("STL", surface, kept)
     with path.open("wb") as file:

@@ -16,7 +16,7 @@ import pyvista as pv
 
 from ...arrays import IntArray
 from ...errors import MeshError
-from ..array_names import get_names, warn_left_out
+from ..array_names import get_names, warn_left_out, warn_renamed
 from ..moving import CORNER_NORMALS
 from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of
 from .reading import DOCUMENT
@@ -123,7 +123,9 @@ def _materials(surface: pv.PolyData, kept: dict[str, list[str]]) -> tuple[Any, l
         return None, []
     kept["cell"].append("Material")
     kept["field"].append("MaterialNames")
-    return np.asarray(values), names
+    named = [name or f"material {k}" for k, name in enumerate(names)]  # as it would be read
+    warn_renamed("material", dict(zip(names, named, strict=True)))
+    return np.asarray(values), named
 
 
 class _Document:
