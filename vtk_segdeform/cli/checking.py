@@ -51,7 +51,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     except (MeshError, OSError) as error:
         if not options.json:
             raise
-        say(json.dumps({**_unread(str(options.input)), "reason": str(error)}, indent=1))
+        _print_json({**_unread(str(options.input)), "reason": str(error)}, say)
         return False
     if options.repair:
         return _repair(given, options, say, progress)
@@ -59,7 +59,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     found = described(given, str(options.input))
     progress(1.0, "done")
     if options.json:
-        say(json.dumps(found, indent=1))
+        _print_json(found, say)
     else:
         _print(found, say)
     return bool(found["can_be_deformed"])
@@ -156,6 +156,11 @@ def _of_precision(points: FloatArray, faces: IntArray) -> list[dict[str, Any]]:
 def _counted(fault: Any) -> dict[str, Any]:
     kind = fault.kind.name.lower().replace("_", " ")
     return {"kind": kind, "text": str(fault), "count": fault.count}
+
+
+def _print_json(found: dict[str, Any], say: Say) -> None:
+    for line in json.dumps(found, indent=1).split("\n"):
+        say(line)
 
 
 def _print(found: dict[str, Any], say: Say) -> None:
