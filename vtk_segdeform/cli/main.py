@@ -158,13 +158,13 @@ def _render_without_display() -> None:
 
 
 def _printable(line: str) -> str:
-    """Return *line* with all unprintable characters escaped.
+    r"""Return *line* with all unprintable characters escaped.
 
     Names of files, and names in files, may contain anything: line breaks, and sequences by which a
     terminal moves its cursor or changes its title.
 
-    >>> _printable("a\x1b[2Jb\nc")
-    'a\\x1b[2Jb\\nc'
+    >>> print(_printable("a\x1b[2Jb\nc"))
+    a\x1b[2Jb\nc
     """
     shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
     encoding = sys.stdout.encoding or "utf-8"

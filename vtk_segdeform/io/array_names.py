@@ -14,7 +14,6 @@ import logging
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
@@ -48,7 +47,7 @@ def text_bytes(data: bytes) -> bytes:
 
 
 def storable(text: str | bytes | None) -> str:
-    """Return *text* as every format can store it: valid in UTF-8, without null characters.
+    r"""Return *text* as every format can store it: valid in UTF-8, without null characters.
 
     >>> storable("a\0b"), storable(b"Gr\xf6\xdfe"), storable(None)
     ('a_b', 'Größe', '')
