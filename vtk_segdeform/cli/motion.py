@@ -16,7 +16,6 @@ Angles are in degrees in the options, and in radians everywhere else.
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,9 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, as_points
 from ..errors import ConstraintError
+from ..files import open_regular
 
+_LARGEST_FILE = 1 << 20  # bytes of 16 numbers and comments
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -79,11 +80,18 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
 
 def read_matrix(path: str | Path) -> FloatArray:
     """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # starts a comment."""
-    if not os.path.isfile(path):  # reading from a device may never end
-        raise ConstraintError(f"matrix {path}: no such file; it must contain 16 numbers")
     try:
-        matrix = np.loadtxt(path, ndmin=2)
-    except (ValueError, OSError) as error:
+        with open_regular(path) as file:
+            content = file.read(_LARGEST_FILE + 1)
+        if len(content) > _LARGEST_FILE:
+            raise ValueError(f"it has more than {_LARGEST_FILE:,} bytes")
+        words = " ".join(line.partition("#")[0] for line in content.decode().splitlines()).split()
+        matrix = np.array([float(word) for word in words])
+    except OSError as error:
+        raise ConstraintError(
+            f"matrix {path}: {error.strerror}; it must contain 16 numbers"
+        ) from None
+    except ValueError as error:
         raise ConstraintError(f"matrix {path} must contain 16 numbers: {error}") from None
     if matrix.size != 16 or not np.isfinite(matrix).all():
         raise ConstraintError(f"matrix {path} must contain 16 finite numbers; got {matrix.size}")

@@ -11,16 +11,26 @@ The files, in reading order:
 from .atomic import is_draft, replacing, require_place
 from .folders import autosave_folder, cache_folder
 from .lock import hold
-from .regular_file import fault_of, is_ours, open_regular
+from .regular_file import (
+    LARGEST_FILE,
+    excess_of,
+    fault_of,
+    is_ours,
+    open_regular,
+    read_regular,
+)
 
 __all__ = [
+    "LARGEST_FILE",
     "autosave_folder",
     "cache_folder",
+    "excess_of",
     "fault_of",
     "hold",
     "is_draft",
     "is_ours",
     "open_regular",
+    "read_regular",
     "replacing",
     "require_place",
 ]

@@ -29,7 +29,7 @@ from ..arrays import as_points
 from ..cages import Cage
 from ..checks import as_flag, as_path, require
 from ..errors import MeshError
-from ..files import fault_of, replacing, require_place
+from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh
 from . import meshlab
 from .array_names import with_storable_texts
@@ -93,6 +93,8 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     except (OSError, ValueError):
         raise MeshError(f"{path}: there is no such file") from None
     if what := fault_of(status):
+        raise MeshError(f"{path}: {what}")
+    if what := excess_of(status):
         raise MeshError(f"{path}: {what}")
     if not status.st_size:
         raise MeshError(f"{path}: the file is empty (0 bytes); copy or export it again")

@@ -22,6 +22,7 @@ from numpy.lib import format as npy
 
 from ..checks import shown
 from ..errors import SessionError
+from ..files import LARGEST_FILE
 
 _T = TypeVar("_T")
 Check: TypeAlias = Callable[[Any, str], _T]
@@ -32,7 +33,6 @@ _LONGEST_HEADER = 1 << 20  # bytes
 _LONGEST_NPY_HEADER = 1 << 12  # bytes
 _LONGEST_DIRECTORY = 1 << 20  # bytes
 _ENTRY = 64  # bytes of the directory for each member, at most, without its name
-_LARGEST = 2 << 30  # bytes of a file; a million vertices take about 80 million
 _END = b"PK\5\6"  # start of the last 22 bytes of a zip file without a comment
 _END_64 = b"PK\6\7"  # start of the 20 bytes before them in a zip64 file, which is too large
 _MOST = 1e300  # a number
@@ -157,7 +157,7 @@ def write_archive(file: IO[bytes], header: Mapping[str, Any], arrays: Mapping[st
     """
     content = json.dumps(header, indent=1)
     for what, size, limit in (
-        ("", sum(array.nbytes for array in arrays.values()) + _LONGEST_HEADER, _LARGEST),
+        ("", sum(array.nbytes for array in arrays.values()) + _LONGEST_HEADER, LARGEST_FILE),
         (" of names and texts", len(content.encode()), _LONGEST_HEADER),
         (" of a directory", sum(len(name) + _ENTRY for name in arrays), _LONGEST_DIRECTORY),
     ):
@@ -245,9 +245,7 @@ class Archive:
 
 
 def _require_short_directory(file: IO[bytes], size: int) -> None:
-    """Raise ValueError if the file, or the directory that zipfile reads at once, is too large."""
-    if size > _LARGEST:
-        raise ValueError(f"the file has {size:.3g} bytes; the limit is {_LARGEST:.3g}")
+    """Raise ValueError if the directory, which zipfile reads at once, is too large."""
     file.seek(max(size - 42, 0))
     more, end = file.read(20), file.read(22)
     is_plain = end.startswith(_END) and end.endswith(b"\0\0") and not more.startswith(_END_64)

@@ -25,6 +25,7 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 
 from ...errors import MeshError
+from ...files import read_regular
 from ..referenced_files import file_inside
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
@@ -196,7 +197,7 @@ class Document:
                 f"buffer {number} refers to {uri[:200]!r}, which is not a file in the "
                 "model's folder; copy it there"
             )
-        return file.read_bytes()
+        return read_regular(file)
 
     def file_of(self, uri: str) -> Path | None:
         """Return the file in the model's folder to which a URI refers; None if there is none."""
