@@ -34,9 +34,10 @@ from .outputs import (
     report_cages,
     report_crossings,
     report_regions,
+    report_session,
     report_solution,
     report_surface,
-    report_volume,
+    written,
 )
 from .selection import Role, parse_selection
 
@@ -75,10 +76,11 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     start = time.perf_counter()
     solution = deformer.solve(targets, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
-    report_solution(solution, time.perf_counter() - start, say)
+    seconds = time.perf_counter() - start
+    stored = written(surface, solution, options.output, LIDS[options.lids])
+    report_solution(stored, seconds, say)
     if options.avoid_contact:
-        report_crossings(solution, say)
-    surface.write(options.output, solution.vertices)
+        report_crossings(stored, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
@@ -114,10 +116,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
         title=f"segdeform {options.input.name}",
         progress=completing,
     )
-    report_volume(session.volume_change, say)
-    if options.output is not None:
-        session.write_deformed(options.output)
-        say(f"written         {options.output}")
+    report_session(session, options.output, say)
     return True
 
 

@@ -18,7 +18,7 @@ from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
 from .commands import LIDS
 from .motion import coordinate_text, parse_vector
-from .outputs import HANDLE_TOLERANCE, Say, report_crossings, report_surface, report_volume
+from .outputs import HANDLE_TOLERANCE, Say, report_crossings, report_surface, report_volume, written
 
 _FARTHEST = 0.05  # diagonals between a given point and the surface
 
@@ -54,13 +54,13 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    report_volume(solution.volume_change, say)
-    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
+    stored = written(surface, solution, options.output, lids)
+    report_volume(stored.volume_change, say)
+    say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
     say(f"status          {solution.status}")
     if options.avoid_contact:
-        report_crossings(solution, say)
-    surface.write(options.output, solution.vertices)
+        report_crossings(stored, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(

@@ -18,7 +18,7 @@ The files, in reading order:
     grids              unstructured grids as PolyData, and back
     isolated reading_child
                        native readers in a child process
-    array_names        names and arrays that a format cannot store
+    array_names        names, arrays and digits that a format cannot store
     referenced_files   files that another file refers to
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats

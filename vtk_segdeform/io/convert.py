@@ -32,7 +32,7 @@ from ..errors import MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh
 from . import meshlab
-from .array_names import with_storable_texts
+from .array_names import warn_of_rounding, with_storable_texts
 from .gltf import read_gltf, write_gltf
 from .moving import MovingSurface
 from .off import read_off, write_off
@@ -173,11 +173,16 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
     """Write by PyMeshLab; OSError if the file is incomplete, which PyMeshLab does not report."""
     try:
         meshlab.write(draft, mesh)
-        complete = len(meshlab.read_faces(draft)[1]) == mesh.n_faces
+        vertices, faces = meshlab.read_faces(draft)
+        complete = len(faces) == mesh.n_faces
     except MeshError as fault:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
+    if np.array_equal(faces, mesh.faces):
+        warn_of_rounding(
+            f"{draft.suffix} rounds coordinates", mesh.vertices[faces], vertices[faces]
+        )
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:

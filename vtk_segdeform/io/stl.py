@@ -30,6 +30,7 @@ from .array_names import (
     get_names,
     set_names,
     warn_left_out,
+    warn_of_rounding,
     warn_renamed,
 )
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
@@ -91,6 +92,9 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     warn_renamed("header", {title: header.decode()})
     kept["field"] += [HEADER] if header else []
     warn_left_out("STL", surface, kept)
+    warn_of_rounding(
+        "STL stores single precision", np.asarray(surface.points)[faces], rows["corners"]
+    )
     with path.open("wb") as file:
         file.write(header.ljust(80, b"\0") + len(rows).to_bytes(4, "little"))
         file.write(rows.tobytes())
