@@ -21,7 +21,7 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray, bounds_of
 from ..errors import MeshError
 from ..geometry import signed_volume
 
@@ -31,7 +31,7 @@ CELL_TYPES = "types of the cells of a grid"  # a field array, see `grids`
 _log = logging.getLogger(__name__)
 # Of the size, and of the volume: the command line tells errors to 0.001 % of the size.
 _VISIBLE = 1e-5
-_CLOSED = 1e-9  # length of the area vector, in areas
+_ROUNDING = 1e-9  # of areas and volumes, in sizes
 _LONGEST = 200  # characters; some readers store names in buffers of fixed size
 
 
@@ -227,48 +227,53 @@ def warn_left_out(
         _log.warning("%s cannot store %s: left out", format_, ", ".join(lost))
 
 
-def warn_of_rounding(what: str, meant: FloatArray, stored: FloatArray) -> None:
-    """Log a warning if a file stores triangles visibly elsewhere, with the size of the loss.
+def warn_of_rounding(what: str, faces: IntArray, meant: FloatArray, stored: FloatArray) -> None:
+    """Log a warning if a file stores vertices visibly elsewhere, with the size of the loss.
 
     Parameters
     ----------
     what : str
         What the format does: "STL stores single precision".
-    meant, stored : (m, 3, 3) float
-        Corners of the triangles: as they should be, and as a reader finds them in the file.
+    faces : (m, 3) int
+        The triangles; vertices in none of them do not count.
+    meant, stored : (n, 3) float
+        The vertices: as they should be, and as a reader finds them in the file.
     """
-    meant, stored = (np.asarray(each, dtype=np.float64) for each in (meant, stored))
-    finite = np.isfinite(meant).all(axis=(1, 2)) & np.isfinite(stored).all(axis=(1, 2))
-    meant, stored = meant[finite], stored[finite]
-    if not len(meant) or np.array_equal(meant, stored):
+    finite = np.isfinite(meant).all(axis=1) & np.isfinite(stored).all(axis=1)
+    faces = faces if finite.all() else faces[finite[faces].all(axis=1)]
+    used = np.zeros(len(meant), dtype=bool)
+    used[faces] = True
+    if not used.any():
         return
-    middle = meant.mean(axis=(0, 1))
-    with np.errstate(over="ignore", invalid="ignore"):
-        meant, stored = meant - middle, stored - middle
-        moved = float(np.sqrt(((stored - meant) ** 2).sum(axis=2).max()))
-        size = float(np.linalg.norm(np.ptp(meant.reshape(-1, 3), axis=0)))
-        change = _volume_change(meant, stored)
+    faces = (np.cumsum(used) - 1)[faces]
+    before = np.asarray(meant, dtype=np.float64)[used]
+    low, high = bounds_of(before)
+    size, middle = float(np.linalg.norm(high - low)), 0.5 * low + 0.5 * high
+    before, after = before - middle, np.asarray(stored, dtype=np.float64)[used] - middle
+    away = after - before
+    moved = float(np.sqrt(np.einsum("ij,ij->i", away, away).max()))
+    change = _volume_change(faces, before, after, size)
     if not (moved > _VISIBLE * size or abs(change) > _VISIBLE):
         return
     volume = f", the volume changed by {100.0 * change:+.3g} %" if change else ""
     share = f" ({100.0 * moved / size:.2g} % of model size)" if size else ""
     _log.warning(
-        "%s: vertices moved by up to %.2g%s%s; .ply and .vtp keep all "
-        "digits, or move the model to the origin",
+        "%s: vertices moved by up to %.2g%s%s; .ply and .vtp keep all digits, or move the model to "
+        "the origin",
         what, moved, share, volume,
     )  # fmt: skip
 
 
-def _volume_change(meant: FloatArray, stored: FloatArray) -> float:
-    """Return the relative change of the volume; 0 if the triangles are not closed."""
-    a, b, c = np.moveaxis(meant, 1, 0)
-    areas = 0.5 * np.cross(b - a, c - a)
-    total = float(np.linalg.norm(areas, axis=1).sum())
-    if np.linalg.norm(areas.sum(axis=0)) > _CLOSED * total:
+def _volume_change(faces: IntArray, before: FloatArray, after: FloatArray, size: float) -> float:
+    """Return the relative change of the volume of a body of a *size*; 0 if it is not closed."""
+    a, b, c = (before[faces[:, k]] for k in range(3))
+    products = (b - a).T @ (c - a)  # twice the area vector, which vanishes for a closed surface
+    volume = signed_volume(before, faces)
+    if np.abs(products - products.T).max() > _ROUNDING * size**2:
         return 0.0
-    numbers = np.arange(3 * len(meant)).reshape(-1, 3)
-    before, after = (signed_volume(each.reshape(-1, 3), numbers) for each in (meant, stored))
-    return (after - before) / before if abs(before) > _CLOSED * total**1.5 else 0.0
+    if abs(volume) <= _ROUNDING * size**3:
+        return 0.0
+    return (signed_volume(after, faces) - volume) / volume
 
 
 def set_names(surface: pv.PolyData, key: str, names: Iterable[str]) -> None:

@@ -179,10 +179,8 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
-    if np.array_equal(faces, mesh.faces):
-        warn_of_rounding(
-            f"{draft.suffix} rounds coordinates", mesh.vertices[faces], vertices[faces]
-        )
+    if len(vertices) == mesh.n_vertices and np.array_equal(faces, mesh.faces):
+        warn_of_rounding(f"{draft.suffix} rounds coordinates", faces, mesh.vertices, vertices)
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:

@@ -73,10 +73,15 @@ def read_stl(path: Path) -> pv.PolyData:
 def write_stl(path: Path, surface: pv.PolyData) -> None:
     """Write the triangles, in their order, to a binary STL file; polygons are cut."""
     counts, corners = polygons_of(surface)
-    faces, polygon = cut_into_triangles(np.asarray(surface.points, float), counts, corners)
+    points = np.asarray(surface.points, dtype=float)
+    faces, polygon = cut_into_triangles(points, counts, corners)
+    with np.errstate(over="ignore"):
+        single = points.astype("<f4")
+    if (np.isinf(single) & np.isfinite(points)).any():
+        raise MeshError("has positions that STL cannot store: over 3e38")
     kept: dict[str, list[str]] = {"cell": [], "field": []}
     rows = np.zeros(len(faces), _ROW)
-    rows["corners"] = surface.points[faces]
+    rows["corners"] = single[faces]
     a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
     with np.errstate(invalid="ignore", over="ignore"):
         normals = np.cross(b - a, c - a)
@@ -92,9 +97,7 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     warn_renamed("header", {title: header.decode()})
     kept["field"] += [HEADER] if header else []
     warn_left_out("STL", surface, kept)
-    warn_of_rounding(
-        "STL stores single precision", np.asarray(surface.points)[faces], rows["corners"]
-    )
+    warn_of_rounding("STL stores single precision", faces, points, single)
     with path.open("wb") as file:
         file.write(header.ljust(80, b"\0") + len(rows).to_bytes(4, "little"))
         file.write(rows.tobytes())

@@ -87,7 +87,7 @@ def moved_document(data: bytes, surface: pv.PolyData) -> bytes | None:
     written = _written(document, changes)
     stored = np.concatenate([block.points for block in scene_of(Document(written))[0]])
     faces = corners.reshape(-1, 3)
-    warn_of_rounding("glTF stores single precision", points[faces], stored[faces])
+    warn_of_rounding("glTF stores single precision", faces, points, stored)
     return written
 
 

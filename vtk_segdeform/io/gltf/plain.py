@@ -43,10 +43,8 @@ def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
         _log.warning("glTF has no polygons: they are cut into triangles")
     material, names = _materials(surface, kept)
     warn_left_out("glTF", surface, kept)
-    stored = np.asarray(attributes["POSITION"], dtype=float) + origin
-    warn_of_rounding(
-        "glTF stores single precision", points[corners[slots]], stored[of_corner[slots]]
-    )
+    stored = (points - origin).astype("f4") + origin
+    warn_of_rounding("glTF stores single precision", corners[slots], points, stored)
     numbers = material[cells_of(surface)][polygon] if names else np.zeros(len(slots), dtype=int)
     document = _Document()
     accessors = {name: document.vertices(name, values) for name, values in attributes.items()}
