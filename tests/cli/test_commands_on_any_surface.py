@@ -258,3 +258,12 @@ def test_numbers_are_told_of_the_file_as_it_is_read_again(
         assert abs(change) < 1e-6
         assert error < 1e-4
         assert output.err == ""
+
+
+@pytest.mark.parametrize(("suffix", "code"), [(".stl", 1), (".glb", 0), (".ply", 0)])
+def test_a_repair_is_told_closed_only_if_the_file_is(tmp_path, capsys, suffix, code):
+    ball, out = sphere(100), tmp_path / f"closed{suffix}"
+    far = Mesh(ball.vertices + 3e9, ball.faces)
+    write_mesh(tmp_path / "far.ply", far)
+    assert main(["check", str(tmp_path / "far.ply"), "--repair", "-o", str(out)]) == code
+    assert ("not closed as it is read again" in capsys.readouterr().out) == bool(code)

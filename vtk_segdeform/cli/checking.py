@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -208,4 +209,15 @@ def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> boo
         say(repair.advice)
     io.write_mesh(options.output, closed)
     say(f"written: {options.output}")
+    if repair.report.is_closed and not _is_closed(options.output):
+        say("The file is not closed as it is read again: its format rounds coordinates")
+        return False
     return repair.report.is_closed
+
+
+def _is_closed(path: Path) -> bool:
+    """Return whether the surface in a file has a closed mesh."""
+    try:
+        return Surface.read(path).mesh.is_closed
+    except MeshError:
+        return False
