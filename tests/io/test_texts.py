@@ -149,6 +149,8 @@ def changed(folder, suffix, surface):
     before, after, told = contents(surface), contents(again), " ".join(told)
     if suffix in (".glb", ".gltf"):  # triangles are sorted by material
         before.pop(("Cell", "Material"), None)
+    if suffix == ".stl" and ("Field", "Header") in before:  # one line
+        before["Field", "Header"] = [" ".join(" ".join(before["Field", "Header"]).split())]
     return [
         (key, value, after.get(key))
         for key, value in before.items()
@@ -266,6 +268,12 @@ def test_texts_with_lone_surrogates_do_not_abort_the_process():
     assert contents(surface)["Field", "notes"] == ["?", "a_b"]
 
 
+def storable_once(text):
+    """Return what is left of a text in every format: names that are equal then become one."""
+    raw = text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass")
+    return " ".join(storable(raw).split())
+
+
 ANY = st.sampled_from(TEXTS) | st.text(max_size=12) | st.binary(max_size=12)
 
 
@@ -276,7 +284,10 @@ def test_any_texts_are_read_back_or_reported(tmp_path, suffix):
         deadline=None, derandomize=True, max_examples=300,
         suppress_health_check=list(HealthCheck),
     )  # fmt: skip
-    @given(place=st.sampled_from(PLACES), texts=st.lists(ANY, min_size=1, max_size=3))
+    @given(
+        place=st.sampled_from(PLACES),
+        texts=st.lists(ANY, min_size=1, max_size=3, unique_by=storable_once),
+    )
     def each(place, texts):
         surface = cube()
         place(surface, texts)

@@ -199,6 +199,15 @@ def test_an_array_of_another_shape_type_or_value_is_read_or_refused(tmp_path, me
     assert refused > 20
 
 
+def test_a_description_of_an_array_that_is_cut_off_is_refused(tmp_path, members):
+    header, content = members
+    for letter in (b"\0", b"(", b"'"):
+        data = content["fixed.npy"].replace(b"}", letter, 1)
+        assert data != content["fixed.npy"]
+        damaged = content | {"fixed.npy": data}
+        assert require_read_or_refused(tmp_path / "a.segdeform", header, damaged)
+
+
 @pytest.mark.campaign
 def test_every_value_and_every_array_replaced_by_every_other(tmp_path, members):
     header, content = members

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import os
+import tokenize
 import zipfile
 from collections.abc import Callable, Mapping
 from io import BytesIO
@@ -217,7 +218,7 @@ class Archive:
                 found_shape, fortran, found_dtype = npy.read_array_header_1_0(
                     content, max_header_size=_LONGEST_NPY_HEADER
                 )
-            except (LookupError, TypeError) as fault:
+            except (LookupError, TypeError, SyntaxError, tokenize.TokenError) as fault:
                 raise ValueError(f"{name} has a damaged header") from fault
             if (found_shape, found_dtype) != (shape, dtype):
                 raise ValueError(

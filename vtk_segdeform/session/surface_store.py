@@ -117,9 +117,9 @@ def read_surface(archive: Archive, header: Mapping[str, Any], mesh: Mesh) -> Sur
         require(place in _DATA[:2], f"{place} has no active arrays")
         data = getattr(given, place).VTKObject
         require(not any(names[data.NUM_ATTRIBUTES :]), "there is no such active array")
-        for attribute, name in enumerate(names[: data.NUM_ATTRIBUTES]):
-            index = data.SetActiveAttribute(-1 if name is None else name, attribute)
-            require(name is None or index >= 0, f"{name} cannot be the active array")
+        for attribute, active in enumerate(names[: data.NUM_ATTRIBUTES]):
+            index = data.SetActiveAttribute(-1 if active is None else active, attribute)
+            require(active is None or index >= 0, f"{active} cannot be the active array")
     vertex_of = _array(archive, "vertex_of", "i", (p,))
     in_mesh = ((vertex_of >= 0) & (vertex_of < mesh.n_vertices)).all()
     require(in_mesh, "a point follows no vertex of the mesh")
