@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.io import Surface, read_polydata, write_mesh
+from vtk_segdeform.io import Surface, read_polydata, triangles_of, write_mesh
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.models import sphere
 
 QUICK = ["--regions", "1", "--cage-vertices", "40"]
@@ -207,3 +209,60 @@ def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
     assert_allclose(moved[right][:, 0], 0.2, atol=5e-3)  # the stray at x = 9 does not count
     stray = parts().n_points - 1
     assert_array_equal(Surface(parts()).vertices_at([stray]), [])
+
+
+@pytest.fixture(scope="module")
+def far_file(tmp_path_factory):
+    """Return a file with a body of 2 m at UTM coordinates."""
+    ball = sphere(300)
+    far = Mesh(ball.vertices + [500_000.0, 5_400_000.0, 300.0], ball.faces)
+    path = tmp_path_factory.mktemp("far") / "ball.ply"
+    write_mesh(path, far)
+    return path
+
+
+def numbers_told(text):
+    """Return the volume change and the handle error that a command has printed."""
+    volume = re.search(r"volume change +(\S+)", text)
+    error = re.search(r"handle error +(\S+) %", text)
+    return float(volume[1]), float(error[1]) / 100.0 if error else None
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".glb", ".obj"])
+@pytest.mark.parametrize("command", ["deform", "pull"])
+def test_numbers_are_told_of_the_file_as_it_is_read_again(
+    far_file, tmp_path, capsys, suffix, command
+):
+    out = tmp_path / f"out{suffix}"
+    words = {
+        "deform": ["--fixed", "z<10%", "--handle", "z>90%", "--translate", "0,0,0.1",
+                   "--regions", "1", "--cage-vertices", "40"],
+        "pull": ["--at", "500000,5400000,301", "--to", "500000,5400000,301.1", "--regions", "1"],
+    }  # fmt: skip
+    assert main([command, str(far_file), "-o", str(out), *words[command]]) == 0
+    output = capsys.readouterr()
+    change, error = numbers_told(output.out)
+    given, again = read_polydata(far_file), read_polydata(out)
+    middle = given.points.mean(axis=0)
+    before, after = (
+        signed_volume(np.asarray(each.points) - middle, triangles_of(each))
+        for each in (given, again)
+    )
+    assert_allclose(change, (after - before) / before, rtol=0.06, atol=1e-7)
+    if suffix == ".stl":
+        assert abs(change) > 1e-3
+        assert error > 0.01 or command == "pull"  # whose target is not rounded
+        assert "STL stores single precision: vertices moved by up to 0.25" in output.err
+    else:
+        assert abs(change) < 1e-6
+        assert error < 1e-4
+        assert output.err == ""
+
+
+@pytest.mark.parametrize(("suffix", "code"), [(".stl", 1), (".glb", 0), (".ply", 0)])
+def test_a_repair_is_told_closed_only_if_the_file_is(tmp_path, capsys, suffix, code):
+    ball, out = sphere(100), tmp_path / f"closed{suffix}"
+    far = Mesh(ball.vertices + 3e9, ball.faces)
+    write_mesh(tmp_path / "far.ply", far)
+    assert main(["check", str(tmp_path / "far.ply"), "--repair", "-o", str(out)]) == code
+    assert ("not closed as it is read again" in capsys.readouterr().out) == bool(code)

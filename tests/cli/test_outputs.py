@@ -15,6 +15,8 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.io import convert
+from vtk_segdeform.io import surface as surface_module
+from vtk_segdeform.io.array_names import set_names
 from vtk_segdeform.pictures import canvas
 
 BAR = models.bar(divisions=(3, 3, 9))
@@ -95,22 +97,23 @@ def test_a_long_invalid_selection_is_named_and_truncated(text):
 
 def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder, monkeypatch):
     monkeypatch.setattr(selection, "_LARGEST_FILE", 1 << 20)  # of 1 << 28, which are read
-    with open("ids.txt", "wb") as file:
-        file.truncate(45_000_000_000)
-    with pytest.raises(ConstraintError, match=r"ids\.txt .*more than 1,048,576 bytes"):
-        parse_selection("ids.txt", BAR.vertices)
+    for size, says in ((45_000_000_000, "has 45 GB"), (1_500_000_000, "more than 1,048,576 bytes")):
+        with open("ids.txt", "wb") as file:
+            file.truncate(size)
+        with pytest.raises((ConstraintError, OSError), match=says):
+            parse_selection("ids.txt", BAR.vertices)
 
 
 def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatch, capsys):
     def read(path):
         raise MemoryError
 
-    with open("vast.obj", "wb") as file:
-        file.truncate(45 * 10**9)
+    convert.write_mesh("vast.obj", BAR)
+    os.truncate("vast.obj", 1_400_000_000)
     monkeypatch.setitem(convert._READERS, ".obj", read)
     assert main(["check", "vast.obj"]) == 1
     told = capsys.readouterr().err
-    assert told == "segdeform check: vast.obj: not enough memory to read this file (45 GB)\n"
+    assert told == "segdeform check: vast.obj: not enough memory to read this file (1.4 GB)\n"
 
 
 def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, capsys):
@@ -161,3 +164,41 @@ def test_every_name_that_the_system_allows_can_be_read_and_written(folder, capsy
     assert told.err == ""
     assert main(["check", f"{out}.ply"]) == 0
     assert sorted(os.listdir(folder)) == sorted([f"{name}.ply", f"{out}.ply"])
+
+
+ESCAPES = "\x1b]0;title\x07\x1b[2J\r\nfake line\x9b31m"
+
+
+def named(name):
+    """Return a bar with *name* wherever a surface has names and texts."""
+    surface = convert.to_polydata(BAR)
+    for sort in ("point", "cell"):
+        getattr(surface, f"{sort}_data")[name] = np.zeros(getattr(surface, f"n_{sort}s"))
+    for key in ("Object", "Group", "Material"):
+        surface.cell_data[key] = np.zeros(surface.n_cells, dtype=int)
+        set_names(surface, f"{key}Names", [name])
+    for key in ("Header", "Comments", "MaterialLibrary", name):
+        set_names(surface, key, [name])
+    return surface
+
+
+@posix
+@pytest.mark.parametrize("suffix", [".obj", ".glb"])
+def test_names_never_reach_the_terminal_as_control_characters(folder, monkeypatch, capsys, suffix):
+    given, missing = named(ESCAPES), f"missing{ESCAPES}.ply"
+    name, out = f"{ESCAPES}{suffix}", f"{ESCAPES}2{suffix}"
+    with monkeypatch.context() as patch:  # as if a file had the names
+        patch.setattr(surface_module, "read_polydata", lambda path: given)
+        codes = [
+            main(["regions", "bar.ply", "--regions", ESCAPES]),
+            main(["deform", "bar.ply", "-o", out, *POSE, "--fixed", ESCAPES]),
+            main(["deform", "bar.ply", "-o", out, "--fixed", "z<10%", "--handle", ESCAPES]),
+            main(["check", "bar.ply", ESCAPES, f"--{ESCAPES}"]),
+            main(["deform", "bar.ply", "-o", name, *POSE]),
+        ]
+    codes += [main(["check", name]), main(["check", missing]), main(["check", missing, "--json"])]
+    assert codes == [1, 2, 2, 2, 0, 0, 1, 1]
+    told = capsys.readouterr()
+    for text in (told.out, told.err):
+        assert [c for c in text if not c.isprintable() and c != "\n"] == []
+        assert not any(line.startswith("fake line") for line in text.split("\n"))

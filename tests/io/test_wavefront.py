@@ -109,7 +109,7 @@ def test_a_material_library_that_is_not_beside_the_file_is_told(tmp_path, caplog
     write_mesh(tmp_path / "here" / "b.obj", surface)
     assert caplog.text == ""
     write_mesh(tmp_path / "there" / "b.obj", surface)
-    assert "the OBJ file refers to Körper.mtl: copy it to the same folder" in caplog.text
+    assert "the OBJ file refers to 'Körper.mtl': copy it to the same folder" in caplog.text
     assert not (tmp_path / "there" / "Körper.mtl").exists()
 
 

@@ -367,7 +367,7 @@ WRONG = [
     ({"header": {"n_regions": 10**12}}, "membership must be bool of shape"),
     ({"header": {"cages": [[HUGE, HUGE]]}}, "cage_vertices must be"),
     ({"header": {"cages": [[2, 4], [2, 0]]}}, "faces must index 0..1"),
-    ({"header": {"cages": [4, 4]}}, "cannot unpack"),
+    ({"header": {"cages": [4, 4]}}, r"cages\[0\] must be a list of 2"),
     ({"header": {"cages": {}}}, "cages must be a list"),
     ({"header": {"handles": [["h", 2]]}}, "handle must be int64 of shape"),
     ({"header": {"handles": [["h", 1], ["h", 0]]}}, "two handles have the same name"),
@@ -376,7 +376,7 @@ WRONG = [
     ({"header": {"smoothness": -1}}, "smoothness must be a number above 0"),
     ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number of at least 0"),
     ({"header": {"options": {"colour": 1}}}, "colour"),
-    ({"header": {"options": 3}}, "mapping"),
+    ({"header": {"options": 3}}, r"options must be an object"),
     ({"mesh_vertices": np.full((6, 3), np.nan)}, "NaN|non-finite|not finite"),
     ({"mesh_vertices": OCTAHEDRON[0].astype(np.float32)}, "must be float64 of shape"),
     ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
@@ -392,7 +392,7 @@ WRONG = [
     ({"targets": np.full((1, 3), 1e9)}, "the pose is damaged"),
     ({"header": {"region_names": "arm"}}, "region_names must be a list"),
     ({"header": {"region_names": ["arm", "leg"]}}, "2 names for 1 regions"),
-    ({"header": {"region_names": [7]}}, "name must be printable text; got 7"),
+    ({"header": {"region_names": [7]}}, r"region_names\[0\] must be text"),
     ({"header": {"region_names": ["a\0b"]}}, "name must be printable text"),
     ({"header": {"region_names": ["a" * 81]}}, "80 characters"),
     ({"header": {"region_names": ["region 2"]}}, "reserved for a region of this number"),
@@ -400,28 +400,28 @@ WRONG = [
     ({"targets": np.zeros((2, 3))}, "targets must be"),
     ({"compress": True}, "header.json is compressed"),
     ({"header": {"pulls": "pull 1"}}, "pulls must be a list"),
-    ({"header": {"pulls": [[]]}}, r"state\.pulls\[0\] must be"),
+    ({"header": {"pulls": [[]]}}, r"pulls\[0\] must be text"),
     ({"header": {"fixed_in_pose": True}}, "fixed_at.npy is missing"),
     ({"header": {"pivots": [0, 0, 0]}}, "pivots must be"),
-    ({"header": {"pivots": {"h": [0.0, 0.0]}}}, "pivot of h must"),
+    ({"header": {"pivots": {"h": [0.0, 0.0]}}}, r"pivots\.h must be a list of 3"),
     ({"header": {"pivots": {"h": [0.0, 0.0, 1e9]}}}, "pivot of h is .* away"),
     ({"header": {"locality": 3}}, "locality must be a list"),
-    ({"header": {"locality": [2, None, 0.1]}}, "locality must have 4 entries"),
-    ({"header": {"locality": [2.5, None, 0.1, 0.5]}}, "locality must be a whole number"),
-    (
-        {"header": {"locality": [99, None, 0.1, 0.5]}},
-        "whole number, 0 to 5; got 99",
-    ),
+    ({"header": {"locality": [2, None, 0.1]}}, r"locality must be a list of 4"),
+    ({"header": {"locality": [2.5, None, 0.1, 0.5]}}, r"locality\[0\] must be a whole number"),
+    ({"header": {"locality": [99, None, 0.1, 0.5]}}, "0 to 5; got 99"),
     ({"header": {"pulled_point": [[0, 99], [0.5, 0.5]]}}, "0 to 5; got 99"),
     ({"header": {"pulled_point": [[0, 1], [0.5, 0.6]]}}, "must have positive shares"),
-    ({"header": {"pulled_point": [[0, 1], ["a", 0.6]]}}, "is not a readable session file"),
-    ({"header": {"pulled_point": [0, 1]}}, "is not a readable session file"),
-    ({"header": {"pulled_point": [[0, 1]]}}, "is not a readable session file"),
+    (
+        {"header": {"pulled_point": [[0, 1], ["a", 0.6]]}},
+        r"pulled_point\[1\]\[0\] must",
+    ),
+    ({"header": {"pulled_point": [0, 1]}}, r"pulled_point\[0\] must be a list"),
+    ({"header": {"pulled_point": [[0, 1]]}}, "pulled_point must be a list of 2"),
     ({"header": {"locality": [2, -1.0, 0.1, 0.5]}}, "radius of a pull must be positive"),
-    ({"header": {"locality": [2, "far", 0.1, 0.5]}}, "radius of a pull must be positive"),
-    ({"header": {"locality": [2, None, None, 0.5]}}, "radius of a pull must be positive"),
+    ({"header": {"locality": [2, "far", 0.1, 0.5]}}, r"locality\[1\] must be a number"),
+    ({"header": {"locality": [2, None, None, 0.5]}}, r"locality\[2\] must be a number"),
     ({"header": {"locality": [2, None, 0.1, 1.5]}}, "follows must be from 0 to 1"),
-    ({"header": {"locality": [2, None, 0.1, "no"]}}, "follows must be from 0 to 1"),
+    ({"header": {"locality": [2, None, 0.1, "no"]}}, r"locality\[3\] must be a number"),
     ({"locality": np.zeros((3, 3))}, "locality must be float64 of shape"),
     ({"locality": np.full((4, 3), np.nan)}, "NaN or infinite"),
     ({"locality": np.full((4, 3), 1e300)}, "the pose is damaged"),
@@ -501,7 +501,7 @@ def sparse(path, size, n):
 def test_a_sparse_file_of_gigabytes_is_refused_before_it_is_read(tmp_path, monkeypatch, size):
     sparse(tmp_path / "saved.npz", size, size // 48)
     monkeypatch.setattr(zipfile, "ZipFile", None)
-    with pytest.raises(SessionError, match=r"saved\.npz: .*has .*e\+\d\d bytes; the limit is"):
+    with pytest.raises(SessionError, match=r"saved\.npz: .*has .* GB; the limit is"):
         load_session(tmp_path / "saved.npz")
 
 
@@ -516,7 +516,7 @@ def test_an_archive_of_very_many_members_is_refused_before_they_are_listed(tmp_p
 
 
 def test_a_session_too_large_to_read_is_not_written(tmp_path, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.session.archive._LARGEST", (1 << 20) + 1000)
+    monkeypatch.setattr("vtk_segdeform.session.archive.LARGEST_FILE", (1 << 20) + 1000)
     with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
         save_session(tmp_path / "saved.npz", shared(posed))
     assert os.listdir(tmp_path) == []

@@ -151,15 +151,15 @@ P, N = SMALL.surface.given.n_points, SMALL.mesh.n_vertices
 HUGE = 1 << 61
 WRONG = [
     ({"points": ["f", HUGE]}, "surface_points must be"),
-    ({"points": ["f", -1]}, "not a size"),
+    ({"points": ["f", -1]}, "must be a whole number"),
     ({"points": ["O", P]}, "must have a type"),
     ({"points": ["f4", P]}, "surface_points must be"),
-    ({"points": 7}, "unpack|iterable"),
+    ({"points": 7}, "points must be a list of 2"),
     ({"cells": {"Polys": [HUGE, HUGE]}}, "must be int64"),
     ({"cells": {"Boxes": [1, 1]}}, "not a kind of cells"),
     ({"arrays": [["secrets", "a", "f8", [1], 1]]}, "not a place of arrays"),
     ({"arrays": [["point_data", 7, "f4", [P, 3], 3]]}, "must be text"),
-    ({"arrays": [["point_data", "a", "f4", ["x"], 3]]}, "not a size"),
+    ({"arrays": [["point_data", "a", "f4", ["x"], 3]]}, "must be a whole number"),
     ({"arrays": [["point_data", "a", "text", [HUGE, 8], 1]]}, "must be int64|missing"),
     ({"active": {"point_data": [7]}}, "must be text"),
     ({"active": {"field_data": ["a"]}}, "no active arrays"),

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ArgumentError
-from ..files import replacing, require_place
+from ..files import read_regular, replacing, require_place
 from ..version import __version__
 from .charts import small_multiples
 from .measuring import processor
@@ -43,7 +43,7 @@ def read_history(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     runs = []
-    for number, line in enumerate(path.read_bytes().splitlines(), 1):
+    for number, line in enumerate(read_regular(path).splitlines(), 1):
         if not line.strip():
             continue
         try:

@@ -38,17 +38,13 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         raise ArgumentError("--open requires --interactive")
     if options.open:
         sizes = DRAWN_SIZES if options.full else DRAWN_SIZES[:2]
-        say(
-            opening_table(
-                sizes=sizes if options.size is None else (options.size,), progress=progress
-            )
-        )
+        sizes = sizes if options.size is None else (options.size,)
+        _print_table(opening_table(sizes=sizes, progress=progress), say)
         return True
     if options.interactive:
         drag, pulls = part(progress, 0.0, 0.3), part(progress, 0.3, 1.0)
-        say(interactive_table(n_cage_vertices=options.cage_vertices, progress=drag))
-        say("")
-        say(pull_table(progress=pulls))
+        table = interactive_table(n_cage_vertices=options.cage_vertices, progress=drag)
+        _print_table(f"{table}\n\n{pull_table(progress=pulls)}", say)
         return True
     scale = QUICK if options.quick else FULL if options.full else USUAL
     scale = replace(scale, n_cage_vertices=options.cage_vertices)
@@ -69,3 +65,8 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"recorded        {options.record}")
     say(f"written         {options.output / NAME}")
     return True
+
+
+def _print_table(table: str, say: Say) -> None:
+    for line in table.split("\n"):
+        say(line)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     except (MeshError, OSError) as error:
         if not options.json:
             raise
-        say(json.dumps({**_unread(str(options.input)), "reason": str(error)}, indent=1))
+        _print_json({**_unread(str(options.input)), "reason": str(error)}, say)
         return False
     if options.repair:
         return _repair(given, options, say, progress)
@@ -59,7 +60,7 @@ def check(options: Namespace, say: Say, progress: Progress) -> bool:
     found = described(given, str(options.input))
     progress(1.0, "done")
     if options.json:
-        say(json.dumps(found, indent=1))
+        _print_json(found, say)
     else:
         _print(found, say)
     return bool(found["can_be_deformed"])
@@ -158,6 +159,11 @@ def _counted(fault: Any) -> dict[str, Any]:
     return {"kind": kind, "text": str(fault), "count": fault.count}
 
 
+def _print_json(found: dict[str, Any], say: Say) -> None:
+    for line in json.dumps(found, indent=1).split("\n"):
+        say(line)
+
+
 def _print(found: dict[str, Any], say: Say) -> None:
     polygons = counted(found["polygons"], "polygon", "polygons")
     given = f"{found['file']}: {found['points']} points, {polygons}"
@@ -203,4 +209,15 @@ def _repair(given: Any, options: Namespace, say: Say, progress: Progress) -> boo
         say(repair.advice)
     io.write_mesh(options.output, closed)
     say(f"written: {options.output}")
+    if repair.report.is_closed and not _is_closed(options.output):
+        say("The file is not closed as it is read again: its format rounds coordinates")
+        return False
     return repair.report.is_closed
+
+
+def _is_closed(path: Path) -> bool:
+    """Return whether the surface in a file has a closed mesh."""
+    try:
+        return Surface.read(path).mesh.is_closed
+    except MeshError:
+        return False

@@ -35,9 +35,10 @@ from .outputs import (
     report_cages,
     report_pose,
     report_regions,
+    report_session,
     report_solution,
     report_surface,
-    report_volume,
+    written,
 )
 from .selection import Role, parse_selection
 from .turns import turn
@@ -77,9 +78,10 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     start = time.perf_counter()
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
-    report_solution(solution, time.perf_counter() - start, say)
-    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact)
-    surface.write(options.output, solution.vertices)
+    seconds = time.perf_counter() - start
+    stored = written(surface, solution, options.output, LIDS[options.lids])
+    report_solution(stored, seconds, say)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
@@ -116,10 +118,7 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
         title=f"segdeform {options.input.name}",
         progress=completing,
     )
-    report_volume(session.volume_change, say)
-    if options.output is not None:
-        session.write_deformed(options.output)
-        say(f"written         {options.output}")
+    report_session(session, options.output, say)
     return True
 
 

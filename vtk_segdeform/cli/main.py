@@ -22,7 +22,7 @@ from ctypes.util import find_library
 from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from .. import sizes
 from ..errors import ConstraintError, SegDeformError
@@ -151,7 +151,8 @@ class _Warnings(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Print a record on its own line."""
         self._bar.clear()
-        print(f"segdeform {self._command}: {record.getMessage()}", file=sys.stderr)
+        text = _printable(record.getMessage())
+        print(f"segdeform {self._command}: {text}", file=sys.stderr)
 
 
 def _render_without_display() -> None:
@@ -161,9 +162,17 @@ def _render_without_display() -> None:
 
 
 def _printable(line: str) -> str:
-    """Return *line* with unprintable characters escaped; file names may contain any bytes."""
+    r"""Return *line* with all unprintable characters escaped.
+
+    Names of files, and names in files, may contain anything: line breaks, and sequences by which a
+    terminal moves its cursor or changes its title.
+
+    >>> print(_printable("a\x1b[2Jb\nc"))
+    a\x1b[2Jb\nc
+    """
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
     encoding = sys.stdout.encoding or "utf-8"
-    return line.encode(encoding, "backslashreplace").decode(encoding)
+    return shown.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _one_line(error: Exception) -> str:
@@ -232,9 +241,17 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Parser(argparse.ArgumentParser):
+    """Prints errors about words that may be names of files."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print *message* with the usage, and exit."""
+        super().error(_printable(message))
+
+
 def _parser() -> argparse.ArgumentParser:
     form = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="segdeform",
         description="Deform surfaces by moving handles, with detail and volume preserved.",
         epilog=_EXAMPLES,

@@ -20,7 +20,6 @@ way, in which the shares s = 1/n, 2/n, ... of their rotations and translations a
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -29,8 +28,10 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, as_points
 from ..errors import ConstraintError
+from ..files import open_regular
 
 _LEG = 0.5 * math.pi  # between targets on the way of a far rotation, at most
+_LARGEST_FILE = 1 << 20  # bytes of 16 numbers and comments
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
@@ -83,11 +84,18 @@ def legs(angles: Sequence[float]) -> int:
 
 def read_matrix(path: str | Path) -> FloatArray:
     """Return the (4, 4) matrix in a text file of 16 numbers, row by row; # starts a comment."""
-    if not os.path.isfile(path):  # reading from a device may never end
-        raise ConstraintError(f"matrix {path}: no such file; it must contain 16 numbers")
     try:
-        matrix = np.loadtxt(path, ndmin=2)
-    except (ValueError, OSError) as error:
+        with open_regular(path) as file:
+            content = file.read(_LARGEST_FILE + 1)
+        if len(content) > _LARGEST_FILE:
+            raise ValueError(f"it has more than {_LARGEST_FILE:,} bytes")
+        words = " ".join(line.partition("#")[0] for line in content.decode().splitlines()).split()
+        matrix = np.array([float(word) for word in words])
+    except OSError as error:
+        raise ConstraintError(
+            f"matrix {path}: {error.strerror}; it must contain 16 numbers"
+        ) from None
+    except ValueError as error:
         raise ConstraintError(f"matrix {path} must contain 16 numbers: {error}") from None
     if matrix.size != 16 or not np.isfinite(matrix).all():
         raise ConstraintError(f"matrix {path} must contain 16 finite numbers; got {matrix.size}")

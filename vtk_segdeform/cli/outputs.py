@@ -1,19 +1,30 @@
-"""Printed lines and written surfaces of the commands."""
+"""Printed lines and written surfaces of the commands.
+
+What is told of a result is told of the file as it is read again: formats round coordinates, and
+some of them to single precision.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista as pv
+from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
-from ..io import Surface, polydata_of
+from ..geometry import lids_of, signed_volume
+from ..io import Surface, polydata_of, read_polydata, to_polydata, triangles_of
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
+from ..session import Session
 from ..solver import Solution, Status
 
 Say = Callable[[str], None]
@@ -74,9 +85,79 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
         say(f"parts           {solution.unmoved_summary(mesh)}")
 
 
+def written(surface: Surface, solution: Solution, path: Path, lids: bool | None) -> Solution:
+    """Write *surface* in a pose, and return the pose as it is in the file.
+
+    Raises
+    ------
+    MeshError
+        If the file cannot be written, or not be read again.
+    """
+    surface.write(path, solution.vertices)
+    x = stored_vertices(surface, solution.vertices, path)
+    if np.array_equal(x, solution.vertices):
+        return solution
+    change = volume_change(surface.mesh, x, lids)
+    return replace(solution, vertices=x, volume=lambda: change)
+
+
+def stored_vertices(surface: Surface, vertices: FloatArray, path: Path) -> FloatArray:
+    """Return where a file of *surface*, with its mesh at *vertices* (n, 3), stores them.
+
+    A file with other points, such as the corners of triangles in STL, has for each vertex one that
+    is nearest: where coordinates are rounded, no other one is nearer.
+    """
+    with _without_warnings():
+        again = read_polydata(path)
+    points = np.asarray(again.points, dtype=np.float64)
+    same = again.n_points == surface.given.n_points
+    if same and np.array_equal(triangles_of(again), triangles_of(surface.given)):
+        return np.asarray(surface.at_vertices(points))
+    points = points[np.isfinite(points).all(axis=1)]
+    return np.asarray(points[cKDTree(points).query(vertices)[1]])
+
+
+def volume_change(mesh: Mesh, vertices: FloatArray, lids: bool | None) -> float:
+    """Return (V - V0) / V0 of *mesh* at *vertices* (n, 3), with its lids; 0 without a volume."""
+    used = lids_of(mesh, lids)
+    if not used.has_volume:
+        return 0.0
+    faces, middle = used.closed(mesh), mesh.vertices.mean(axis=0)
+    before, after = (
+        signed_volume(used.extension @ (x - middle), faces) for x in (mesh.vertices, vertices)
+    )
+    return (after - before) / before
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Log no warnings of reading: writing has logged them."""
+    logger = logging.getLogger("vtk_segdeform.io")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
 def report_volume(change: float, say: Say) -> None:
     """Print the relative change of the volume."""
     say(f"volume change   {change:+.1e} of the original volume")
+
+
+def report_session(session: Session, path: Path | None, say: Say) -> None:
+    """Write the surface of a session in its pose, if to a *path*, and print its volume change."""
+    change = session.volume_change
+    if path is not None:
+        session.write_deformed(path)
+        surface = session.surface or Surface(to_polydata(session.mesh))
+        x = stored_vertices(surface, session.vertices, path)
+        if not np.array_equal(x, session.vertices):
+            change = volume_change(session.mesh, x, session.options.lids)
+    report_volume(change, say)
+    if path is not None:
+        say(f"written         {path}")
 
 
 def coloured_regions(surface: Surface, regions: Regions) -> pv.PolyData:

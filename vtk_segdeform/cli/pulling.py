@@ -17,7 +17,7 @@ from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
 from .commands import LIDS
 from .motion import parse_vector
-from .outputs import HANDLE_TOLERANCE, Say, report_pose, report_surface, report_volume
+from .outputs import HANDLE_TOLERANCE, Say, report_pose, report_surface, report_volume, written
 
 
 def pull(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -51,11 +51,11 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    report_volume(solution.volume_change, say)
-    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
+    stored = written(surface, solution, options.output, lids)
+    report_volume(stored.volume_change, say)
+    say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
-    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact)
-    surface.write(options.output, solution.vertices)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(

@@ -18,7 +18,7 @@ from ..pictures import require_offscreen, require_screen
 from ..progress import Progress
 from ..session import Session
 from .commands import opened
-from .outputs import Say, report_volume
+from .outputs import Say, report_session
 
 if TYPE_CHECKING:
     from ..widgets.recording import ReplayLimits
@@ -43,12 +43,9 @@ def replay(options: Namespace, say: Say, progress: Progress) -> bool:
     for fault in faults:
         say(f"message         {fault}")
     say(f"replayed        {options.recording}")
-    report_volume(session.volume_change, say)
     if options.film is not None:
         say(f"written         {options.film}, {pictures} frames")
-    if options.output is not None:
-        session.write_deformed(options.output)
-        say(f"written         {options.output}")
+    report_session(session, options.output, say)
     return True
 
 

@@ -15,11 +15,20 @@ from .atomic import is_draft, replacing, require_place
 from .folders import autosave_folder, cache_folder
 from .lock import hold
 from .referenced_files import file_inside
-from .regular_file import fault_of, is_ours, open_regular
+from .regular_file import (
+    LARGEST_FILE,
+    excess_of,
+    fault_of,
+    is_ours,
+    open_regular,
+    read_regular,
+)
 
 __all__ = [
+    "LARGEST_FILE",
     "autosave_folder",
     "cache_folder",
+    "excess_of",
     "fault_of",
     "file_inside",
     "hold",
@@ -27,6 +36,7 @@ __all__ = [
     "is_ours",
     "landlock",
     "open_regular",
+    "read_regular",
     "replacing",
     "require_place",
 ]

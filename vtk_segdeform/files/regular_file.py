@@ -1,5 +1,7 @@
 """Open a file for reading only if it is regular: a pipe would block, a device may never end.
 
+A regular file that is larger than `LARGEST_FILE` is refused as well, before it is read.
+
 A file can be replaced at any moment, so the checks are made on the open file, not on its name.
 """
 
@@ -9,6 +11,12 @@ import errno
 import os
 import stat
 from typing import BinaryIO
+
+LARGEST_FILE = 2 << 30
+"""Bytes of a file beyond which it is refused before it is read.
+
+Twenty million vertices as text, of which reading takes some 30 GB of memory.  A file that is larger
+by mistake, such as a disk image or one with a hole, would fill the memory first."""
 
 # O_BINARY exists on Windows only, the others everywhere else.
 _READ = os.O_RDONLY | sum(
@@ -29,7 +37,8 @@ def open_regular(path: str | os.PathLike[str], *, own: bool = False) -> BinaryIO
     Raises
     ------
     OSError
-        If it cannot be opened or is not a regular file; ``strerror`` gives the reason.
+        If it cannot be opened, is not a regular file or is too large; ``strerror`` gives the
+        reason.
     """
     name = name_of(path)
     try:
@@ -37,12 +46,31 @@ def open_regular(path: str | os.PathLike[str], *, own: bool = False) -> BinaryIO
     except FileNotFoundError as fault:
         raise FileNotFoundError(fault.errno, "there is no such file", name) from None
     try:
-        if what := fault_of(os.fstat(handle), own=own):
+        status = os.fstat(handle)
+        if what := fault_of(status, own=own):
             raise OSError(errno.EINVAL, f"is {what}", name)
-        return open(handle, "rb")
+        if what := excess_of(status):
+            raise OSError(errno.EFBIG, what, name)
+        if status.st_size:
+            return open(handle, "rb")
     except BaseException:  # Ctrl+C as well: nobody else would close it
         os.close(handle)
         raise
+    os.close(handle)
+    return open(os.devnull, "rb")  # a file of the kernel, in /proc, may block, or never end
+
+
+def read_regular(path: str | os.PathLike[str]) -> bytes:
+    """Return the bytes of a file that `open_regular` opens."""
+    with open_regular(path) as file:
+        return file.read()
+
+
+def excess_of(status: os.stat_result) -> str:
+    """Return that a file is too large to be read, in words; "" if it is not."""
+    if status.st_size <= LARGEST_FILE:
+        return ""
+    return f"has {status.st_size / 1e9:.3g} GB; the limit is {LARGEST_FILE / 1e9:.3g} GB"
 
 
 def name_of(path: str | os.PathLike[str]) -> str:

@@ -18,7 +18,7 @@ The files, in reading order:
     confined reading_child
                        VTK's and PyMeshLab's readers, in a process that can open one file only
     groups             named groups of cells
-    array_names        names and arrays that a format cannot store
+    array_names        names, arrays and digits that a format cannot store
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData

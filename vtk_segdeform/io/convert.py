@@ -30,10 +30,10 @@ from ..arrays import as_points
 from ..cages import Cage
 from ..checks import as_flag, as_path, require, shown
 from ..errors import ArgumentError, MeshError
-from ..files import fault_of, replacing, require_place
+from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
-from .array_names import set_names
+from .array_names import set_names, warn_of_rounding, with_storable_texts
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
 from .groups import GROUP, names_key
@@ -97,6 +97,8 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         raise MeshError(f"{path}: there is no such file") from None
     if what := fault_of(status):
         raise MeshError(f"{path}: {what}")
+    if what := excess_of(status):
+        raise MeshError(f"{path}: {what}")
     if not status.st_size:
         raise MeshError(f"{path}: the file is empty (0 bytes); copy or export it again")
     suffix = path.suffix.lower()
@@ -155,6 +157,8 @@ def write_mesh(
     is_mesh = isinstance(mesh, Mesh)
     surface = to_polydata(mesh) if is_mesh else as_polydata(mesh, "mesh", "a Mesh or a PolyData")
     require_writable(path)
+    if not is_mesh:
+        surface = with_storable_texts(surface)
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
@@ -177,11 +181,14 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
     """Write by PyMeshLab; OSError if the file is incomplete, which PyMeshLab does not report."""
     try:
         meshlab.write(draft, mesh)
-        complete = len(meshlab.read_faces(draft)[1]) == mesh.n_faces
+        vertices, faces = meshlab.read_faces(draft)
+        complete = len(faces) == mesh.n_faces
     except MeshError as fault:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
+    if len(vertices) == mesh.n_vertices and np.array_equal(faces, mesh.faces):
+        warn_of_rounding(f"{draft.suffix} rounds coordinates", faces, mesh.vertices, vertices)
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:

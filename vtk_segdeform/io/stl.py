@@ -34,11 +34,13 @@ from ..kernels import compiled_checks, inputs
 from ..mesh import first_equal_row
 from .array_names import (
     HEADER,
+    cut,
     decoded,
     get_names,
     plain_names,
     set_names,
     warn_left_out,
+    warn_of_rounding,
     warn_renamed,
 )
 from .groups import GROUP, OBJECT, groups_of, names_key, set_groups
@@ -169,17 +171,21 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     It is text, with several solids, if the surface has groups or objects, and binary otherwise.
     """
     counts, corners = polygons_of(surface)
-    faces, polygon = cut_into_triangles(np.asarray(surface.points, float), counts, corners)
+    points = np.asarray(surface.points, dtype=float)
+    faces, polygon = cut_into_triangles(points, counts, corners)
+    with np.errstate(over="ignore"):
+        single = points.astype("<f4")
+    if (np.isinf(single) & np.isfinite(points)).any():
+        raise MeshError("has positions that STL cannot store: over 3e38")
     kept: dict[str, list[str]] = {"cell": [], "field": []}
     rows = np.zeros(len(faces), _ROW)
+    rows["corners"] = single[faces]
+    a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
     with np.errstate(invalid="ignore", over="ignore"):
-        rows["corners"] = surface.points[faces]
-        a, b, c = np.moveaxis(rows["corners"].astype(float), 1, 0)
         normals = np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         rows["normal"] = normals / np.where(length > 0, length, 1.0)
-    if np.isinf(rows["corners"]).any():
-        raise MeshError("has positions that STL cannot store: infinite or over 3e38")
+    warn_of_rounding("STL stores single precision", faces, points, single)
     cells = cells_of(surface)[polygon]
     for key in (GROUP, OBJECT):
         if len(rows) and (found := groups_of(surface, key)) is not None:
@@ -191,9 +197,10 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
     if attributes is not None and attributes.dtype == np.uint16 and attributes.ndim == 1:
         rows["more"] = np.asarray(attributes)[cells]
         kept["cell"].append("Attribute")
-    header = " ".join(get_names(surface, HEADER)).encode("utf-8")[:80]
-    if header.lower().startswith(b"solid"):  # which would be text
-        header = b"_" + header[:79]
+    title = " ".join(get_names(surface, HEADER))
+    sound = f"_{title}" if title.lower().startswith("solid") else title  # it would be text
+    header = cut(sound, 80)
+    warn_renamed("header", {title: header.decode()})
     kept["field"] += [HEADER] if header else []
     warn_left_out("STL", surface, kept)
     with path.open("wb") as file:

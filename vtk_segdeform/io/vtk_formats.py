@@ -30,9 +30,11 @@ from ..errors import MeshError
 from .array_names import (
     CELL_TYPES,
     HEADER,
+    component_names,
     decoded,
     get_names,
     plain_names,
+    replace_arrays,
     set_names,
     warn_renamed,
 )
@@ -53,7 +55,7 @@ _BEGINS = {
 }
 _WRITERS = {".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
 _REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"', ".vtkhdf": "/."}
-_LONGEST_TITLE = 200
+_LONGEST_TITLE = 200  # bytes
 _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
 
 
@@ -124,8 +126,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
     suffix = path.suffix.lower()
     plain, title = _with_plain_names(surface, suffix), ""
     if suffix == ".vtk":
-        title = " ".join(get_names(surface, HEADER))[:_LONGEST_TITLE]
-        title = title if title.isprintable() else ""
+        title = _title_of(surface)
         if title:
             plain.GetFieldData().RemoveArray(HEADER)
     if suffix in _XML:
@@ -161,6 +162,16 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         raise OSError("the file is incomplete")
 
 
+def _title_of(surface: pv.PolyData) -> str:
+    """Return the title by which a legacy file stores the field array `HEADER`.
+
+    That is "" unless a reader finds the same text there; then it remains a field array.
+    """
+    (title, *others) = get_names(surface, HEADER) or [""]
+    is_plain = title.isprintable() and title == title.strip() and not others
+    return title if is_plain and len(title.encode()) <= _LONGEST_TITLE else ""
+
+
 def _without_types(surface: Any) -> Any:
     surface.GetFieldData().RemoveArray(CELL_TYPES)
     return surface
@@ -172,17 +183,20 @@ def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
     copy.ShallowCopy(surface)
     for sort in ("Point", "Cell", "Field"):
         attributes = getattr(copy, f"Get{sort}Data")()
+        if suffix == ".vtkhdf":
+            _warn_of_components(attributes, f"{sort.lower()} array")
         if suffix == ".vtkhdf" and sort != "Field":
             _remove_texts(attributes, f"{sort.lower()} array")
         arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
         refused, measure = _REFUSED.get(suffix, ""), _quoted if suffix == ".vtk" else len
         names = plain_names((a.GetName() for a in arrays), refused=refused, measure=measure)
-        parts = {name for array in arrays for name in _components(array) if name}
+        parts = [name for array in arrays for name in component_names(array) if name]
         components = plain_names(parts, refused=refused, measure=measure)
         warn_renamed(f"{sort.lower()} array", names)
         warn_renamed("component", components)
         if any(name != plain for name, plain in (names | components).items()):
-            _rename(attributes, arrays, list(names.values()), components)
+            new = [_renamed(a, names[a.GetName()], components) for a in arrays]
+            replace_arrays(attributes, new)
         if suffix == ".vtk" and sort != "Field":
             scalars = attributes.GetScalars()
             if scalars is not None and scalars.GetNumberOfComponents() > _MOST:
@@ -199,31 +213,25 @@ def _remove_texts(attributes: Any, what: str) -> None:
             attributes.RemoveArray(k)
 
 
-def _components(array: Any) -> list[str]:
-    """Return the names of the components of an array; "" for unnamed ones."""
-    if not array.HasAComponentName():
-        return []
-    return [array.GetComponentName(k) or "" for k in range(array.GetNumberOfComponents())]
+def _warn_of_components(attributes: Any, what: str) -> None:
+    """Log a warning for each array whose components have names, which VTKHDF does not store."""
+    for k in range(attributes.GetNumberOfArrays()):
+        array = attributes.GetAbstractArray(k)
+        if any(component_names(array)):
+            _log.warning(
+                "VTKHDF cannot store the names of the components of %s %r: left out",
+                what, array.GetName(),
+            )  # fmt: skip
 
 
-def _rename(
-    attributes: Any, arrays: list[Any], names: list[str], components: dict[str, str]
-) -> None:
-    """Replace *arrays* by renamed copies that remain the active normals, scalars ..."""
-    parts = [
-        attributes.IsArrayAnAttribute(k) if hasattr(attributes, "IsArrayAnAttribute") else -1
-        for k in range(len(arrays))
-    ]
-    attributes.Initialize()
-    for array, name, part in zip(arrays, names, parts, strict=True):
-        renamed = array.NewInstance()
-        renamed.DeepCopy(array)
-        renamed.SetName(name)
-        for k, component in enumerate(_components(array)):
-            renamed.SetComponentName(k, components[component] if component else "")
-        place = attributes.AddArray(renamed)
-        if part >= 0:
-            attributes.SetActiveAttribute(place, part)
+def _renamed(array: Any, name: str, components: dict[str, str]) -> Any:
+    """Return a copy of an array with other names."""
+    copy = array.NewInstance()
+    copy.DeepCopy(array)
+    copy.SetName(name)
+    for k, component in enumerate(component_names(array)):
+        copy.SetComponentName(k, components[component] if component else "")
+    return copy
 
 
 def _quoted(name: str) -> int:

@@ -272,7 +272,9 @@ def write_obj(path: Path, surface: pv.PolyData) -> None:
     comments = [line for text in get_names(surface, COMMENTS) for line in text.splitlines() or [""]]
     kept["field"] += [COMMENTS] if comments else []
     if missing := [name for name in libraries.values() if not os.path.exists(path.parent / name)]:
-        _log.warning("the OBJ file refers to %s: copy it to the same folder", ", ".join(missing))
+        _log.warning(
+            "the OBJ file refers to %s: copy it to the same folder", ", ".join(map(repr, missing))
+        )
     table = np.asarray(surface.points, dtype=float)
     colour = surface.point_data.get("RGB")
     if colour is not None and colour.dtype == np.uint8 and colour.shape == table.shape:

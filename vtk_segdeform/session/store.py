@@ -34,19 +34,32 @@ import os
 import struct
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..cages import Cage
-from ..checks import as_flag, as_path, require
+from ..checks import as_flag, as_path, require, shown
 from ..errors import SessionError
 from ..files import open_regular, replacing
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
-from .archive import Archive, write_archive
+from .archive import (
+    Archive,
+    anything,
+    field,
+    flag,
+    list_of,
+    map_of,
+    number,
+    optional,
+    row_of,
+    text,
+    whole,
+    write_archive,
+)
 from .session import Session
 from .state import Finished, Locality, Options, Pose, State, split_rows
 
@@ -62,9 +75,8 @@ _LATER = {
     "avoid_contact": False,
 }  # options that version 1 does not have, and their defaults
 
-# Errors of zipfile, numpy and json on invalid content.
-_ERRORS = (zipfile.BadZipFile, ValueError, KeyError, TypeError, EOFError, OverflowError,
-           RuntimeError, NotImplementedError, struct.error, OSError)  # fmt: skip
+# Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
+_ERRORS = (zipfile.BadZipFile, ValueError, EOFError, RuntimeError, struct.error, OSError)
 
 
 def save_session(
@@ -143,7 +155,7 @@ def saved_view(path: str | os.PathLike[str]) -> dict[str, Any]:
             header = Archive(file).header()
     except _ERRORS:
         return {}
-    view = header.get("view") if isinstance(header, dict) else None
+    view = header.get("view")
     return view if isinstance(view, dict) else {}
 
 
@@ -213,16 +225,16 @@ def _write(
 
 def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     header = _checked_header(archive.header())
-    n, r = _count(header, "n_vertices"), _count(header, "n_regions")
+    n, r = field(header, "n_vertices", whole), field(header, "n_regions", whole)
     mesh = Mesh(
         archive.array("mesh_vertices", "f", (n, 3)),
-        archive.array("mesh_faces", "i", (_count(header, "n_faces"), 3)),
+        archive.array("mesh_faces", "i", (field(header, "n_faces", whole), 3)),
     )
     regions = None
     if r:
         membership = archive.array("membership", "b", (r, n))
-        regions = Regions(mesh, membership, _number(header, "smoothness"))
-    counts = [(_whole(m, "cages"), _whole(k, "cages")) for m, k in _list(header, "cages")]
+        regions = Regions(mesh, membership, field(header, "smoothness", number))
+    counts = field(header, "cages", list_of(row_of(whole, whole)))
     n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
     total = sum(n_vertices)
     cages: tuple[Cage, ...] = ()
@@ -231,20 +243,19 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         faces = split_rows(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
         cages = tuple(Cage(*pair) for pair in zip(vertices, faces, strict=True))
 
-    sizes = {str(name): _whole(k, "handles") for name, k in _list(header, "handles")}
-    if len(sizes) != len(_list(header, "handles")):
+    listed = field(header, "handles", list_of(row_of(text, whole)))
+    sizes = dict(listed)
+    if len(sizes) != len(listed):
         raise SessionError("two handles have the same name")
     lengths, n_handle = list(sizes.values()), sum(sizes.values())
     ids = split_rows(archive.array("handle", "i", (n_handle,)), lengths)
     pose = None
-    if not isinstance(header["posed"], bool):
-        raise SessionError(f"posed must be true or false in the header; got {header['posed']!r}")
-    if header["posed"]:
+    if field(header, "posed", flag):
         places = split_rows(archive.array("pose", "f", (total, 3)), n_vertices)
         targets = split_rows(archive.array("targets", "f", (n_handle, 3)), lengths)
         finished = None
         if "n_finished_held" in header:
-            held = _count(header, "n_finished_held")
+            held = field(header, "n_finished_held", whole)
             finished = Finished(
                 archive.array("finished", "f", (n, 3)),
                 archive.array("finished_held", "i", (held,)),
@@ -253,40 +264,43 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
                 archive.array("finished_offset", "f", (n, 3)),
             )
         pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)), finished)
-    fixed = archive.array("fixed", "i", (_count(header, "n_fixed"),))
-    options = Options(**header["options"])
-    names = tuple(_list(header, "region_names")) if "region_names" in header else ()
-    pulls = tuple(_list(header, "pulls")) if "pulls" in header else ()
+    fixed = archive.array("fixed", "i", (field(header, "n_fixed", whole),))
+    names, pulls = (
+        tuple(field(header, name, list_of(text))) if name in header else ()
+        for name in ("region_names", "pulls")
+    )
     locality = None
     if "locality" in header:
-        entries = _list(header, "locality")
-        if len(entries) != 4:
-            raise SessionError(f"locality must have 4 entries in the header; got {entries!r}")
-        vertex, reach, spread, follows = entries
+        shape = row_of(whole, optional(number), number, number)
+        vertex, reach, spread, follows = field(header, "locality", shape)
         kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
         reach = math.inf if reach is None else reach
-        point = SurfacePoint.at_vertex(_whole(vertex, "locality"))
+        point = SurfacePoint.at_vertex(vertex)
         if "pulled_point" in header:
-            corners, shares = _list(header, "pulled_point")
+            shape = row_of(list_of(whole), list_of(number))
+            corners, shares = field(header, "pulled_point", shape)
             point = SurfacePoint(tuple(corners), tuple(shares))
         locality = Locality(point, reach, spread, follows, tuple(kept))
-    handles = dict(zip(sizes, ids, strict=True))
-    more = {"pivots": header["pivots"]} if "pivots" in header else {}
-    if header.get("fixed_in_pose"):
+    handles, more = dict(zip(sizes, ids, strict=True)), dict[str, Any]()
+    if "pivots" in header:
+        pivots = field(header, "pivots", map_of(row_of(number, number, number)))
+        more["pivots"] = {name: np.array(point) for name, point in pivots.items()}
+    if "fixed_in_pose" in header and field(header, "fixed_in_pose", flag):
         more["fixed_at"] = archive.array("fixed_at", "f", (len(fixed), 3))
+    options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:
         return mesh, state
     imported("vtk_segdeform.session.surface_store")  # imports pyvista
     from .surface_store import read_surface
 
-    return read_surface(archive, header["surface"], mesh), state
+    return read_surface(archive, field(header, "surface", map_of(anything)), mesh), state
 
 
-def _checked_header(header: Any) -> Mapping[str, Any]:
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
+def _checked_header(header: dict[str, Any]) -> dict[str, Any]:
+    if header.get("format") != FORMAT:
         raise SessionError(f"the header does not contain the format {FORMAT!r}")
-    version = _count(header, "version")
+    version = field(header, "version", whole)
     if version > VERSION:
         raise SessionError(f"version {version} is newer than {VERSION}; update vtk_segdeform")
     if version < 1:
@@ -294,28 +308,13 @@ def _checked_header(header: Any) -> Mapping[str, Any]:
     return header
 
 
+def _options(values: Mapping[str, Any]) -> Options:
+    """Return options of these *values*, which `Options` checks."""
+    unknown = values.keys() - {each.name for each in fields(Options)}
+    if unknown:
+        raise SessionError(f"there is no option {shown(sorted(unknown))}")
+    return Options(**values)
+
+
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _list(header: Mapping[str, Any], name: str) -> list[Any]:
-    value = header[name]
-    if not isinstance(value, list):
-        raise SessionError(f"{name} must be a list in the header; got {value!r}")
-    return value
-
-
-def _count(header: Mapping[str, Any], name: str) -> int:
-    return _whole(header[name], name)
-
-
-def _whole(value: Any, name: str) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise SessionError(f"{name} must be a whole number in the header; got {value!r}")
-    return value
-
-
-def _number(header: Mapping[str, Any], name: str) -> float:
-    if not isinstance(header[name], int | float):
-        raise SessionError(f"{name} must be a number in the header; got {header[name]!r}")
-    return float(header[name])

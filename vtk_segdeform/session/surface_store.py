@@ -26,7 +26,7 @@ from vtkmodules.vtkCommonDataModel import vtkCellArray
 from ..arrays import IntArray
 from ..io import Surface
 from ..mesh import Kind, Mesh, Soup, Workaround
-from .archive import Archive, type_of
+from .archive import Archive, field, list_of, map_of, optional, row_of, text, type_of, whole
 
 _CELLS = ("Verts", "Lines", "Polys", "Strips")
 _DATA = ("point_data", "cell_data", "field_data")
@@ -83,19 +83,19 @@ def surface_parts(surface: Surface) -> tuple[dict[str, Any], dict[str, Any]]:
     return header, {f"surface_{name}": array for name, array in arrays.items()}
 
 
-def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
+def read_surface(archive: Archive, header: Mapping[str, Any], mesh: Mesh) -> Surface:
     """Return the surface in *archive* that follows *mesh*.
 
     Raises
     ------
-    ValueError, TypeError, KeyError, OSError
+    ValueError, OSError
         If it is damaged.
     """
-    require(isinstance(header, dict), "the surface must be described by names")
-    kind, p = header["points"]
+    kind, p = field(header, "points", row_of(text, whole))
     given = pv.PolyData()
     given.SetPoints(pv.vtk_points(_array(archive, "points", kind, (p, 3)), deep=True))
-    for name, (n_cells, n_corners) in header["cells"].items():
+    cells_of = map_of(row_of(whole, whole))
+    for name, (n_cells, n_corners) in field(header, "cells", cells_of).items():
         require(name in _CELLS, f"{name} is not a kind of cells")
         corners = _array(archive, name.lower(), "i", (n_corners,))
         ends = _ends(archive, f"{name.lower()}_ends", n_cells, n_corners)
@@ -104,15 +104,22 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
         starts = np.insert(ends, 0, 0)
         cells.SetData(*(pv.convert_array(each, deep=True) for each in (starts, corners)))
         getattr(given, f"Set{name}")(cells)
-    for number, (place, name, kind, shape, parts) in enumerate(header["arrays"]):
+    arrays = list_of(row_of(text, optional(text), text, list_of(whole), whole))
+    for number, (place, name, kind, shape, parts) in enumerate(field(header, "arrays", arrays)):
         require(place in _DATA, f"{place} is not a place of arrays")
-        _add(getattr(given, place), name, _values(archive, str(number), kind, shape), parts)
-    for place, names in header["active"].items():
+        rows = {"point_data": p, "cell_data": given.GetNumberOfCells()}.get(place)
+        values = _values(archive, str(number), kind, shape)
+        require(parts > 0, "an array has no components")
+        n_rows = len(values) // parts if kind == _TEXT else shape[0] if shape else -1
+        require(rows in (None, n_rows) and n_rows >= 0, f"{place} has an array of other length")
+        _add(getattr(given, place), name, values, parts)
+    for place, names in field(header, "active", map_of(list_of(optional(text)))).items():
         require(place in _DATA[:2], f"{place} has no active arrays")
-        for attribute, name in enumerate(names):
-            data = getattr(given, place).VTKObject
-            require(name is None or isinstance(name, str), "names of arrays must be text")
-            data.SetActiveAttribute(-1 if name is None else name, attribute)
+        data = getattr(given, place).VTKObject
+        require(not any(names[data.NUM_ATTRIBUTES :]), "there is no such active array")
+        for attribute, active in enumerate(names[: data.NUM_ATTRIBUTES]):
+            index = data.SetActiveAttribute(-1 if active is None else active, attribute)
+            require(active is None or index >= 0, f"{active} cannot be the active array")
     vertex_of = _array(archive, "vertex_of", "i", (p,))
     in_mesh = ((vertex_of >= 0) & (vertex_of < mesh.n_vertices)).all()
     require(in_mesh, "a point follows no vertex of the mesh")
@@ -123,53 +130,55 @@ def read_surface(archive: Archive, header: Any, mesh: Mesh) -> Surface:
     return Surface.of(given, soup)
 
 
-def require(condition: Any, text: str) -> None:
-    """Raise ValueError with *text* if the *condition* is false."""
+def require(condition: Any, words: str) -> None:
+    """Raise ValueError with *words* if the *condition* is false."""
     if not condition:
-        raise ValueError(f"the given surface is damaged: {text}")
+        raise ValueError(f"the given surface is damaged: {words}")
 
 
 def _workarounds(archive: Archive, header: Mapping[str, Any], p: int) -> tuple[Workaround, ...]:
-    sizes = [_whole(size) for _, size, _, _ in header["workarounds"]]
+    listed = field(header, "workarounds", list_of(row_of(text, whole, optional(text), whole)))
+    sizes = [size for _, size, _, _ in listed]
     points = _array(archive, "workarounds", "i", (sum(sizes),))
     require(((points >= 0) & (points < p)).all(), "a workaround is not at a point")
+    for _, _, kind, _ in listed:
+        require(kind is None or kind in Kind.__members__, f"{kind} is not a kind of workarounds")
     parts = np.split(points, np.cumsum(sizes))
     return tuple(
-        Workaround(str(text), part, kind and Kind[kind], _whole(count))
-        for (text, _, kind, count), part in zip(header["workarounds"], parts, strict=False)
+        Workaround(words, part, None if kind is None else Kind[kind], count)
+        for (words, _, kind, count), part in zip(listed, parts, strict=False)
     )
 
 
-def _add(data: Any, name: Any, values: Any, parts: Any) -> None:
+def _add(data: Any, name: str | None, values: Any, parts: int) -> None:
     """Add an array of numbers, or a list of texts in *parts* components."""
-    require(name is None or isinstance(name, str), "names of arrays must be text")
     if isinstance(values, list):
-        require(_whole(parts) > 0 and len(values) % parts == 0, f"{name} has missing texts")
+        require(len(values) % parts == 0, f"{name} has missing texts")
         stored = vtkStringArray()
         stored.SetName(name)
         stored.SetNumberOfComponents(parts)
         stored.SetNumberOfValues(len(values))
-        for k, text in enumerate(values):
-            stored.SetValue(k, text)
+        for k, words in enumerate(values):
+            stored.SetValue(k, words)
         data.VTKObject.AddArray(stored)
     elif name is None:
+        require(values.dtype.kind in "iuf", "an array of its type needs a name")
         data.VTKObject.AddArray(pv.convert_array(values, deep=True))
     else:
         data.set_array(values, name, deep_copy=True)
 
 
-def _values(archive: Archive, number: str, kind: Any, shape: Any) -> Any:
-    require(isinstance(kind, str) and isinstance(shape, list), "arrays need a type and a shape")
+def _values(archive: Archive, number: str, kind: str, shape: list[int]) -> Any:
     if kind != _TEXT:
         return _array(archive, number, kind, tuple(shape))
-    n_texts, n_bytes = shape
+    n_texts, n_bytes = row_of(whole, whole)(shape, "the shape of texts")
     ends = _ends(archive, f"{number}_ends", n_texts, n_bytes)
     content = _array(archive, number, "u1", (n_bytes,)).tobytes()
     pairs = itertools.pairwise([0, *ends.tolist()])
     return [content[a:b] for a, b in pairs]
 
 
-def _ends(archive: Archive, name: str, count: Any, total: Any) -> IntArray:
+def _ends(archive: Archive, name: str, count: int, total: int) -> IntArray:
     """Return where *count* parts of *total* items end."""
     ends: IntArray = _array(archive, name, "i", (count,))
     in_order = (np.diff(np.insert(ends, 0, 0)) >= 0).all()
@@ -177,13 +186,8 @@ def _ends(archive: Archive, name: str, count: Any, total: Any) -> IntArray:
     return ends
 
 
-def _array(archive: Archive, name: str, kind: Any, shape: tuple[Any, ...]) -> Any:
-    return archive.array(f"surface_{name}", kind, tuple(_whole(size) for size in shape))
-
-
-def _whole(value: Any) -> int:
-    require(type(value) is int and value >= 0, f"{value!r} is not a size")
-    return int(value)
+def _array(archive: Archive, name: str, kind: str, shape: tuple[int, ...]) -> Any:
+    return archive.array(f"surface_{name}", kind, shape)
 
 
 def _bytes(text: str | bytes) -> bytes:

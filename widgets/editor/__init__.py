@@ -77,6 +77,7 @@ from .panel_actions import (
     toggle_projection,
     with_radius,
     with_up,
+    write_posed,
 )
 from .session_file import (
     MESH_FILES,
@@ -156,4 +157,5 @@ __all__ = [
     "toggle_regions",
     "with_radius",
     "with_up",
+    "write_posed",
 ]

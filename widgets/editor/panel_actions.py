@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from vtk_segdeform.errors import RegionError, SessionError
+from vtk_segdeform.session import Session
 
 from ..region_selector import Paint
 from .actions import Action, fit_cages, once_settled, segment, toggle_volume
@@ -216,13 +217,19 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        with _warnings() as remarks:
-            session.write_deformed(path)
+        remarks = write_posed(session, path)
         saved = f"Mesh saved to {path}{controller.pose_remark}"
-        controller.say(". ".join([saved, *map(_shortened, remarks)]))
+        controller.say(". ".join([saved, *remarks]))
         then()
 
     return once_settled(export)
+
+
+def write_posed(session: Session, path: Path) -> list[str]:
+    """Write the surface in its pose, and return what the format cannot store, in sentences."""
+    with _warnings() as remarks:
+        session.write_deformed(path)
+    return [_shortened(remark) for remark in remarks]
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from vtk_segdeform.files import replacing
 from vtk_segdeform.io import is_mesh_file, writable_suffixes
 from vtk_segdeform.session import save_session
 
-from ..editor import DeformEditor, opening
+from ..editor import DeformEditor, opening, write_posed
 
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
@@ -152,7 +152,9 @@ class Transfer:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if place.suffix != _SESSION:
-            session.write_deformed(place)
+            remarks = write_posed(session, place)
+            if remarks:
+                editor.controller.say(". ".join(remarks))
             return
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)

@@ -223,3 +223,13 @@ def test_the_seam_of_a_surface_with_one_side_does_not_show(open_editor):
         assert (np.abs(one - other).max(axis=2) > 12).mean() < 2e-4
     for one, other in pairwise(seen[0]):
         assert (np.abs(one - other).max(axis=2) > 12).mean() > 0.02
+
+
+def test_digits_that_a_format_loses_are_said(tmp_path):
+    given = bottle()
+    given.points = np.asarray(given.points, dtype=float) + [500_000.0, 5_400_000.0, 300.0]
+    scene = Scene(given)
+    scene.editor.do(exporting(tmp_path / "bottle.stl"))
+    assert "STL stores single precision: vertices moved by up to 0.25" in scene.editor.status
+    scene.editor.do(exporting(tmp_path / "bottle.glb"))
+    assert "precision" not in scene.editor.status

@@ -187,7 +187,7 @@ def test_a_huge_file_a_pipe_and_a_device_are_refused_at_once(tmp_path):
     view = plain_view((50, 50))
     with open(tmp_path / "huge.txt", "wb") as file:
         file.truncate(45_000_000_000)
-    with pytest.raises(SessionError, match=r"huge\.txt: exceeds the limit of 67,108,864 bytes"):
+    with pytest.raises(SessionError, match=r"huge\.txt: .*has 45 GB; the limit is"):
         replay(view, tmp_path / "huge.txt")
     if os.name == "posix":
         os.mkfifo(tmp_path / "pipe")

@@ -25,7 +25,7 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 
 from ...errors import MeshError
-from ...files import file_inside
+from ...files import file_inside, read_regular
 
 _TYPES = {5120: "i1", 5121: "u1", 5122: "i2", 5123: "u2", 5125: "u4", 5126: "f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -200,7 +200,7 @@ class Document:
                 f"buffer {number} refers to {uri[:200]!r}, which is not a file in the "
                 "model's folder; copy it there"
             )
-        return file.read_bytes()
+        return read_regular(file)
 
     def file_of(self, uri: str) -> Path | None:
         """Return the file in the model's folder to which a URI refers; None if there is none."""

@@ -6,6 +6,7 @@ import logging
 from typing import Any
 
 from ...errors import MeshError
+from ...files import read_regular
 from .buffers import Document, copied, glb_of, objects, whole
 
 _log = logging.getLogger(__name__)
@@ -73,7 +74,11 @@ def _embed_images(document: Document, head: dict[str, Any], binary: bytearray) -
             _log.warning("image %r is not a file in the model's folder", image["uri"][:200])
             continue
         if str(file) not in views:
-            data = file.read_bytes()
+            try:
+                data = read_regular(file)
+            except OSError as fault:
+                _log.warning("image %r: %s", image["uri"][:200], fault.strerror)
+                continue
             binary += b"\0" * (-len(binary) % 8)
             view = {"buffer": 0, "byteOffset": len(binary), "byteLength": len(data)}
             binary += data

@@ -21,6 +21,7 @@ import pyvista as pv
 from ...arrays import FloatArray
 from ...errors import MeshError
 from ...geometry import NormalTransport
+from ..array_names import warn_of_rounding
 from ..polygons import polygons_of
 from .accessors import Accessors
 from .buffers import Document, copied, glb_of, object_, objects
@@ -81,7 +82,13 @@ def moved_document(data: bytes, surface: pv.PolyData) -> bytes | None:
         change = _local(document, block, {key: new for key, (_, new) in here.items()})
         shown = changes.setdefault(block.mesh, {}).setdefault(block.node, {})
         shown[_key(block.attributes)] = change
-    return _written(document, changes) if changes else data
+    if not changes:
+        return data
+    written = _written(document, changes)
+    stored = np.concatenate([block.points for block in scene_of(Document(written))[0]])
+    faces = corners.reshape(-1, 3)
+    warn_of_rounding("glTF stores single precision", faces, points, stored)
+    return written
 
 
 def _key(attributes: dict[str, Any]) -> str:

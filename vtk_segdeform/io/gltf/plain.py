@@ -1,7 +1,8 @@
 """A new glTF document of any surface.
 
-points      positions in single precision; normals, texture coordinates, "RGB" or "RGBA", and
-arrays whose names begin with "_"
+points      positions in single precision, relative to the middle of a surface that is farther from
+            the origin than its size: the translation of its node; normals, texture coordinates,
+            "RGB" or "RGBA", and arrays whose names begin with "_"
 corners     "TextureCorners" and "NormalCorners": points are doubled where these differ
 cells       triangles; those of one "Material" are one primitive
 """
@@ -16,7 +17,7 @@ import pyvista as pv
 
 from ...arrays import IntArray
 from ...errors import MeshError
-from ..array_names import warn_left_out
+from ..array_names import warn_left_out, warn_of_rounding, warn_renamed
 from ..groups import MATERIAL, groups_of, names_key
 from ..moving import CORNER_NORMALS
 from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of
@@ -36,12 +37,15 @@ def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
     if not (np.abs(points) < _LARGEST).all():
         raise MeshError("has positions that glTF cannot store: NaN, infinite or over 3e38")
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": [DOCUMENT]}
-    attributes, of_corner = _vertices(surface, counts, corners, points, kept)
+    origin = _origin_of(points)
+    attributes, of_corner = _vertices(surface, counts, corners, points - origin, kept)
     slots, polygon = cut_into_triangles(points[corners], counts, np.arange(len(corners)))
     if len(polygon) > len(counts):
         _log.warning("glTF has no polygons: they are cut into triangles")
     material, names = _materials(surface, kept)
     warn_left_out("glTF", surface, kept)
+    stored = (points - origin).astype("f4") + origin
+    warn_of_rounding("glTF stores single precision", corners[slots], points, stored)
     numbers = material[cells_of(surface)][polygon] if names else np.zeros(len(slots), dtype=int)
     document = _Document()
     accessors = {name: document.vertices(name, values) for name, values in attributes.items()}
@@ -51,9 +55,23 @@ def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
         primitive = {"attributes": accessors, "indices": document.indices(faces)}
         primitives.append(primitive | ({"material": int(number)} if names else {}))
     document.head["meshes"] = [{"primitives": primitives}]
+    if origin.any():
+        document.head["nodes"][0]["translation"] = origin.tolist()
     if names:
         document.head["materials"] = [{"name": name} for name in names]
     return document.head, bytes(document.binary)
+
+
+def _origin_of(points: Any) -> Any:
+    """Return the translation (3,) of the node, itself in single precision, which readers may use.
+
+    Zero unless the points are farther from the origin than from each other.
+    """
+    if not len(points):
+        return np.zeros(3)
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (0.5 * low + 0.5 * high).astype(np.float32).astype(float)
+    return middle if np.abs(middle).max() > np.linalg.norm(high - low) else np.zeros(3)
 
 
 def _vertices(
@@ -121,7 +139,10 @@ def _materials(surface: pv.PolyData, kept: dict[str, list[str]]) -> tuple[Any, l
         return None, []
     kept["cell"].append(MATERIAL)
     kept["field"].append(names_key(MATERIAL))
-    return found
+    values, names = found
+    named = [name or f"material {k}" for k, name in enumerate(names)]  # as it would be read
+    warn_renamed("material", dict(zip(names, named, strict=True)))
+    return values, named
 
 
 class _Document:
