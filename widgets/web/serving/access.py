@@ -89,8 +89,8 @@ class Access:
         @web.middleware
         async def checked(request: web.Request, handler: Handler) -> web.StreamResponse:
             hosts = request.headers.getall(hdrs.HOST, [])
-            named = request.rel_url.raw_authority or request.headers.get(hdrs.HOST, "")
-            if len(hosts) != 1 or not (self._is_ours(hosts[0]) and self._is_ours(named)):
+            # `request.host` is the one in the address, if the request has a whole address.
+            if len(hosts) != 1 or not all(map(self._is_ours, (hosts[0], request.host))):
                 refuse(403, "This server does not answer under this host name.")
             if request.method == hdrs.METH_POST or hdrs.UPGRADE in request.headers:
                 origins = request.headers.getall(hdrs.ORIGIN, [])

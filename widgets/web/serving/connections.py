@@ -54,8 +54,9 @@ class Connections:
         while True:
             await asyncio.sleep(0.5 * self._limits.patience)
             waiting = self._waiting()
-            for transport in self._late.intersection(waiting):
-                transport.abort()
+            for transport in waiting:
+                if transport in self._late:
+                    transport.abort()
             self._late = set(waiting)
 
     def _waiting(self) -> list[asyncio.WriteTransport]:
