@@ -21,7 +21,7 @@ import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonCore import vtkStringArray
 
-from ..arrays import BoolArray, FloatArray, IntArray, bounds_of
+from ..arrays import FloatArray, IntArray, bounds_of
 from ..errors import MeshError
 from ..geometry import signed_volume
 
@@ -239,7 +239,7 @@ def warn_of_rounding(what: str, faces: IntArray, meant: FloatArray, stored: Floa
     meant, stored : (n, 3) float
         The vertices: as they should be, and as a reader finds them in the file.
     """
-    finite: BoolArray = (np.isfinite(meant) & np.isfinite(stored)).all(axis=1)
+    finite = np.asarray((np.isfinite(meant) & np.isfinite(stored)).all(axis=1))
     faces = faces if finite.all() else faces[finite[faces].all(axis=1)]
     used = np.zeros(len(meant), dtype=bool)
     used[faces] = True
