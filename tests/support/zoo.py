@@ -258,7 +258,7 @@ FAULTY = [
     Creature("text", lambda: (body()[0].astype(str), body()[1]), "vertices must contain numbers", False, False),
     Creature("complex numbers", lambda: (body()[0] + 1j, body()[1]), "vertices must contain numbers", False, False),
     Creature("ragged lists", lambda: ([[0, 0, 0], [1, 0]], [[0, 1, 1]]), "rows differ in length", False, False),
-    Creature("None", lambda: (None, None), "needs vertices and faces", False, False),
+    Creature("None", lambda: (None, None), "vertices must", False, False),
 ]  # fmt: skip
 
 # Points in no face are refused by a mesh only.
