@@ -85,7 +85,7 @@ def test_objects_of_vtk_are_taken_everywhere(tmp_path, name):
     assert read_polydata(tmp_path / "a.vtp").n_cells == n * 32
     with pytest.raises(MeshError, match=r"Make one with .* or Surface\(polydata\)\.mesh$"):
         sd.segment(given, 2)
-    with pytest.raises(ArgumentError, match=r"vertices and faces; got .*Surface\(polydata\)\.mesh"):
+    with pytest.raises(ArgumentError, match=r"faces \(m, 3\); got .*Surface\(polydata\)\.mesh"):
         sd.Mesh(given)
 
 

@@ -27,8 +27,25 @@ def in_haste() -> Iterator[None]:
 
 @pytest.fixture
 def unpainted(monkeypatch):
-    """Leave the view blank, which is slow to draw: for tests of files, menus and dialogs."""
-    monkeypatch.setattr(QVTKRenderWindowInteractor, "paintGL", lambda _: None)
+    """Leave the view blank, which is slow to draw: for tests of files, menus and dialogs.
+
+    PySide keeps the method that a widget was first painted by, so it is replaced for good.
+    """
+    monkeypatch.setattr(_Painting, "is_on", False)
+
+
+class _Painting:
+    """Whether views are painted."""
+
+    is_on = True
+
+
+def _painted_if_wanted(self, _paint=QVTKRenderWindowInteractor.paintGL):
+    if _Painting.is_on:
+        _paint(self)
+
+
+QVTKRenderWindowInteractor.paintGL = _painted_if_wanted
 
 
 @pytest.fixture(autouse=True)
