@@ -120,6 +120,7 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     from vtk_segdeform.widgets.recording import Recorder, replay
 
     editor = web.editor
+    editor.mode = Mode.PULL
     session = web.session
     start, steps = Session(session.mesh, state=session.state), session.position
     web.plotter.render_window.Render()
@@ -141,6 +142,7 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     assert session.position == steps + 1
     again = DeformEditor(plain_view(), start)
     again.On()
+    again.mode = Mode.PULL
     settle(again)
     replay(again.view, recorder.lines, busy=lambda: again.is_busy)
     settle(again)

@@ -189,9 +189,13 @@ class Slow:
         yield self._half
 
 
-def test_two_clients_upload_at_once_and_one_client_one_after_the_other(server, guest, do):
+def test_two_clients_upload_at_once_and_one_client_one_after_the_other(do, tmp_path):
     async def story():
-        other = server[1]()
+        async with serving(tmp_path) as (_, visitor):  # without a page that was left
+            await at_once(visitor(), visitor())
+
+    async def at_once(guest, other):
+        await guest.enter()
         await other.enter()
         bodies = Slow(60_000), Slow(40_000)
         both = [
