@@ -1011,7 +1011,7 @@ def test_only_a_mode_is_accepted(bench):
 
 
 def test_only_a_session_or_a_mesh_can_be_edited():
-    with pytest.raises(ValueError, match="a Session or a Mesh; got 'cactus"):
+    with pytest.raises(ValueError, match="a Session, a Surface or a Mesh; got 'cactus"):
         DeformEditor(plain_view(), "cactus.obj")
 
 
