@@ -49,7 +49,7 @@ def body():
     surface.cell_data["part"] = np.arange(7, dtype="i4")
     for key in ("Material", "Group"):
         surface.cell_data[key] = np.array([0, 0, 1, 1, 1, 2, 2])
-        set_names(surface, f"{key}Names", ["skin", "Größe", "third one"])
+        set_names(surface, f"{key}Names", ["skin", "Größe", "third_one"])
     return surface
 
 

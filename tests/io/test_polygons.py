@@ -296,6 +296,8 @@ def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
     assert_array_equal(cells_of(given), [2, 3, 4, 4, 5])
     assert rows(counts, corners)[:2] == [[0, 1, 2], [4, 5, 6, 7]]
     assert rows(np.array([2, 2]), np.arange(4)) == [[0, 1], [2, 3]]
+    assert rows(np.array([3]), np.arange(3)) == [[0, 1, 2]]
+    assert rows(np.array([3, 2]), np.arange(5)) == [[0, 1, 2], [3, 4]]
     assert rows(np.array([], int), np.array([], int)) == []
     again = polydata_of(points, counts, corners)
     assert_array_equal(again.faces, [3, 0, 1, 2, 4, 4, 5, 6, 7, 3, 0, 1, 2, 3, 2, 1, 3, 3, 7, 6, 5])

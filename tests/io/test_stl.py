@@ -202,10 +202,11 @@ def test_named_solids_are_groups_of_one_welded_mesh_and_keep_their_names(tmp_pat
         again = read_polydata(tmp_path / f"{k}{suffix}")
     assert_array_equal(again.points, 2 * given.points)
     assert_array_equal(again.faces, given.faces)
-    assert names_of(again) == names_of(given)
+    # In STL a name is one word: MeshLab loses triangles after others.
+    assert names_of(again) == [name.replace(" ", "_") for name in names_of(given)]
     text = (tmp_path / f"{len(way) - 1}.stl").read_text(encoding="utf-8")
     lines = [line for line in text.split("\n") if "solid" in line]
-    assert lines == ["solid inlet", "endsolid inlet", "solid outer wall", "endsolid outer wall"]
+    assert lines == ["solid inlet", "endsolid inlet", "solid outer_wall", "endsolid outer_wall"]
     assert len(pv.read(tmp_path / f"{len(way) - 1}.stl").points) == 6
     if ".obj" in way:
         text = (tmp_path / f"{way.index('.obj')}.obj").read_text(encoding="utf-8")
@@ -226,7 +227,7 @@ def test_text_has_all_digits_and_the_order_of_the_triangles(tmp_path):
     again = read_polydata(tmp_path / "a.stl")
     assert_array_equal(again.points, binary.points)
     assert_array_equal(again.faces, binary.faces)
-    written = {"a": "a", "b\nsolid c": "b_solid c_1", "b_solid c": "b_solid c",
+    written = {"a": "a", "b\nsolid c": "b_solid_c", "b_solid c": "b_solid_c_1",
                "Größe": "Gr__e_1", "Gr__e": "Gr__e"}  # fmt: skip
     assert names_of(again) == [written[name] for name in names_of(surface)]
 
@@ -238,7 +239,7 @@ def test_objects_become_solids_and_arrays_of_binary_files_are_told(tmp_path, cap
     surface.cell_data["Attribute"] = np.arange(8, dtype=np.uint16)
     write_mesh(tmp_path / "a.stl", surface)
     assert "a text STL cannot store cell array 'Object', cell array 'Attribute'" in caplog.text
-    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"inlet", "outer wall"}
+    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"inlet", "outer_wall"}
     del surface.cell_data["Group"]
     write_mesh(tmp_path / "a.stl", surface)
     assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"above", "below"}

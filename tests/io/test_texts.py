@@ -22,7 +22,6 @@ import vtk_segdeform as sd
 from vtk_segdeform.io.array_names import set_names, storable
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 
-pytestmark = pytest.mark.usefixtures("vtk_in_process")
 FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtp", ".vtu", ".vtk", ".vtkhdf"]
 TEXTS = [
     "\0", "a\0b", "a\nb", "a\r\nb", "a\tb", "\x1b[31mred\x1b[0m", "%00", "%41", "\"'<&>", "]]>",

@@ -210,8 +210,10 @@ def write_stl(path: Path, surface: pv.PolyData) -> None:
 
 def _write_text(path: Path, rows: Any, group: IntArray, names: list[str]) -> None:
     """Write triangles of `_ROW` as text; a solid ends where the *group* (m,) changes."""
-    # MeshLab takes a file with other letters for a binary one.
-    written = plain_names(names, refused="".join(c for c in "".join(names) if not c.isascii()))
+    # MeshLab takes a file with other letters for a binary one, and loses triangles after names of
+    # several words, of which OpenFOAM reads the first.
+    refused = {letter for letter in "".join(names) if not letter.isascii() or letter.isspace()}
+    written = plain_names(names, refused="".join(refused))
     warn_renamed("group", written)
     values = np.column_stack([rows["normal"], rows["corners"].reshape(-1, 9)])
     ends = [*(np.flatnonzero(np.diff(group)) + 1).tolist(), len(rows)]

@@ -14,7 +14,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 from ..errors import MeshError
-from .array_names import decoded
+from .array_names import storable
 
 _CELLS = ("verts", "lines", "polys", "strips")
 
@@ -78,7 +78,7 @@ def _add_arrays(attributes: Any, part: dict[str, Any], sort: str, count: int | N
     while f"{sort}/{k}/name" in part:
         begin = f"{sort}/{k}/"
         each = {key.removeprefix(begin): part[key] for key in part if key.startswith(begin)}
-        name, width = _text(each["name"]), int(each["width"][0])
+        name, width = _text(each["name"].tobytes()), int(each["width"][0])
         array = _texts(each) if "lengths" in each else _numbers(each)
         array.SetName(name)
         if "lengths" in each:
@@ -91,7 +91,7 @@ def _add_arrays(attributes: Any, part: dict[str, Any], sort: str, count: int | N
             names = each["components"].tobytes().split(b"\0")
             for j, component in enumerate(names[: array.GetNumberOfComponents()]):
                 if component:
-                    array.SetComponentName(j, decoded(component))
+                    array.SetComponentName(j, _text(component))
         place = attributes.AddArray(array)
         for use in each["uses"].tolist():
             attributes.SetActiveAttribute(place, use)
@@ -111,10 +111,13 @@ def _texts(each: dict[str, Any]) -> vtkStringArray:
     array, ends = vtkStringArray(), np.cumsum(each["lengths"])
     data = each["values"].tobytes()
     for start, end in zip((ends - each["lengths"]).tolist(), ends.tolist(), strict=True):
-        # A null character ends a text for VTK, and crashes its reader of XML.
-        array.InsertNextValue(decoded(data[start:end]).replace("\0", "\ufffd"))
+        array.InsertNextValue(_text(data[start:end]))
     return array
 
 
-def _text(values: Any) -> str:
-    return decoded(values.tobytes())
+def _text(data: bytes) -> str:
+    """Return a text of VTK, which may have any bytes and a mark of UTF-8 that belongs to it."""
+    try:
+        return storable(data.decode())
+    except UnicodeDecodeError:
+        return storable(data)

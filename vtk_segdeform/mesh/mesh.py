@@ -75,7 +75,10 @@ class Mesh(Frozen):
     def __init__(self, vertices: ArrayLike, faces: ArrayLike | None = None) -> None:
         if faces is None:
             line = _made_with(vertices)
-            raise ArgumentError(f"a Mesh needs vertices and faces; got {shown(vertices)}. {line}")
+            got = shown(vertices)
+            raise ArgumentError(
+                f"vertices must be points (n, 3), followed by faces (m, 3); got {got}. {line}"
+            )
         self._set(Search(*as_soup(vertices, faces)))
 
     @classmethod
