@@ -48,7 +48,7 @@ bench-history: $(VENV)/installed
 # Workers keep the tests of a file together, so that its fixtures are created once, and take over
 # tests of others when they have finished.  Without bytecode files, every worker and every child
 # process would compile all modules again.
-test: export PYTHONDONTWRITEBYTECODE :=
+test test-lowest test-newest: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 

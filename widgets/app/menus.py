@@ -32,6 +32,9 @@ class Menus:
     def __init__(self, window: Any) -> None:
         self._window = window
         self._need_mesh: list[Any] = []
+        # PySide6 before 6.11.2 drops a menu, with its entries, that was asked for from an action of
+        # which no reference is left.
+        self._kept: list[Any] = []
         self._file()
         self._edit()
         self._view()
@@ -46,7 +49,7 @@ class Menus:
     def _file(self) -> None:
         window, menu = self._window, self._menu("&File")
         self._add(menu, "&Open ...", window.ask_and_open, _Keys.Open)
-        self.recent = menu.addMenu("Open &recent")
+        self.recent = self._kept_menu(menu, "Open &recent")
         self.recent.aboutToShow.connect(self._update_recent)
         repair = self._add(menu, "Re&pair and open ...", window.repair)
         self._need_mesh.append(repair)
@@ -124,7 +127,12 @@ class Menus:
     # Pieces.
 
     def _menu(self, title: str) -> Any:
-        return self._window.menuBar().addMenu(title)
+        return self._kept_menu(self._window.menuBar(), title)
+
+    def _kept_menu(self, parent: Any, title: str) -> Any:
+        menu = parent.addMenu(title)
+        self._kept.append(menu.menuAction())
+        return menu
 
     def _add(self, menu: Any, text: str, call: Callable[[], object], keys: Any = None) -> Any:
         action = menu.addAction(text)
