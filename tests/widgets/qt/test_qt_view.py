@@ -186,7 +186,9 @@ def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(models, "cactus", lambda _: MESH)
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
     soon = functools.partial(later, 50)  # instead of a second
-    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: soon(do))
+    # Windows of other tests may be open, so that closing this one would not end the loop.
+    ended = lambda do: soon(lambda: (do(), app.quit()))  # noqa: E731
+    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
     limit = QtCore.QTimer()
     limit.setSingleShot(True)
     limit.timeout.connect(app.quit)
