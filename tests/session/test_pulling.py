@@ -667,6 +667,15 @@ def test_the_error_of_a_point_pulled_on_a_finished_pose_is_that_of_the_mesh(fini
     assert off < (1e-12 if finishes_again else 1e-3)
 
 
+def test_a_finish_begins_with_the_error_of_the_pulled_point():
+    session = ready()
+    to = INSIDE.at(X) + 3.0 * UP
+    session.pull(INSIDE, to)
+    session.commit()
+    off = np.linalg.norm(INSIDE.at(session.vertices) - to) / D
+    assert session.finishing().start.handle_error == pytest.approx(off, rel=0.01, abs=1e-9)
+
+
 def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
     session, place = ready(), INSIDE.at(X)
     session.pull(INSIDE, place + UP)
