@@ -31,7 +31,7 @@ from ..errors import ConstraintError
 from ..files import open_regular
 
 _LEG = 0.5 * math.pi  # between targets on the way of a far rotation, at most
-_MOST_TURNS = 10.0  # each takes four solves; no body follows so many, so more is a typing error
+_MOST_TURNS = 10.0  # each takes four solves: beyond that a typing error is more likely
 _LARGEST_FILE = 1 << 20  # bytes of 16 numbers and comments
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
