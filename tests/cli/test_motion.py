@@ -55,6 +55,12 @@ def test_a_rotation_that_is_none_is_refused(text):
         motion.parse_rotation(text)
 
 
+def test_a_rotation_has_a_limited_number_of_turns():
+    assert motion.parse_rotation("z,-3600")[1] == pytest.approx(-20 * math.pi)
+    with pytest.raises(ConstraintError, match="limited to 10 turns, 3600 degrees; got 'z,1e6'"):
+        motion.parse_rotation("z,1e6")
+
+
 @pytest.mark.parametrize("text", ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3", "nan,0,0"])
 def test_a_vector_that_is_none_is_refused_by_name(text):
     with pytest.raises(ConstraintError, match="translate must be"):

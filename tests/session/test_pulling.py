@@ -651,6 +651,31 @@ def test_the_finish_of_a_pulled_point_of_a_face_keeps_it_at_its_target():
     assert session.solution.handle_error < 1e-3
 
 
+@pytest.mark.parametrize("finishes_again", [False, True])
+def test_the_error_of_a_point_pulled_on_a_finished_pose_is_that_of_the_mesh(finishes_again):
+    session, place = ready(), INSIDE.at(X)
+    session.pull(INSIDE, place + 3.0 * UP)
+    session.commit()
+    session.finish()
+    to = INSIDE.at(session.vertices) + UP[::-1]
+    solution = session.pull(INSIDE, to)
+    if finishes_again:
+        session.commit()
+        solution = session.finish()
+    off = np.linalg.norm(INSIDE.at(session.vertices) - to) / D
+    assert solution.handle_error == pytest.approx(off, rel=0.01, abs=1e-12)
+    assert off < (1e-12 if finishes_again else 1e-3)
+
+
+def test_a_finish_begins_with_the_error_of_the_pulled_point():
+    session = ready()
+    to = INSIDE.at(X) + 3.0 * UP
+    session.pull(INSIDE, to)
+    session.commit()
+    off = np.linalg.norm(INSIDE.at(session.vertices) - to) / D
+    assert session.finishing().start.handle_error == pytest.approx(off, rel=0.01, abs=1e-9)
+
+
 def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
     session, place = ready(), INSIDE.at(X)
     session.pull(INSIDE, place + UP)

@@ -31,6 +31,7 @@ from ..errors import ConstraintError
 from ..files import open_regular
 
 _LEG = 0.5 * math.pi  # between targets on the way of a far rotation, at most
+_MOST_TURNS = 10.0  # each takes four solves: beyond that a typing error is more likely
 _LARGEST_FILE = 1 << 20  # bytes of 16 numbers and comments
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
@@ -69,6 +70,11 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
     length = float(np.linalg.norm(axis))
     if len(axis) != 3 or len(numbers) != 1 or length == 0.0:
         raise ConstraintError(f"rotate must be {form} (z,60 or 1,0,1,60); got {text!r}")
+    if abs(numbers[0]) > 360.0 * _MOST_TURNS:
+        raise ConstraintError(
+            f"rotate is limited to {_MOST_TURNS:.0f} turns, {360.0 * _MOST_TURNS:.0f} degrees; "
+            f"got {text!r}"
+        )
     return axis / length, math.radians(numbers[0])
 
 

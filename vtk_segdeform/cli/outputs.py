@@ -72,7 +72,7 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
     status = str(solution.status)
     if solution.is_finished and solution.status is Status.STEP_LIMIT:
         remaining = f"{100 * solution.remaining:.1g} % of model size"
-        status = f"not fully converged: finished further, it would move by about {remaining}"
+        status = f"not fully converged: to finish it again would move it by {remaining} or more"
     say(f"status          {status}")
     advice = _ADVICE if avoids_contact else f"{_ADVICE}, or use --avoid-contact"
     crossings, folds = len(solution.crossings()), len(solution.folds())

@@ -101,6 +101,7 @@ class PoseSolver:
         self._bound: tuple[tuple[State, Deformer], ...] = ()  # newest first
         self._constrained: tuple[Deformer, State, FloatArray | None, Deformer] | None = None
         self._local: tuple[Deformer, Locality, Deformer] | None = None
+        self._pressed: tuple[Locality, FloatArray] | None = None
         self._current: Pose | None = None  # pose of the deformer in use; None if unknown
         self._aim: _Aim | None = None  # of the current pose, if that has reached its targets
         self._used: Deformer | None = None
@@ -277,13 +278,7 @@ class PoseSolver:
         if aim is None:
             return pose, solution
         reached = None if solution.targets is None else solution.targets + aim.shift
-        ids = deformer.handle, deformer.fixed
-        errors = partial(
-            errors_at, ids, (wanted, _fixed_at(self._mesh, state)), self._mesh.diagonal
-        )
-        if state.locality is not None and not state.locality.point.is_vertex:
-            own = solution.errors(self._surface(state, cages))  # targets are those of the cages
-            return pose, replace(solution, errors=lambda _: own, targets=reached)
+        errors = partial(self._errors, state, deformer, wanted, self._beside(state))
         return pose, replace(solution, errors=errors, targets=reached)
 
     def finish(self, state: State, pose: Pose) -> Finish:
@@ -307,8 +302,8 @@ class PoseSolver:
         if state.locality is not None:
             at_press = self._known_surface(state, state.locality)
             deformer = localised(deformer, state.locality, at_press)
-        ids, wanted = (deformer.handle, deformer.fixed), _stacked(pose.targets)
-        places, (_, volume) = (wanted, _fixed_at(self._mesh, state)), self._enclosed(state)
+        wanted, (_, volume) = _stacked(pose.targets), self._enclosed(state)
+        beside = self._beside(state)
         rest, faces = self._mesh.vertices, self._mesh.faces
         start = Solution(
             vertices=x,
@@ -316,14 +311,19 @@ class PoseSolver:
             steps=0,
             status=Status.STEP_LIMIT if is_further else Status.CONVERGED,
             merits=(),
-            errors=partial(errors_at, ids, places, self._mesh.diagonal),
+            errors=partial(self._errors, state, deformer, wanted, beside),
             volume=partial(volume.relative, x),
             region_volumes=lambda _: np.empty(0),
             crossed=partial(new_crossings, rest=rest, faces=faces),
             folded=partial(turned_over, rest=rest, faces=faces),
             unfinished=x if is_further else None,
         )
-        return Finish(deformer.copy(), pose, wanted, shift, start)
+        aims = np.array(wanted)
+        if state.locality is not None and beside is not None:  # where the deformer differs
+            point = state.locality.point
+            own = point.at(at_press) - at_press[point.vertex]
+            aims[deformer.handle == point.vertex] += beside - own
+        return Finish(deformer.copy(), pose, aims, shift, start)
 
     def accept(self, before: Pose, after: Pose) -> None:
         """Continue from *after*, which has the same cages as *before* and is finished."""
@@ -472,6 +472,42 @@ class PoseSolver:
         if known and known[0].cage_vertices is cages and known[0].finished is None:
             return known[2]
         return self._surface(state, cages)
+
+    def _beside(self, state: State) -> FloatArray | None:
+        """Return where the pulled point was at the press, from its handle's vertex, (3,).
+
+        On the mesh that was shown.  None if no point of a face is pulled.
+        """
+        pose, locality = state.pose, state.locality
+        if pose is None or locality is None or locality.point.is_vertex:
+            return None
+        point = locality.point
+        if self._pressed is None or self._pressed[0] is not locality:
+            if pose.finished is None:
+                x = self._known_surface(state, locality)
+            elif pose.cage_vertices is locality.cage_vertices:
+                x = pose.finished.vertices
+            else:
+                x = self._moved_on(state, pose, pose.finished, locality.cage_vertices).vertices
+            self._pressed = locality, point.at(x) - x[point.vertex]
+        return self._pressed[1]
+
+    def _errors(
+        self,
+        state: State,
+        deformer: Deformer,
+        wanted: FloatArray,
+        beside: FloatArray | None,
+        x: FloatArray,
+    ) -> tuple[float, ...]:
+        """Return `Solution.handle_error` and `fixed_error` of the mesh at *x* (n, 3)."""
+        places = np.array(wanted)
+        if beside is not None:
+            assert state.locality is not None
+            point = state.locality.point
+            places[deformer.handle == point.vertex] += x[point.vertex] + beside - point.at(x)
+        ids, at = (deformer.handle, deformer.fixed), (places, _fixed_at(self._mesh, state))
+        return errors_at(ids, at, self._mesh.diagonal, x)
 
     def _localise(self, state: State, constrained: Deformer) -> Deformer:
         """Return a deformer that keeps what the last pull of *state* does not reach, if any."""
