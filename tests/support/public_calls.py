@@ -134,7 +134,9 @@ def _calls_of_class(cls: type) -> Iterator[Call]:
         if isinstance(member, property):
             if member.fset is not None:
                 yield Call(label, functools.partial(_setter, cls, name), ("value",), ("value",))
-        elif str(getattr(member, "__module__", "")).startswith("vtk_segdeform"):  # not VTK's own
+        elif callable(member) and str(getattr(member, "__module__", "")).startswith(
+            "vtk_segdeform"
+        ):  # not VTK's own
             yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
 
 
