@@ -187,8 +187,13 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
+    what = f"{draft.suffix} rounds coordinates"
     if len(vertices) == mesh.n_vertices and np.array_equal(faces, mesh.faces):
-        warn_of_rounding(f"{draft.suffix} rounds coordinates", faces, mesh.vertices, vertices)
+        warn_of_rounding(what, faces, mesh.vertices, vertices)
+    elif len(vertices) < mesh.n_vertices:  # rounded to the same place, and merged
+        corners = np.arange(3 * mesh.n_faces).reshape(-1, 3)
+        meant, stored = mesh.vertices[mesh.faces], vertices[faces]
+        warn_of_rounding(what, corners, meant.reshape(-1, 3), stored.reshape(-1, 3))
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:
