@@ -406,7 +406,7 @@ def test_pymeshlab_cannot_open_names_that_are_not_utf_8(tmp_path):
 
 
 @MESHLAB
-def test_rounding_that_merges_vertices_is_told(tmp_path, caplog):
+def test_rounding_is_told_of_formats_that_renumber_vertices(tmp_path, caplog):
     vertices, faces = icosphere(1)
     write_mesh(tmp_path / "a.x3d", Mesh(vertices + (448262.0, 5411932.0, 132.0), faces))
     assert ".x3d rounds coordinates: vertices moved by up to" in caplog.text

@@ -187,13 +187,11 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
-    what = f"{draft.suffix} rounds coordinates"
-    if len(vertices) == mesh.n_vertices and np.array_equal(faces, mesh.faces):
-        warn_of_rounding(what, faces, mesh.vertices, vertices)
-    elif len(vertices) < mesh.n_vertices:  # rounded to the same place, and merged
-        corners = np.arange(3 * mesh.n_faces).reshape(-1, 3)
-        meant, stored = mesh.vertices[mesh.faces], vertices[faces]
-        warn_of_rounding(what, corners, meant.reshape(-1, 3), stored.reshape(-1, 3))
+    place = np.zeros(mesh.n_vertices, dtype=np.int64)  # some formats renumber or merge vertices
+    place[mesh.faces] = faces
+    if np.array_equal(place[mesh.faces], faces):
+        what = f"{draft.suffix} rounds coordinates"
+        warn_of_rounding(what, mesh.faces, mesh.vertices, vertices[place])
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:
