@@ -24,6 +24,7 @@ from vtk_segdeform.files import landlock
 from vtk_segdeform.io import confined, meshlab, reading_child
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
+from vtk_segdeform.io.vtk_formats import _first_message
 
 NAMES = ["<&\">'", "a\nb", "100%", "%3C", "Größe", "身体", "a b"]
 
@@ -369,3 +370,43 @@ def test_no_temporary_files_are_left_behind(tmp_path, monkeypatch, fresh):
     with pytest.raises(MeshError):
         read_mesh(tmp_path / "a.vtkhdf")
     assert [path.name for path in tmp_path.iterdir()] == ["a.vtkhdf"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process that can be stopped")
+def test_a_reader_that_another_program_ends_is_not_blamed_on_the_file(tmp_path, fresh):
+    write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))
+    read_mesh(tmp_path / "a.vtp")
+    process = confined._idle["vtk"]._process.pid
+    os.kill(process, signal.SIGSTOP)  # so that it does not answer
+    timer = threading.Timer(0.1, os.kill, [process, signal.SIGKILL])
+    timer.start()
+    with pytest.raises(MeshError, match=r"another program ended the reader \(SIGKILL\)"):
+        read_mesh(tmp_path / "a.vtp")
+    assert read_mesh(tmp_path / "a.vtp").n_vertices == 8
+
+
+def test_memory_in_use_is_known_without_proc(monkeypatch):
+    pytest.importorskip("resource")
+    monkeypatch.setattr(reading_child, "Path", lambda _: Path("not there"))
+    assert 1 << 20 < reading_child._memory_in_use() < 1 << 40
+
+
+def test_the_first_message_of_vtk_is_not_the_place_of_a_warning():
+    text = "Warning: In vtkDataReader.cxx, line 3034\nvtkDataReader (0x1): Error reading METADATA\n"
+    assert _first_message(MeshError(text)) == "Error reading METADATA"
+
+
+@MESHLAB
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
+def test_pymeshlab_cannot_open_names_that_are_not_utf_8(tmp_path):
+    path = tmp_path / os.fsdecode(b"\xff.x3d")
+    path.write_text(X3D.format(SHAPE))
+    with pytest.raises(MeshError, match="its name is not valid UTF-8"):
+        read_mesh(path)
+
+
+@MESHLAB
+def test_rounding_is_told_of_formats_that_renumber_vertices(tmp_path, caplog):
+    vertices, faces = icosphere(1)
+    write_mesh(tmp_path / "a.x3d", Mesh(vertices + (448262.0, 5411932.0, 132.0), faces))
+    assert ".x3d rounds coordinates: vertices moved by up to" in caplog.text

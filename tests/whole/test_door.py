@@ -127,8 +127,9 @@ def _draws(seed: int, these: list[Call], each: int) -> Iterator[tuple[Call, dict
 
 
 def _check_errors(these: list[Call], seed: int, each: int, fd: int) -> None:
-    faults = [_tried(call, bad, fd) for call, bad in _draws(seed, these, each)]
-    faults = list(filter(None, faults))
+    answers = [_tried(call, bad, fd) for call, bad in _draws(seed, these, each)]
+    faults = list(filter(None, answers))
+    print(f"\n{len(answers)} calls, {len(faults)} faults")
     assert not faults, f"{len(faults)} calls:\n" + "\n".join(faults)
 
 

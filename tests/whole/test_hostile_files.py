@@ -435,10 +435,10 @@ def test_no_false_count_is_accepted(tmp_path):
 
 
 @pytest.mark.campaign
-def test_two_thousand_damaged_files_are_read_or_rejected(tmp_path):
+def test_four_thousand_damaged_files_are_read_or_rejected(tmp_path):
     counts, wrong = Counter(), []
     sound = originals(tmp_path)
-    for seed in range(10):
+    for seed in range(20):
         folder = tmp_path / str(seed)
         folder.mkdir()
         files = mutants(folder, sound, 200, seed=100 + seed)

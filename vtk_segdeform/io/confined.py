@@ -133,6 +133,9 @@ class _Child:
             if is_late.is_set():
                 raise MeshError(f"reading was stopped after {request['seconds']} s") from None
             names = {each.value: each.name for each in signal.Signals}
+            if code < 0:  # the process that waits for requests, which opens no file
+                how = names.get(-code, f"signal {-code}")
+                raise MeshError(f"another program ended the reader ({how}); try again") from None
             how = names.get(code - 128, f"code {code}")
             raise MeshError(
                 f"the reader crashed ({how}); the file is damaged or too large"

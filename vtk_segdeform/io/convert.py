@@ -187,8 +187,11 @@ def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
         raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
     if not complete:
         raise OSError("the written file is incomplete")
-    if len(vertices) == mesh.n_vertices and np.array_equal(faces, mesh.faces):
-        warn_of_rounding(f"{draft.suffix} rounds coordinates", faces, mesh.vertices, vertices)
+    place = np.zeros(mesh.n_vertices, dtype=np.int64)  # some formats renumber or merge vertices
+    place[mesh.faces] = faces
+    if np.array_equal(place[mesh.faces], faces):
+        what = f"{draft.suffix} rounds coordinates"
+        warn_of_rounding(what, mesh.faces, mesh.vertices, vertices[place])
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:

@@ -153,6 +153,10 @@ def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
     path = as_path(path)
     _pymeshlab()
     try:
+        os.fspath(path).encode()
+    except UnicodeEncodeError:
+        raise MeshError(f"{path}: PyMeshLab cannot open it: its name is not valid UTF-8") from None
+    try:
         arrays = read_confined("meshlab", path)
         return _plain(arrays["vertices"].reshape(-1, 3), arrays["faces"])
     except (MeshError, OSError, KeyError, ValueError) as error:

@@ -129,7 +129,11 @@ def answer(
 
 
 def _memory_in_use() -> int:
-    pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
+    try:
+        pages = Path("/proc/self/statm").read_text(encoding="ascii").split()[0]
+    except FileNotFoundError:  # no /proc, as in some containers: less, but not by gigabytes
+        resource: Any = _module("resource")
+        return int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) * 1024
     return int(pages) * int(os.sysconf("SC_PAGE_SIZE"))
 
 

@@ -44,6 +44,7 @@ from .reading_child import without_ranges
 from .vtk_arrays import data_sets
 
 _log = logging.getLogger(__name__)
+_BEGIN_OF_MESSAGE = ("ERROR: In", "Warning: In", "Generic Warning: In")
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
 _XML = frozenset({".vtp", ".vtu"})
 _TITLE, _NO_TITLE = re.compile(rb"[^\n]*\n([^\r\n]{1,255})\r?\n"), "vtk output"
@@ -113,7 +114,7 @@ def _surface(data: pv.DataSet, suffix: str) -> pv.PolyData:
 def _first_message(error: Exception) -> str:
     """Return the first error message of VTK; the others follow from it."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    messages = [line for line in lines if not line.startswith(("ERROR: In", "Generic Warning: In"))]
+    messages = [line for line in lines if not line.startswith(_BEGIN_OF_MESSAGE)]
     return _PREFIX.sub("", messages[0]) if messages else type(error).__name__
 
 
