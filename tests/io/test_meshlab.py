@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import numpy as np
@@ -15,6 +16,7 @@ from solids import icosphere, torus
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.geometry import local_volume_change
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.interpreter import python_command, python_environment
 from vtk_segdeform.io import Surface, meshlab
 from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
@@ -248,3 +250,16 @@ def test_an_unreadable_file_is_an_error_that_names_it(tmp_path):
     (tmp_path / "a.dae").write_text("rubbish")
     with pytest.raises(MeshError, match=r"a\.dae"):
         read_mesh(tmp_path / "a.dae")
+
+
+def test_python_ends_well_after_a_file_was_written_by_pymeshlab(tmp_path):
+    """Where PyMeshLab was imported in another thread, its Qt frees memory twice at the end."""
+    write_mesh(tmp_path / "ball.ply", Mesh(*icosphere(3)))
+    arguments = ["deform", "ball.ply", "-o", "bent.x3d", "--fixed", "z<-0.5", "--handle", "z>0.9",
+                 "--translate", "0.1,0,0"]  # fmt: skip
+    code = f"import sys; from vtk_segdeform.cli import main; sys.exit(main({arguments}))"
+    done = subprocess.run(
+        python_command(code), cwd=tmp_path, env=python_environment(), capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")

@@ -21,6 +21,7 @@ that are not percentages must be wrapped in its ``PureValue``.
 from __future__ import annotations
 
 import contextlib
+import importlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -31,7 +32,6 @@ import numpy as np
 from ..arrays import FloatArray, IntArray, is_whole
 from ..checks import all_of, as_path, require, shown
 from ..errors import ArgumentError, MeshError, MissingDependencyError
-from ..importing import imported
 from ..mesh import Mesh, require_mesh
 from .confined import read_confined
 from .meshlab_layers import (
@@ -248,7 +248,8 @@ def _same_folder() -> Iterator[None]:
 
 def _pymeshlab() -> Any:
     try:
-        return imported("pymeshlab")
+        # In this thread: imported in another one, its Qt frees memory twice when Python ends.
+        return importlib.import_module("pymeshlab")
     except ImportError as error:
         raise MissingDependencyError(
             "this needs PyMeshLab: pip install 'vtk-segdeform[meshlab]', and on Debian "

@@ -17,8 +17,8 @@ values; it ends with an empty name.  The only name of a failed reply is "error".
     k/points  k/verts/offsets  k/verts/corners ... (lines, polys, strips)  k/cells/...  k/types
     k/point/j/name  /values  /lengths (of texts)  /uses  /ids  /components      (cell, field)
 
-It imports nothing of the package but `landlock`, from its folder, and numpy only where it must, so
-that it starts in a fraction of a second.
+Long because it imports nothing of the package but `landlock`, from its folder, and numpy only where
+it must: so it starts in a fraction of a second.
 """
 
 from __future__ import annotations
