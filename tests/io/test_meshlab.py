@@ -259,7 +259,7 @@ def test_python_ends_well_after_a_file_was_written_by_pymeshlab(tmp_path):
                  "--translate", "0.1,0,0"]  # fmt: skip
     code = f"import sys; from vtk_segdeform.cli import main; sys.exit(main({arguments}))"
     done = subprocess.run(
-        python_command(code), cwd=tmp_path, env=python_environment(), capture_output=True, text=True,
-        check=False,
+        python_command(code), cwd=tmp_path, env=python_environment(), capture_output=True,
+        text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
