@@ -23,6 +23,7 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
+from vtk_segdeform.arrays import as_ids
 from vtk_segdeform.checks import as_path, as_text, shown
 from vtk_segdeform.deformer import deform
 from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
@@ -286,9 +287,11 @@ class PolyDataTools:
             As in `vtk_segdeform.deform`; MeshError if no mesh can be made of the surface.
         """
         surface = Surface(self._given)
-        vertices, ends = surface.targets_at(handle, targets)
+        n_points = self._given.n_points
+        stays = surface.vertices_at(as_ids(fixed, n_points, "fixed"))
+        vertices, ends = surface.targets_at(as_ids(handle, n_points, "handle"), targets)
         solution = deform(
-            surface.mesh, surface.vertices_at(fixed), vertices, ends,
+            surface.mesh, stays, vertices, ends,
             n_regions=n_regions, n_cage_vertices=n_cage_vertices,
             preserve_volume=preserve_volume, lids=lids, refine=refine, progress=progress,
         )  # fmt: skip

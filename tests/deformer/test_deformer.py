@@ -14,8 +14,15 @@ from solids import TETRAHEDRON, exact_volume_change, icosphere, rotation
 
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.deformer.deformer import Deformer
-from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionError
+from vtk_segdeform.errors import (
+    ArgumentError,
+    CageError,
+    Cancelled,
+    ConstraintError,
+    RegionError,
+)
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
@@ -483,3 +490,10 @@ def test_loose_specks_around_a_body_do_not_hinder_its_pose(distance):
             axis=2,
         ).argmin(axis=1)
         assert np.abs(specks - moved[reach, None]).max() < 0.1 * mesh.diagonal
+
+
+@pytest.mark.parametrize("number", [[60], "60", np.full(3, 60), 3, 60.5, np.nan])
+def test_the_number_of_cage_vertices_is_named_if_it_is_none(number):
+    mesh = SCENE.mesh
+    with pytest.raises(ArgumentError, match="n_cage_vertices must be a whole number, 4 or more"):
+        deform(mesh, [0], [9], mesh.vertices[[9]], n_cage_vertices=number)

@@ -528,3 +528,11 @@ def test_a_pipe_or_a_device_is_refused_without_blocking(tmp_path):
     for path in (tmp_path / "pipe", "/dev/zero"):
         with pytest.raises(SessionError, match="a device or a pipe"):
             load_session(path)
+
+
+def test_a_view_that_is_no_json_is_refused_by_name(tmp_path):
+    view = {"camera": []}
+    view["camera"].append(view)
+    with pytest.raises(SessionError, match="view must be plain JSON"):
+        save_session(tmp_path / "a.segdeform", Session(SCENE.mesh), view=view)
+    assert not list(tmp_path.iterdir())

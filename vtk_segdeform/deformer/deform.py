@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import sizes
-from ..arrays import FloatArray
+from ..arrays import FloatArray, is_whole
 from ..cages import fit_cages, suggested_size
-from ..checks import as_flag, require_sequence
-from ..errors import Cancelled, ConstraintError, SegDeformError
+from ..checks import as_flag, require_sequence, shown
+from ..errors import ArgumentError, Cancelled, ConstraintError, SegDeformError
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -101,6 +101,10 @@ def deform(
     as_flag(avoid_folds, "avoid_folds")
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
+    if n_cage_vertices is not None and not is_whole(n_cage_vertices, 4):
+        raise ArgumentError(
+            f"n_cage_vertices must be a whole number, 4 or more; got {shown(n_cage_vertices)}"
+        )
     stays, moves = checked_constraints(mesh, fixed, handle)
     if not len(moves):
         raise ConstraintError(

@@ -29,6 +29,7 @@ handles and pose are checked like arguments of a caller.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import struct
@@ -112,6 +113,10 @@ def save_session(
     given = session.surface if as_flag(surface, "surface") else None
     if view is not None:
         require(view, Mapping, "view")
+        try:
+            json.dumps(dict(view))
+        except (TypeError, ValueError, RecursionError) as fault:
+            raise SessionError(f"view must be plain JSON; {fault}") from None
     try:
         with replacing(path) as draft, open(draft, "wb") as file:
             _write(file, session, given, view)
