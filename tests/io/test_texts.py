@@ -163,7 +163,7 @@ def reported(told, name, value):
     of_it = [name, *(value[1] if value and isinstance(value[0], list) else value)]
     kinds = {
         "ObjectNames": "object", "GroupNames": "group", "MaterialNames": "material",
-        "Header": "header",
+        "Header": "header", "MaterialLibrary": "material library",
     }  # fmt: skip
     return any(repr(text) in told for text in of_it) or (
         name in kinds and f"{kinds[name]} " in told
