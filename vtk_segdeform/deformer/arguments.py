@@ -222,7 +222,8 @@ def checked_targets(
     Without vertices, any empty sequence is accepted.
     """
     try:
-        array = as_points(targets, name) if count or np.size(targets) else np.empty((0, 3))
+        is_empty = not count and not plain(targets, name).size
+        array = np.empty((0, 3)) if is_empty else as_points(targets, name)
     except ValueError as fault:
         raise ConstraintError(str(fault)) from None
     if len(array) != count:

@@ -941,7 +941,7 @@ class Deformer:
         """Move towards *goal* by poses *within* a distance of converged ones; return the last."""
         limit = self._options.max_steps if max_steps is None else max_steps
         unit = self._frame.size / self.mesh.diagonal
-        options = replace(self._options, within=within / unit, progress=progress)
+        options = replace(self._options, max_steps=limit, within=within / unit, progress=progress)
         reached, steps, remaining = None, 0, np.inf
         self._aim.share = min(
             self._aim.share, self._longest_leg(min(_largest(goal - self._targets), _CLEARANCE))

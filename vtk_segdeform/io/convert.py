@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import as_points
 from ..cages import Cage
-from ..checks import as_flag, as_path, require, shown
+from ..checks import as_flag, as_path, as_text, require, shown
 from ..errors import ArgumentError, MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
@@ -277,6 +277,7 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
     """
     if isinstance(mesh, pv.PolyData):
         return mesh
+    name, expected = as_text(name, "name"), as_text(expected, "expected")
     line = conversion_of(mesh)
     data = pv.wrap(mesh) if line == "Surface(mesh)" else None
     if isinstance(data, pv.PolyData):
