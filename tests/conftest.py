@@ -156,6 +156,19 @@ def _bodies_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(params=["numba", "numpy"])
+def either(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run checks of meshes with and without compiled kernels, whatever the size."""
+    from vtk_segdeform import sizes
+    from vtk_segdeform.kernels import dispatch
+
+    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+    if request.param == "numba":
+        pytest.importorskip("numba")
+    else:
+        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+
+
 @pytest.fixture(scope="module")
 def bound_once() -> Iterator[None]:
     """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""

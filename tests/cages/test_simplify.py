@@ -17,16 +17,6 @@ from vtk_segdeform.kernels import dispatch
 TURN = rotation([1.0, 2.0, -0.5], 1.234)
 
 
-@pytest.fixture(params=["numba", "numpy"])
-def either(request, monkeypatch):
-    """Run with and without compiled kernels, whatever the size."""
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
-
-
 def fine_cube(times=3):
     """Return a cube whose faces are split in four several times."""
     vertices, faces = CUBE

@@ -315,6 +315,8 @@ def test_replies_are_checked_on_arrival():
             replies(framed(b"a", values) + end)
     with pytest.raises(MeshError, match="64 times"):
         replies(framed(b"a", np.zeros(200)) + end)
+    with pytest.raises(MeshError, match="64 times"):
+        replies(10 * framed(b"a", np.zeros(0)) + end)
     with pytest.raises((MeshError, EOFError)):
         replies(b"not an array at all, whatever it is")
     huge = good.replace(b"(3,), }" + 13 * b" ", b"(30000000000000,), }")

@@ -9,7 +9,6 @@ from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io import polygons
 from vtk_segdeform.io.polygons import (
@@ -24,7 +23,6 @@ from vtk_segdeform.io.polygons import (
     triangles_of,
     unstripped,
 )
-from vtk_segdeform.kernels import dispatch
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -56,16 +54,6 @@ SHAPES = {
         (0, 0), (4, 0), (4, 4), (0, 4), (0, 0), (1, 1), (1, 3), (3, 3), (3, 1), (1, 1)
     ),
 }  # fmt: skip
-
-
-@pytest.fixture(params=["numba", "numpy"])
-def either(request, monkeypatch):
-    """Run with and without compiled kernels, whatever the size."""
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
 def cut(points, *polygons):

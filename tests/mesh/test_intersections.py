@@ -8,21 +8,9 @@ from numpy.testing import assert_array_equal
 from solids import OCTAHEDRON, icosphere
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
-from vtk_segdeform import sizes
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import Crossings, new_crossings, self_intersections
 from vtk_segdeform.mesh.intersections import flat_faces, intersections_of
 from vtk_segdeform.mesh.near_faces import _near_centres, near_faces
-
-
-@pytest.fixture(params=["numba", "numpy"])
-def either(request, monkeypatch):
-    """Run with and without compiled kernels, whatever the size."""
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
 def joined(*solids):

@@ -37,6 +37,7 @@ _log = logging.getLogger(__name__)
 _SECONDS, _PER_MEGABYTE = 30.0, 2.0
 _MEMORY, _REPLY, _PER_BYTE = 2 << 30, 64 << 20, 64  # bytes, and more for each of the file
 _LONGEST = 65_536  # bytes of a name
+_FRAME = 256  # bytes of the headers of a name and its values
 _MAGIC = b"\x93NUMPY\x01\x00"
 _HEAD = re.compile(  # what `reading_child` writes; numpy evaluates a header as an expression
     rb"\{'descr': '([<>|][iuf][1248])', 'fortran_order': False, 'shape': \(([\d, ]{0,60})\), \} *\n"
@@ -190,7 +191,7 @@ def _reply(stream: IO[bytes], most: int) -> Arrays:
         if not len(name):
             return arrays
         values = _array(stream, most)
-        most -= values.nbytes
+        most -= values.nbytes + _FRAME  # also for empty arrays, of which there could be any number
         arrays[name.tobytes().decode()] = values
 
 

@@ -138,7 +138,7 @@ def _memory_in_use() -> int:
 
 
 def _set_limits(limits: dict[str, int]) -> None:
-    """Lower limits of this process, those that the system has."""
+    """Lower those of the given resource limits of this process that the system supports."""
     try:
         resource: Any = importlib.import_module("resource")
     except ImportError:

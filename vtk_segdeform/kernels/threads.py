@@ -232,7 +232,7 @@ class _Batch:
 
 
 def _surely(action: Callable[[], None]) -> None:
-    """Call *action*, which must not fail by itself, until it is completed.
+    """Call *action* again until it completes; it must raise no exception of its own.
 
     Exceptions of signal handlers are raised afterwards.
     """

@@ -1,8 +1,8 @@
-"""Connections of all visitors, of whom anybody may send nothing, or half a request.
+"""Limits for connections that send nothing, or only part of a request.
 
-Whoever reaches the port can open connections, without a token.  So those on which no request of a
-client is being answered are limited in time and number.  One too many closes the oldest one of the
-address that has most of them, so that others are served: their requests arrive whole, and at once.
+Anyone who reaches the port can open connections, without a token.  So connections on which no
+request of a client is being answered are limited in time and number.  Beyond that number, the
+oldest connection of the address with the most of them is closed; others are still served.
 """
 
 from __future__ import annotations
