@@ -74,8 +74,8 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
     posed = held().copy()
     posed.solve(X[[HIGH]] + UP)
     local = posed.local(int(X[:, 0].argmax()), 0.2 * D, 0.1 * D)
-    solver, p = local._constraints.solver, local._p
-    places = local._constraints.pulled.moved(local._constraints.places(local._targets))
+    solver, p = local._constraints.solver, local._path.p
+    places = local._constraints.pulled.moved(local._constraints.places(local._path.targets))
     assert np.abs(solver.unbalanced(p, places)).max() < 1e-12 * np.abs(solver._hessian).max()
     assert local.solve(X[[HIGH]] + UP).steps == 0
     assert local._constraints.pulled.points == (SurfacePoint.at_vertex(HIGH),)
@@ -112,7 +112,7 @@ def test_a_soft_row_reproduces_affine_maps():
 
 
 def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_one():
-    solver, p = held()._constraints.solver, held()._p
+    solver, p = held()._constraints.solver, held()._path.p
     assert solver.steadying(p, 0.0) == 0.0
     assert solver.steadying(p, 10.0 * solver.energy.scale) > 0.0
     squeezed = p * [1.0, 1.0, 0.6]
@@ -139,7 +139,7 @@ def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_on
 
 
 def test_the_search_for_steadying_anchors_ends_where_none_are_enough():
-    solver, p = held()._constraints.solver, held()._p
+    solver, p = held()._constraints.solver, held()._path.p
     without = replace(solver, energy=replace(solver.energy, mass=0.0 * solver.energy.mass))
     assert without.steadying(p * [1.0, 1.0, 0.2], solver.energy.scale) == 0.0
 
@@ -171,7 +171,7 @@ def test_a_pose_out_of_all_proportion_is_not_shown_and_the_status_says_so(monkey
     with monkeypatch.context() as wrong:
         wrong.setattr(Deformer, "_with_exact_volume", explode)
         for within in (None, 0.0025):
-            missed = deformer.solve(X[[HIGH]] + 0.2 * UP, within=within)
+            missed = deformer.solve(X[[HIGH]] + 0.2 * UP)
             assert missed.status is Status.MISSED
             assert_allclose(missed.vertices, before.vertices, atol=1e-12)
             assert abs(missed.volume_change) < 1e-12

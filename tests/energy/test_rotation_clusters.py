@@ -45,7 +45,7 @@ def bent() -> np.ndarray:
     """Return the cages of the sausage, bent by 50 degrees, with a rotation for each vertex."""
     deformer = SCENE.deformer(rotation_groups=SCENE.mesh.n_vertices)
     deformer.solve(SCENE.turned(50))
-    return deformer._p
+    return deformer._path.p
 
 
 def value(energy: Energy, p: np.ndarray) -> float:

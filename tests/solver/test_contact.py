@@ -186,7 +186,7 @@ def test_no_two_samples_pass_through_each_other_in_a_step(fork):
     radii = contact.surface.radii
     rng = np.random.default_rng(1)
     for size in (1e-3, 10.0):
-        step = size * rng.standard_normal(deformer._p.shape)
+        step = size * rng.standard_normal(deformer._path.p.shape)
         far = np.linalg.norm(contact.surface.rows @ step, axis=1).max()
         share = contact.share(step)
         assert share * 2.0 * far <= 1.5 * 2.0 * np.median(radii) * (1.0 + 1e-12)

@@ -80,7 +80,7 @@ def test_a_large_mesh_is_scaled_and_its_cages_with_it():
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
+    assert deformer._path.solver.volumes.constraints[0].target != pytest.approx(
         deformer._constraints.volumes.constraints[0].target, rel=1e-9
     )  # the coarse volume of the pose in which the mesh has its own
 

@@ -19,7 +19,7 @@ def test_shared_places_are_as_accurate_as_separate_ones(monkeypatch):
     monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
     monkeypatch.setattr(sizes, "PLACES", 30)
     deformer = SCENE.held()
-    assert len(deformer._continuation.solver.positions.rows) == 60
+    assert len(deformer._path.solver.positions.rows) == 60
     shared = deformer.solve(targets)
     assert shared.handle_error < 1.5 * each.handle_error + 1e-4
     assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4
@@ -36,10 +36,10 @@ def test_a_set_with_shared_places_is_checked_at_its_largest_error(monkeypatch):
     away = np.linalg.norm(solution.vertices - goal, axis=1) / deformer._frame.size
     largest = [away[ids].max() for ids in (SCENE.handle, SCENE.fixed)]
     term, places = (
-        deformer._continuation.solver.positions,
-        deformer._constraints.places(deformer._targets),
+        deformer._path.solver.positions,
+        deformer._constraints.places(deformer._path.targets),
     )
-    shared, checked = term.errors(deformer._continuation.p, places)
+    shared, checked = term.errors(deformer._path.p, places)
     assert_allclose(1.5 * checked, largest, rtol=1e-6)
     assert (shared < 0.7 * np.array(largest)).all()  # errors at the places are smaller
 

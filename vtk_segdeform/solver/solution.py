@@ -79,8 +79,6 @@ class Solution:
     """Estimate of the largest distance of a vertex to its place in the converged pose, in diagonals
     of the mesh: the length of Newton's step at this pose.  Infinite where it is not computed, in a
     solve with ``max_steps`` that has not converged."""
-    targets: FloatArray | None = None
-    """(k, 3) float: the targets of this pose, if it is on the way to those of the solve."""
     unfinished: FloatArray | None = None
     """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
