@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray
-from ..errors import MeshError
 from ..geometry import lids_of, signed_volume
 from ..mesh import Mesh
 from .array_names import rounding_text
@@ -23,7 +22,8 @@ from .surface import Surface
 def stored_vertices(surface: Surface, vertices: FloatArray, path: Path) -> FloatArray:
     """Return where a file of *surface*, with its mesh at *vertices* (n, 3), stores them.
 
-    In a file with other triangles, each vertex is at the nearest point.
+    A file with other points, such as the corners of triangles in STL, has for each vertex one that
+    is nearest: where coordinates are rounded, no other one is nearer.
 
     Raises
     ------
@@ -32,15 +32,10 @@ def stored_vertices(surface: Surface, vertices: FloatArray, path: Path) -> Float
     """
     again = read_polydata(path)
     points = np.asarray(again.points, dtype=np.float64)
-    here, there = triangles_of(surface.given), triangles_of(again)
-    if here.shape == there.shape:  # STL, for example, has the points in another order
-        place = np.zeros(surface.given.n_points, dtype=np.int64)
-        place[here] = there
-        if np.array_equal(place[here], there):
-            return np.asarray(surface.at_vertices(points[place]))
+    same = again.n_points == surface.given.n_points
+    if same and np.array_equal(triangles_of(again), triangles_of(surface.given)):
+        return np.asarray(surface.at_vertices(points))
     points = points[np.isfinite(points).all(axis=1)]
-    if not len(points):
-        raise MeshError(f"{path}: contains no finite coordinates")
     return np.asarray(points[cKDTree(points).query(vertices)[1]])
 
 

@@ -14,7 +14,7 @@ from vtk_segdeform import Mesh, Session, Surface, models
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io import meshlab, read_polydata, stored, to_polydata, triangles_of
 from vtk_segdeform.widgets import DeformEditor
-from vtk_segdeform.widgets.editor import exporting, write_posed
+from vtk_segdeform.widgets.editor import Job, exporting, write_posed
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 UTM = np.array([500_000.0, 5_400_000.0, 100.0])
@@ -143,18 +143,31 @@ def test_during_a_job_it_is_said_afterwards(edited, tmp_path):
     assert editor.status.startswith("The file cannot be read again")
 
 
-def test_a_later_file_is_told_of_instead(edited, gate, tmp_path):
+def read(view, gate):
+    """Let all files be read again, and the window be told of them."""
+    gate.set()
+    for thread in threading.enumerate():
+        if thread.name.startswith("segdeform job"):
+            thread.join(30.0)
+    view.interactor.InvokeEvent("TimerEvent")
+
+
+def test_a_later_file_is_told_of_instead(edited, view, gate, tmp_path):
     editor = edited(FAR)
     editor.do(exporting(tmp_path / "far.stl"))
     editor.do(exporting(tmp_path / "far.ply"))
-    gate.set()
+    read(view, gate)
     assert editor.controller.saved_intact()
     assert "In the file" not in editor.status
 
 
-def test_a_removed_editor_is_told_nothing(edited, gate, tmp_path):
-    editor = edited(FAR)
-    editor.do(exporting(tmp_path / "far.stl"))
-    editor.remove()
-    gate.set()
-    assert editor.controller.saved_intact()
+def test_a_removed_editor_is_told_nothing(edited, view, gate, tmp_path, monkeypatch):
+    delivered = []
+    monkeypatch.setattr(Job, "deliver", lambda job: delivered.append(job))
+    for is_there in (False, True):
+        editor = edited(FAR)
+        editor.do(exporting(tmp_path / "far.stl"))
+        if not is_there:
+            editor.remove()
+        read(view, gate)
+        assert bool(delivered) == is_there
