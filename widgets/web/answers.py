@@ -14,8 +14,8 @@ from wslink.protocol import EXCEPTION_ERROR
 _log = logging.getLogger(__name__)
 _MALFORMED = -32600  # an invalid request, of JSON-RPC
 _SENTENCES = {
-    EXCEPTION_ERROR: "The call failed. The log of the server has the details.",
-    _MALFORMED: "The message is not a call.",
+    EXCEPTION_ERROR: "The call failed. See the log of the server for details.",
+    _MALFORMED: "The message is not a valid call.",
 }
 
 

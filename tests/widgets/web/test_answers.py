@@ -19,8 +19,8 @@ from vtk_segdeform import Mesh
 
 HELLO = {"id": "system:c0:0", "method": "wslink.hello", "args": [{"secret": "wslink-secret"}]}
 STATE = {"id": "rpc:c0:9", "method": "trame.state.get", "args": []}
-MALFORMED = "The message is not a call."
-FAILED = "The call failed. The log of the server has the details."
+MALFORMED = "The message is not a valid call."
+FAILED = "The call failed. See the log of the server for details."
 
 
 def call(method, *args, **more):
