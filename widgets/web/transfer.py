@@ -75,6 +75,7 @@ class Transfer:
         self._editor, self._folder, self.limit = editor, folder, limit
         self._names, self._changed = names, changed
         self._is_uploading = False
+        self._downloads: set[Path] = set()  # the folders of those that are being read again
 
     def add_routes(self, app: Any) -> None:
         """Add the routes to an aiohttp application."""
@@ -131,6 +132,7 @@ class Transfer:
         while self._editor.controller.settling.is_pending:
             await asyncio.sleep(_PERIOD)
         place = self._new_folder() / f"download{suffix}"
+        self._downloads.add(place.parent)
         try:
             written = self._write(place)
             data = place.read_bytes()
@@ -139,7 +141,8 @@ class Transfer:
         except SegDeformError as error:
             return _refusal(409, str(error).replace(f"{place}: ", ""))
         finally:
-            shutil.rmtree(place.parent)
+            self._downloads.remove(place.parent)
+            shutil.rmtree(place.parent, ignore_errors=True)  # or `close` has
         self._changed()
         disposition = f'attachment; filename="{place.name}"'
         return web.Response(body=data, headers={"Content-Disposition": disposition})
@@ -171,8 +174,9 @@ class Transfer:
 
     def _remove_folders(self, *, all_but: Path | None) -> None:
         """Remove uploads, except the one that is edited, which may be saved to again."""
+        kept = {all_but, self._editor.path.parent, *self._downloads}
         for path in self._folder.iterdir():
-            if path.is_dir() and path not in (all_but, self._editor.path.parent):
+            if path.is_dir() and path not in kept:
                 shutil.rmtree(path, ignore_errors=True)
 
 

@@ -219,7 +219,22 @@ def test_a_download_that_cannot_be_read_again_is_refused_with_the_reason(
     assert b"/" not in text
 
 
+def upload(served, data):
+    """Return the status of an upload."""
+
+    async def story():
+        url = f"http://127.0.0.1:{served.port}/upload?name=new.ply"
+        async with (
+            ClientSession(headers=HEADERS) as session,
+            session.post(url, data=data) as answer,
+        ):
+            return answer.status
+
+    return asyncio.run(asyncio.wait_for(story(), 60.0))
+
+
 def test_the_server_goes_on_while_a_download_is_read_again(served, monkeypatch):
+    data = download(served, "ply")[1]
     go_on, read = threading.Event(), stored.read_polydata
 
     def gated(path):
@@ -231,6 +246,9 @@ def test_the_server_goes_on_while_a_download_is_read_again(served, monkeypatch):
         answer = other.submit(download, served, "stl")
         served.wait(lambda: [*served.folder.glob("*/download.stl")])
         assert served.call(lambda: not answer.done())
+        before = served.web.session
+        assert upload(served, data) == 200
+        served.wait(lambda: served.web.session is not before)
         go_on.set()
         assert answer.result(60)[0] == 200
     assert not [*served.folder.glob("*/download.stl")]
