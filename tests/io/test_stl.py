@@ -234,7 +234,7 @@ def test_text_has_all_digits_and_the_order_of_the_triangles(tmp_path):
 
 def test_objects_become_solids_and_arrays_of_binary_files_are_told(tmp_path, caplog):
     surface = patches()
-    surface.cell_data["Object"] = surface.cell_data["Group"]
+    surface.cell_data["Object"] = np.array(surface.cell_data["Group"])
     set_names(surface, "ObjectNames", ["above", "below"])
     surface.cell_data["Attribute"] = np.arange(8, dtype=np.uint16)
     write_mesh(tmp_path / "a.stl", surface)

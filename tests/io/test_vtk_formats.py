@@ -305,6 +305,8 @@ def test_unclosed_ranges_of_norms_take_no_quadratic_time():
 @pytest.mark.parametrize("binary", [False, True])
 def test_the_title_is_kept(tmp_path, as_grid, binary):
     surface = rich().cast_to_unstructured_grid() if as_grid else rich()
+    if pv.vtk_version_info < (9, 7) and not binary:
+        del surface.point_data["odd"]  # this VTK cannot read nan as text, and says so
     data = written_legacy(tmp_path / "a.vtk", surface, binary=binary, version=_NEW)
     assert data.count(b"vtk output") == 1
     for title in ("Körper 7, scanned", "vtk output"):

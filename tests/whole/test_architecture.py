@@ -71,6 +71,7 @@ GRANTED = {
     "widgets.app": VTK | {"qtpy"},
     "widgets.app.repair_preview": {"pyvista", "pyvistaqt"},
     "widgets.web.pictures": VTK | {"PIL"},
+    "widgets.web.answers": {"wslink"},
     "widgets.web.protocol": {"wslink"},
     "widgets.web.transfer": {"aiohttp"},
     "widgets.web.notebook": {"IPython", "pyvista"},

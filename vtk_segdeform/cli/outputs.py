@@ -15,12 +15,10 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
-from ..geometry import lids_of, signed_volume
-from ..io import Surface, polydata_of, read_polydata, to_polydata, triangles_of
+from ..io import Surface, polydata_of, stored_vertices, to_polydata, volume_change
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
@@ -94,39 +92,12 @@ def written(surface: Surface, solution: Solution, path: Path, lids: bool | None)
         If the file cannot be written, or not be read again.
     """
     surface.write(path, solution.vertices)
-    x = stored_vertices(surface, solution.vertices, path)
+    with _without_warnings():
+        x = stored_vertices(surface, solution.vertices, path)
     if np.array_equal(x, solution.vertices):
         return solution
     change = volume_change(surface.mesh, x, lids)
     return replace(solution, vertices=x, volume=lambda: change)
-
-
-def stored_vertices(surface: Surface, vertices: FloatArray, path: Path) -> FloatArray:
-    """Return where a file of *surface*, with its mesh at *vertices* (n, 3), stores them.
-
-    A file with other points, such as the corners of triangles in STL, has for each vertex one that
-    is nearest: where coordinates are rounded, no other one is nearer.
-    """
-    with _without_warnings():
-        again = read_polydata(path)
-    points = np.asarray(again.points, dtype=np.float64)
-    same = again.n_points == surface.given.n_points
-    if same and np.array_equal(triangles_of(again), triangles_of(surface.given)):
-        return np.asarray(surface.at_vertices(points))
-    points = points[np.isfinite(points).all(axis=1)]
-    return np.asarray(points[cKDTree(points).query(vertices)[1]])
-
-
-def volume_change(mesh: Mesh, vertices: FloatArray, lids: bool | None) -> float:
-    """Return (V - V0) / V0 of *mesh* at *vertices* (n, 3), with its lids; 0 without a volume."""
-    used = lids_of(mesh, lids)
-    if not used.has_volume:
-        return 0.0
-    faces, middle = used.closed(mesh), mesh.vertices.mean(axis=0)
-    before, after = (
-        signed_volume(used.extension @ (x - middle), faces) for x in (mesh.vertices, vertices)
-    )
-    return (after - before) / before
 
 
 @contextmanager
@@ -152,7 +123,8 @@ def report_session(session: Session, path: Path | None, say: Say) -> None:
     if path is not None:
         session.write_deformed(path)
         surface = session.surface or Surface(to_polydata(session.mesh))
-        x = stored_vertices(surface, session.vertices, path)
+        with _without_warnings():
+            x = stored_vertices(surface, session.vertices, path)
         if not np.array_equal(x, session.vertices):
             change = volume_change(session.mesh, x, session.options.lids)
     report_volume(change, say)

@@ -3,6 +3,7 @@
 The files, in reading order:
 
     surface            `Surface`: what is given, and the mesh that is deformed
+    stored             what a file has lost, as it is read again
     convert            `read_polydata`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
     moving             a PolyData at other positions, with its normals and tangents
@@ -26,6 +27,7 @@ The files, in reading order:
     meshlab_project    MeshLab projects: a mesh and its cages
 """
 
+from .array_names import IS_ROUNDING
 from .convert import (
     as_polydata,
     from_polydata,
@@ -41,14 +43,17 @@ from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
+from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
 
 __all__ = [
+    "IS_ROUNDING",
     "Surface",
     "as_polydata",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",
+    "loss_of",
     "polydata_of",
     "read_mesh",
     "read_polydata",
@@ -56,9 +61,11 @@ __all__ = [
     "repair_surface",
     "require_writable",
     "simplify",
+    "stored_vertices",
     "to_meshset",
     "to_polydata",
     "triangles_of",
+    "volume_change",
     "with_vertices",
     "writable_suffixes",
     "write_mesh",

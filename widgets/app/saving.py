@@ -70,7 +70,7 @@ def may_discard(window: Any, *, is_kept: bool = False) -> bool:
         _settle(window)
     if is_kept or not window.is_modified:
         return True
-    mesh_is_saved = window.mesh_state is window.session.state
+    mesh_is_saved = _mesh_is_saved(window)
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
     if answer is Answer.SAVE_MESH:
         return _mesh_saved_now(window)
@@ -90,7 +90,13 @@ def _mesh_saved_now(window: Any) -> bool:
     if not save_mesh(window):
         return False
     _settle(window)
-    return window.mesh_state is window.session.state
+    return _mesh_is_saved(window)
+
+
+def _mesh_is_saved(window: Any) -> bool:
+    """Return whether a file contains the mesh as it is, without a loss that would be unseen."""
+    is_written = window.mesh_state is window.session.state
+    return is_written and window.editor.controller.saved_intact()
 
 
 def _settle(window: Any) -> None:

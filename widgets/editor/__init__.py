@@ -14,7 +14,7 @@ The files, in reading order:
     settling         a pose that converges after its release, and saving after that
     rest             what waits until the hand has rested
     finishing        the finish of a pose on the mesh, after a drag
-    session_file     the file that the session is saved to
+    session_file     the file that the session is saved to, and meshes that are written
     recordings       recordings of input and video
     messages hints status_line help_card
                      messages, hints and the help card
@@ -77,15 +77,16 @@ from .panel_actions import (
     toggle_projection,
     with_radius,
     with_up,
-    write_posed,
 )
 from .session_file import (
     MESH_FILES,
     READABLE_FILES,
     SessionFile,
+    WrittenMesh,
     expect_session,
     is_mesh,
     read_session,
+    write_posed,
 )
 from .widget_set import Mode
 
@@ -106,6 +107,7 @@ __all__ = [
     "Notices",
     "SessionFile",
     "Timer",
+    "WrittenMesh",
     "actions",
     "choosing_handle",
     "choosing_regions",

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_first_run, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
@@ -26,7 +27,7 @@ from .camera import Camera, has_y_up
 from .finishing import Finishing
 from .help_card import HelpCard
 from .hints import hint
-from .job import Worker, view_timer
+from .job import Job, Worker, view_timer
 from .keys import Keys
 from .messages import Messages
 from .neighbours import Neighbours
@@ -34,7 +35,7 @@ from .notices import Notices
 from .preparing import Preparing
 from .recordings import Recordings
 from .rest import Rest
-from .session_file import SessionFile, is_mesh, read_session
+from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
 from .settling import Settling
 from .widget_set import Mode, WidgetSet
 
@@ -116,6 +117,8 @@ class Controller:
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
+        self._reading: Job[str | SessionError] | None = None  # of the mesh that was saved last
+        self._is_intact = True  # that file, as far as is known
         self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
 
@@ -207,6 +210,8 @@ class Controller:
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
         self.is_on = False
+        if self._reading is not None:
+            self._reading.abandon()
         self._stop_listening()
         self._stop_failures()
         self.recordings.remove()
@@ -523,6 +528,36 @@ class Controller:
         place = self.place
         self.file.write(self.session, place, self.view_settings)
         self.say(f"Saved to {place}{self.pose_remark}")
+
+    def read_again(self, written: WrittenMesh) -> None:
+        """Read a mesh again in another thread, and say what the file has lost, if anything.
+
+        It is said once nothing is dragged or computed, which would replace the message.
+        """
+
+        def read(_: Progress) -> str | SessionError:
+            try:
+                return written.loss()
+            except SessionError as error:
+                return error
+
+        def tell(loss: str | SessionError) -> None:
+            self._is_intact = not loss
+            if isinstance(loss, SessionError):
+                self._show_error(loss)
+            elif loss:
+                self.say(". ".join([f"Mesh saved to {written.path}", loss, *written.remarks]))
+
+        if self._reading is not None:
+            self._reading.abandon()
+        self._is_intact = True
+        self._reading = Job(view_timer(self.view), read, done=tell, is_due=self._is_free)
+
+    def saved_intact(self) -> bool:
+        """Wait until the mesh that was saved last is read again; return whether nothing is lost."""
+        if self._reading is not None:
+            self._reading.wait()
+        return self._is_intact
 
     @property
     def view_settings(self) -> dict[str, object]:

@@ -6,20 +6,17 @@ move the camera work during a job and during a drag, too.
 
 from __future__ import annotations
 
-import logging
-import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from vtk_segdeform.errors import RegionError, SessionError
-from vtk_segdeform.session import Session
 
 from ..region_selector import Paint
 from .actions import Action, fit_cages, once_settled, segment, toggle_volume
 from .controller import Controller
+from .session_file import write_posed
 from .widget_set import Mode
 
 
@@ -208,8 +205,8 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
     The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
-    left out is said.  A pose that still converges is written once it has settled, and *then* is
-    called.
+    left out is said.  The file is then read again in another thread, see `Controller.read_again`.
+    A pose that still converges is written once it has settled, and *then* is called.
     """
 
     def export(controller: Controller) -> None:
@@ -217,38 +214,13 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        remarks = write_posed(session, path)
+        written = write_posed(session, path)
         saved = f"Mesh saved to {path}{controller.pose_remark}"
-        controller.say(". ".join([saved, *remarks]))
+        controller.say(". ".join([saved, *written.remarks]))
+        controller.read_again(written)
         then()
 
     return once_settled(export)
-
-
-def write_posed(session: Session, path: Path) -> list[str]:
-    """Write the surface in its pose, and return what the format cannot store, in sentences."""
-    with _warnings() as remarks:
-        session.write_deformed(path)
-    return [_shortened(remark) for remark in remarks]
-
-
-@contextmanager
-def _warnings() -> Iterator[list[str]]:
-    """Collect the warnings that reading and writing files logs inside a ``with`` block."""
-    found: list[str] = []
-    handler, logger = logging.Handler(logging.WARNING), logging.getLogger("vtk_segdeform.io")
-    handler.emit = lambda record: found.append(record.getMessage())  # type: ignore[method-assign]
-    logger.addHandler(handler)
-    try:
-        yield found
-    finally:
-        logger.removeHandler(handler)
-
-
-def _shortened(warning: str) -> str:
-    """Return a *warning* about arrays for the status line: their names only."""
-    text = re.sub(r"\b(point|cell|field) array ", "", warning)
-    return text[:1].upper() + text[1:]
 
 
 # The camera.

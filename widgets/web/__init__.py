@@ -8,7 +8,8 @@ The files, in reading order:
                 what the page draws itself during a drag
     inputs key_names timers pictures
                 the parts of that: events, keys, timers, JPEG
-    protocol    the messages between page and stream
+    protocol answers
+                the messages between page and stream, and answers to calls that fail
     page_model  what the page shows, and the one way in which it uses the editor
     touch       hints for fingers
     transfer    uploads and downloads

@@ -12,6 +12,7 @@ from vtk_segdeform.arrays import is_number, is_whole
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
+from .answers import answer_in_sentences
 from .page_drawing import PageDrawing, Surface, Update
 from .pictures import Picture
 from .stream import Stream
@@ -39,6 +40,11 @@ class ViewProtocol(LinkProtocol):
         self._stream, self._drawing, self._sized = stream, drawing, sized
         self._draws = False  # the page that connected last
         self._pages: set[str] = set()
+
+    def init(self, publish: Any, *others: Any) -> None:
+        """Receive the functions of wslink; `publish` is a method of the handler of connections."""
+        super().init(publish, *others)
+        answer_in_sentences(publish.__self__)
 
     def onConnect(self, request: Any, client_id: str) -> None:  # noqa: N802 - wslink's name
         """Count a page; whether it draws is not known yet."""

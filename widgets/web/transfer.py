@@ -23,9 +23,10 @@ from aiohttp import web
 from vtk_segdeform.errors import SegDeformError, SessionError
 from vtk_segdeform.files import replacing
 from vtk_segdeform.io import is_mesh_file, writable_suffixes
+from vtk_segdeform.kernels import quick_turns
 from vtk_segdeform.session import save_session
 
-from ..editor import DeformEditor, opening, write_posed
+from ..editor import DeformEditor, WrittenMesh, opening, write_posed
 
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
@@ -74,6 +75,7 @@ class Transfer:
         self._editor, self._folder, self.limit = editor, folder, limit
         self._names, self._changed = names, changed
         self._is_uploading = False
+        self._downloads: set[Path] = set()  # the folders of those that are being read again
 
     def add_routes(self, app: Any) -> None:
         """Add the routes to an aiohttp application."""
@@ -130,13 +132,17 @@ class Transfer:
         while self._editor.controller.settling.is_pending:
             await asyncio.sleep(_PERIOD)
         place = self._new_folder() / f"download{suffix}"
+        self._downloads.add(place.parent)
         try:
-            self._write(place)
+            written = self._write(place)
             data = place.read_bytes()
+            if written is not None:
+                self._tell(await asyncio.to_thread(quick_turns()(written.loss)), *written.remarks)
         except SegDeformError as error:
-            return _refusal(409, str(error).removeprefix(f"{place}: "))
+            return _refusal(409, str(error).replace(f"{place}: ", ""))
         finally:
-            shutil.rmtree(place.parent)
+            self._downloads.remove(place.parent)
+            shutil.rmtree(place.parent, ignore_errors=True)  # or `close` has
         self._changed()
         disposition = f'attachment; filename="{place.name}"'
         return web.Response(body=data, headers={"Content-Disposition": disposition})
@@ -145,19 +151,22 @@ class Transfer:
         self._folder.mkdir(mode=0o700, exist_ok=True)
         return Path(tempfile.mkdtemp(dir=self._folder))
 
-    def _write(self, place: Path) -> None:
-        """Write the session, or the surface in its pose."""
+    def _tell(self, *remarks: str) -> None:
+        """Say what the format of a download has lost."""
+        if text := ". ".join(filter(None, remarks)):
+            self._editor.controller.say(text)
+
+    def _write(self, place: Path) -> WrittenMesh | None:
+        """Write the session, or the surface in its pose, which is returned."""
         editor, session = self._editor, self._editor.session
         if editor.is_busy or session.is_dragging:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if place.suffix != _SESSION:
-            remarks = write_posed(session, place)
-            if remarks:
-                editor.controller.say(". ".join(remarks))
-            return
+            return write_posed(session, place)
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
+        return None
 
     def _too_large(self, name: str) -> web.Response:
         most = f"{self.limit / 1e6:,.0f} MB"
@@ -165,8 +174,9 @@ class Transfer:
 
     def _remove_folders(self, *, all_but: Path | None) -> None:
         """Remove uploads, except the one that is edited, which may be saved to again."""
+        kept = {all_but, self._editor.path.parent, *self._downloads}
         for path in self._folder.iterdir():
-            if path.is_dir() and path not in (all_but, self._editor.path.parent):
+            if path.is_dir() and path not in kept:
                 shutil.rmtree(path, ignore_errors=True)
 
 

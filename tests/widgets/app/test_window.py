@@ -26,7 +26,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import Qt, QtCore, QtTest, QtWidgets, application, until
 
-from vtk_segdeform import Session, models
+from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import convert
 from vtk_segdeform.io.surface import Surface
@@ -217,6 +217,30 @@ def test_the_mesh_may_be_saved_on_closing(start, ball_file, tmp_path, monkeypatc
     boxes.answers.append("Save mesh ...")
     assert hand.window.close()
     assert_allclose(Surface.read(tmp_path / "posed.ply").mesh.vertices, posed, atol=1e-6)
+
+
+@BLANK
+def test_a_mesh_that_lost_digits_is_told_of_and_closes_no_window(
+    start, tmp_path, monkeypatch, boxes
+):
+    convert.write_mesh(tmp_path / "far.ply", Mesh(BALL.vertices + [5e5, 5.4e6, 100.0], BALL.faces))
+    hand = start(tmp_path / "far.ply")
+    change(hand)
+    words = hand.window.editor_widget.panel.status.words
+    choose_file(monkeypatch, tmp_path / "posed.stl")
+    hand.choose("File", "Save mesh as")
+    until(lambda: "In the file, vertices moved by up to 0.25" in words.text(), "the loss")
+    assert ", the volume changed by " in words.text()
+    boxes.answers.append("Save mesh ...")
+    assert not hand.window.close()
+    assert "regions, cages and handles" not in boxes.seen[-1]  # the mesh itself is not saved
+    assert "In the file" in words.text()
+    choose_file(monkeypatch, tmp_path / "posed.ply")
+    hand.choose("File", "Save mesh as")
+    boxes.answers.append("Cancel")
+    assert not hand.window.close()
+    assert "regions, cages and handles" in boxes.seen[-1]
+    assert "In the file" not in words.text()
 
 
 @BLANK

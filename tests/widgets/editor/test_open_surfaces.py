@@ -230,6 +230,8 @@ def test_digits_that_a_format_loses_are_said(tmp_path):
     given.points = np.asarray(given.points, dtype=float) + [500_000.0, 5_400_000.0, 300.0]
     scene = Scene(given)
     scene.editor.do(exporting(tmp_path / "bottle.stl"))
-    assert "STL stores single precision: vertices moved by up to 0.25" in scene.editor.status
+    assert not scene.editor.controller.saved_intact()
+    assert "In the file, vertices moved by up to 0.25" in scene.editor.status
     scene.editor.do(exporting(tmp_path / "bottle.glb"))
-    assert "precision" not in scene.editor.status
+    assert scene.editor.controller.saved_intact()
+    assert "In the file" not in scene.editor.status

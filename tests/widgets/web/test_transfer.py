@@ -1,8 +1,13 @@
-"""Uploads of a page: each arrives as a whole, apart from all others, or is refused."""
+"""Uploads of a page: each arrives as a whole, apart from all others, or is refused.
+
+And its downloads, which are read again.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,8 +15,15 @@ import pytest
 
 pytest.importorskip("trame")
 from aiohttp import ClientSession, web
+from scipy.spatial import cKDTree
+from web_hands import Served
 from yarl import URL
 
+from vtk_segdeform import Mesh, models
+from vtk_segdeform.io import read_polydata, stored
+from vtk_segdeform.widgets.editor import write_posed
+from vtk_segdeform.widgets.panel import status as panel_status
+from vtk_segdeform.widgets.web import transfer
 from vtk_segdeform.widgets.web.transfer import Transfer
 
 LIMIT = 1000  # bytes
@@ -145,8 +157,6 @@ def test_names_are_shown_without_control_characters_and_name_no_file(told, tmp_p
 
 
 def test_a_full_disk_is_told(told, monkeypatch):
-    from vtk_segdeform.widgets.web import transfer
-
     def refuse(*_, **__):
         raise OSError(28, "No space left on device")
 
@@ -158,3 +168,87 @@ def test_a_full_disk_is_told(told, monkeypatch):
         assert editor.opened == []
 
     told(story)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    """Return the editor of a body far from the origin."""
+    ball, folder = models.sphere(300), tmp_path_factory.mktemp("server")
+    with Served(Mesh(ball.vertices + [5e5, 5.4e6, 100.0], ball.faces), folder=folder) as served:
+        yield served
+
+
+def download(served, suffix):
+    """Return status and content of a download."""
+
+    async def story():
+        url = f"http://127.0.0.1:{served.port}/download/{suffix}"
+        async with ClientSession(headers=HEADERS) as session, session.get(url) as answer:
+            return answer.status, await answer.read()
+
+    return asyncio.run(asyncio.wait_for(story(), 60.0))
+
+
+@pytest.mark.parametrize(("suffix", "is_told"), [("ply", False), ("stl", True), ("vtp", False)])
+def test_a_download_is_read_again_and_its_loss_is_told(served, tmp_path, suffix, is_told):
+    served.call(lambda: served.web.editor.controller.say(""))
+    status, data = download(served, suffix)
+    assert status == 200
+    (tmp_path / f"download.{suffix}").write_bytes(data)
+    far = served.web.session.mesh
+    points = read_polydata(tmp_path / f"download.{suffix}").points
+    assert (cKDTree(points).query(far.vertices)[0].max() > 0.2) == is_told
+    shown = served.call(lambda: panel_status(served.web.editor).text)
+    assert shown.startswith("In the file, vertices moved by up to 0.25") == is_told
+    assert ("the volume changed by" in shown) == is_told
+
+
+@pytest.mark.parametrize("suffix", ["stl", "vtp"])
+def test_a_download_that_cannot_be_read_again_is_refused_with_the_reason(
+    served, monkeypatch, suffix
+):
+    def damaged(session, path):
+        written = write_posed(session, path)
+        path.write_bytes(path.read_bytes()[:500])
+        return written
+
+    monkeypatch.setattr(transfer, "write_posed", damaged)
+    status, text = download(served, suffix)
+    assert status == 409
+    assert text.startswith(b"The file cannot be read again: save the mesh again")
+    assert b"/" not in text
+
+
+def upload(served, data):
+    """Return the status of an upload."""
+
+    async def story():
+        url = f"http://127.0.0.1:{served.port}/upload?name=new.ply"
+        async with (
+            ClientSession(headers=HEADERS) as session,
+            session.post(url, data=data) as answer,
+        ):
+            return answer.status
+
+    return asyncio.run(asyncio.wait_for(story(), 60.0))
+
+
+def test_the_server_goes_on_while_a_download_is_read_again(served, monkeypatch):
+    data = download(served, "ply")[1]
+    go_on, read = threading.Event(), stored.read_polydata
+
+    def gated(path):
+        assert go_on.wait(30.0)
+        return read(path)
+
+    monkeypatch.setattr(stored, "read_polydata", gated)
+    with ThreadPoolExecutor(1) as other:
+        answer = other.submit(download, served, "stl")
+        served.wait(lambda: [*served.folder.glob("*/download.stl")])
+        assert served.call(lambda: not answer.done())
+        before = served.web.session
+        assert upload(served, data) == 200
+        served.wait(lambda: served.web.session is not before)
+        go_on.set()
+        assert answer.result(60)[0] == 200
+    assert not [*served.folder.glob("*/download.stl")]
