@@ -127,7 +127,7 @@ def test_a_loose_tolerance_does_not_make_a_pose_converged():
 
 def test_missed_handles_are_told_before_all_else():
     deformer, solutions = finished(bent_sausage)
-    off = replace(solutions[-1], targets=np.zeros(3), errors=lambda _: (0.5, 0.0))
+    off = replace(solutions[-1], errors=lambda _: (0.5, 0.0))
     assert deformer.finish(off).status is Status.MISSED
 
 

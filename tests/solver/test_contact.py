@@ -37,7 +37,7 @@ def through(fork):
     """Return the pose without avoiding contact, and its cages in the units of the solver."""
     deformer, targets = fork
     free = deformer.hold(fixed=deformer.fixed, handle=deformer.handle, avoid_contact=False)
-    return free.solve(targets), free._p
+    return free.solve(targets), free._path.p
 
 
 def test_what_crosses_without_it_does_not_with_it(fork, through):

@@ -110,7 +110,7 @@ def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
     ends = []
     for deformer in (straight, roundabout):
         deformer.solve(SCENE.turned(40.0))
-        ends.append(deformer._constraints.solver._way.ends[-1])
+        ends.append(deformer._path.solver._way.ends[-1])
     (first,), (second,) = (end.directions for end in ends)
     assert np.linalg.norm(first - second) < 1e-4 * np.linalg.norm(first)
 

@@ -96,12 +96,12 @@ from .frame import Frame
 from .locality import Ring, SurfaceSamples
 from .path import Path
 
-_POSITION_WEIGHT = 900.0  # of a handle or fixed patch, times the scale of the shape energy
+_POSITION_WEIGHT = 2700.0  # of a handle or fixed patch, times the scale of the shape energy
 _ANCHOR_WEIGHT = 1.0  # kappa of a local deformer, in weights of a handle; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
-_CORRECTIONS, _GAIN = 8, 0.7  # of pulled points: at most, and the factor by which errors must fall
-_PULLED = 5e-5  # largest error of pulled points in a final pose
+_GAIN = 0.7  # the factor by which errors of pulled points must fall
+_PULLED = 1e-5  # largest error of pulled points in a final pose
 _SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
