@@ -56,7 +56,9 @@ def test_turns_that_the_body_loses_are_an_error(turned, capsys):
     code, x = turned("--rotate", "z,720", fixed="z<40%", handle="z>60%")
     assert code == 1
     assert abs(twist(x)[-1] - 720.0) > 180.0
-    assert "the body is not wound by 720 degrees: it has snapped back to 0;" in capsys.readouterr().err
+    assert (
+        "the body is not wound by 720 degrees: it has snapped back to 0;" in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize("divisions", [(2, 2, 2), (2, 2, 6), (3, 3, 12)])

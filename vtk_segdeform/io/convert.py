@@ -57,6 +57,7 @@ _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
+_SHORT = 200  # characters of a name in messages
 # Formats of point arrays of any name and colours.
 _STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"})
 
@@ -277,7 +278,7 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
     """
     if isinstance(mesh, pv.PolyData):
         return mesh
-    name, expected = as_text(name, "name"), as_text(expected, "expected")
+    name, expected = as_text(name, "name", _SHORT), as_text(expected, "expected", _SHORT)
     line = conversion_of(mesh)
     data = pv.wrap(mesh) if line == "Surface(mesh)" else None
     if isinstance(data, pv.PolyData):
