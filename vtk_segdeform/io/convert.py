@@ -33,7 +33,7 @@ from ..errors import ArgumentError, MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
-from .array_names import set_names, warn_of_rounding, with_storable_texts
+from .array_names import set_names, warn_left_out, warn_of_rounding, with_storable_texts
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
 from .groups import GROUP, names_key
@@ -168,6 +168,7 @@ def write_mesh(
             elif suffix in _VTK_WRITES:
                 write_with_vtk(draft, surface)
             else:
+                warn_left_out(f"{suffix} written by PyMeshLab", surface, {})
                 _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
