@@ -185,7 +185,7 @@ def _made(vertices: FloatArray, faces: IntArray, what: str) -> Mesh:
     try:
         return Mesh(vertices, faces)
     except MeshError as fault:
-        raise ArgumentError(f"{what} gives no mesh: {fault}") from None
+        raise ArgumentError(f"cannot make a mesh with {what}: {fault}") from None
 
 
 def _require(n_vertices: int, least: int) -> None:
