@@ -35,11 +35,9 @@ def turns_off(
     )
     reached = handle[np.isfinite(away[handle])]
     ends = np.unique(np.linspace(0, len(reached) - 1, min(_WAYS, len(reached))).astype(np.int64))
-    off = [
-        round((_turn(mesh, x, list(_way(int(end), before))) @ axis - angle) / (2.0 * np.pi))
-        for end in reached[ends]
-    ]
-    return min(off, key=abs, default=0)
+    ways = (list(_way(int(end), before.astype(np.int64))) for end in reached[ends])
+    turned = (float(_turn(mesh, x, way) @ axis) for way in ways)
+    return min((round((each - angle) / (2.0 * np.pi)) for each in turned), key=abs, default=0)
 
 
 def _turn(mesh: Mesh, x: FloatArray, way: list[int]) -> FloatArray:
