@@ -6,6 +6,7 @@ what it must be, and shows the value in short form.
 
 from __future__ import annotations
 
+import math
 import os
 import reprlib
 from collections.abc import Callable, Sequence
@@ -95,9 +96,11 @@ def as_switch(value: object, name: str) -> bool:
     raise ArgumentError(f"{name} must be True or False; got {shown(value)}")
 
 
-def as_text(value: object, name: str) -> str:
-    """Return *value* if it is a str that can be encoded and has no null character."""
+def as_text(value: object, name: str, most: float = math.inf) -> str:
+    """Return *value* if it is a str of at most *most* characters, encodable, without null."""
     text = require(value, str, name)
+    if len(text) > most:
+        raise ArgumentError(f"{name} has {len(text)} characters; at most {most} are allowed")
     if "\0" in text:
         raise ArgumentError(f"{name} must not contain a null character; got {shown(text)}")
     try:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from bars import BAR, HEIGHT, twist
 
+from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.motion import legs, rotation, transform
-from vtk_segdeform.cli.turns import turn
+from vtk_segdeform.cli.turns import turns_off
 from vtk_segdeform.deformer import deform
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import read_mesh, write_mesh
@@ -55,7 +56,25 @@ def test_turns_that_the_body_loses_are_an_error(turned, capsys):
     code, x = turned("--rotate", "z,720", fixed="z<40%", handle="z>60%")
     assert code == 1
     assert abs(twist(x)[-1] - 720.0) > 180.0
-    assert "the body is not wound by 720 degrees: it has snapped back to" in capsys.readouterr().err
+    assert (
+        "the body is not wound by 720 degrees: it has snapped back to 0;" in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize("divisions", [(2, 2, 2), (2, 2, 6), (3, 3, 12)])
+@pytest.mark.parametrize("axis", "xz")
+def test_a_coarse_bar_bends_by_half_a_turn_either_way_and_snaps_back_from_more(
+    tmp_path, capsys, divisions, axis
+):
+    """On a coarse bar, the sums of rotations are far from the angle, by up to half a turn."""
+    path = tmp_path / "bar.ply"
+    write_mesh(path, models.bar((0.2, 0.2, 1.0), divisions))
+    words = [str(path), "-o", str(tmp_path / "bent.ply"), "--fixed", "z<0.01", "--handle", "z>0.99"]
+    for degrees, back in ((180, ""), (-180, ""), (270, "-90")):
+        code = main(["deform", *words, "--regions", "1", "--rotate", f"{axis},{degrees}"])
+        assert code == bool(back)
+        message = f"by {degrees} degrees: it has snapped back to {back};" if back else ""
+        assert message in capsys.readouterr().err
 
 
 def test_a_matrix_comes_before_the_rotation_and_both_together_keep_their_sense(tmp_path, turned):
@@ -91,13 +110,15 @@ def test_the_turn_of_a_handle_is_measured_along_the_surface():
                 for each in BAR.vertices
             ]
         )
-        assert turn(BAR, x, axis, fixed=fixed, handle=handle) == pytest.approx(angle, abs=0.2)
+        for more in (0.0, 2.5, -2.5, 6.5, -12.6):
+            off = turns_off(BAR, x, axis, angle + more, fixed=fixed, handle=handle)
+            assert off == -round(more / (2.0 * math.pi))
     apart = Mesh(
         np.concatenate([BAR.vertices, BAR.vertices + 5.0]),
         np.concatenate([BAR.faces, BAR.faces + BAR.n_vertices]),
     )
     other = handle + BAR.n_vertices
-    assert turn(apart, apart.vertices, axis, fixed=fixed, handle=other) is None
+    assert turns_off(apart, apart.vertices, axis, 9.0, fixed=fixed, handle=other) == 0
 
 
 def test_legs_are_less_than_half_a_turn():

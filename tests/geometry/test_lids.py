@@ -21,6 +21,7 @@ from open_meshes import (
     together,
     tube,
     with_holes,
+    with_walls,
 )
 from solids import CUBE, rotation
 
@@ -121,6 +122,9 @@ FLAT = {
 }
 
 
+BAR = models.bar((1, 1, 3), divisions=(2, 2, 6))
+
+
 @pytest.mark.parametrize("name", every(3, BODIES))
 def test_a_body_encloses_a_volume(name):
     mesh = BODIES[name]()
@@ -188,6 +192,18 @@ def test_faces_and_lids_have_no_boundary(name):
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     forward = np.sort(tails * len(ends) + heads)
     assert_array_equal(forward, np.sort(heads * len(ends) + tails))
+
+
+def test_the_border_of_a_wall_is_no_hole_and_its_lid_adds_no_volume():
+    lids = lids_of(with_walls(open_box(), 1.0))
+    assert_array_equal(lids.holes, ~lids.of_wall)
+    assert sorted(np.bincount(lids.loop)[lids.holes]) == [24]
+    assert lids.used.sum() == 2
+    mesh = with_walls(BAR, 1.0, 2.0)
+    lids = lids_of(mesh)
+    assert not lids.holes.any()
+    volume = signed_volume(lids.extension @ mesh.vertices, lids.closed(mesh))
+    assert volume == pytest.approx(3.0)
 
 
 def test_a_closed_mesh_has_no_lids_and_its_own_faces():
@@ -319,6 +335,9 @@ def test_thousands_of_leaves_and_cups_are_told_apart_soon():
             None,
             "Closed surface: volume kept; 2 open sheets have no volume",
         ),
+        (with_walls(BAR, 1.0), None, "Closed surface with an inner wall: volume kept"),
+        (with_walls(BAR, 1.0, 2.0), None, "Closed surface with inner walls: volume kept"),
+        (with_walls(open_box(), 1.0), None, "1 hole: volume kept under a lid"),
     ],
 )
 def test_one_sentence_says_what_has_a_volume(mesh, option, says):

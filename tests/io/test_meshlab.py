@@ -18,7 +18,8 @@ from vtk_segdeform.geometry import local_volume_change
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.interpreter import python_command, python_environment
 from vtk_segdeform.io import Surface, meshlab
-from vtk_segdeform.io.convert import from_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.array_names import set_names
+from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.session.session import Session
@@ -230,6 +231,24 @@ def test_files_in_formats_of_pymeshlab_are_written_and_read(tmp_path, suffix):
     assert signed_volume(again.vertices, again.faces) == pytest.approx(
         signed_volume(mesh.vertices, mesh.faces), rel=1e-3
     )
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+@pytest.mark.parametrize("suffix", every(2, [".x3d", ".dae"]))
+def test_what_files_of_pymeshlab_do_not_store_is_told(tmp_path, caplog, suffix):
+    surface = painted()
+    set_names(surface, "groups", ["arm", "leg"])
+    write_mesh(tmp_path / f"a{suffix}", surface)
+    (message,) = caplog.messages
+    assert message.startswith(f"{suffix} written by PyMeshLab cannot store point array 'selection'")
+    for sort in ("point", "cell"):
+        for name in getattr(surface, f"{sort}_data"):
+            assert f"{sort} array '{name}'" in message
+    assert message.endswith("field array 'groups': left out")
+    assert not read_polydata(tmp_path / f"a{suffix}").array_names
+    caplog.clear()
+    write_mesh(tmp_path / f"b{suffix}", from_polydata(surface))
+    assert not caplog.messages
 
 
 @pytest.mark.usefixtures("with_pymeshlab")

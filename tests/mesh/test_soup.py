@@ -389,6 +389,10 @@ def test_points_of_a_seam_are_one_vertex_and_go_to_the_mean_of_their_targets():
     assert_allclose(targets, found.mesh.vertices)
     with pytest.raises(ConstraintError, match="no point of the handle is in a face"):
         found.targets_at([36, 37], ends[:2])
+    with pytest.raises(
+        ConstraintError, match=r"targets .* each of the 3 points of the handle; got"
+    ):
+        found.targets_at([0, 1, 2], ends[:2])
     assert len(found.targets_at([], np.empty((0, 3)))[0]) == 0
 
 

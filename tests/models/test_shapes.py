@@ -188,3 +188,10 @@ def test_invalid_arguments_are_errors_with_advice():
     ):
         with pytest.raises(ArgumentError, match=r"must be|needs"):
             call()
+    for size in (1e-320, 1e300):
+        with pytest.raises(ArgumentError, match="a mesh with radius 1e"):
+            models.sphere(radius=size)
+        with pytest.raises(ArgumentError, match=r"a mesh with size .1e"):
+            models.bar((size, size, size))
+        with pytest.raises(ArgumentError, match=r"a mesh with major 1e.* and minor"):
+            models.torus(major=size, minor=size / 2)

@@ -809,7 +809,11 @@ WRONG = [
     (lambda s: s.change_options(rotation_groups=2.5), SessionError, "a whole number of at least 1"),
     (lambda s: s.change_options(preserve_volume="no"), SessionError, "True or False"),
     (lambda s: s.change_options(colour=1), SessionError, "no option colour; there are n_cage"),
-    (lambda s: s.change_options(n_cage_vertices=9) or s.fit_cages(), CageError, "at least 8"),
+    (
+        lambda s: s.change_options(n_cage_vertices=9) or s.fit_cages(),
+        CageError,
+        "^n_cage_vertices must .* at least 8",
+    ),
     (lambda s: s.drag(NEAR, max_steps=0), ValueError, "max_steps"),
 ]
 

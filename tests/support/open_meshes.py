@@ -57,6 +57,18 @@ def with_holes(mesh: Mesh, count: int, radius: float, seed: int = 1) -> Mesh:
     return part_of(left, component[left.faces[:, 0]] == np.bincount(component).argmax())
 
 
+def with_walls(mesh: Mesh, *heights: float) -> Mesh:
+    """Return a body about the z axis with plane walls inside, across it at *heights*."""
+    vertices, faces = mesh.vertices, [mesh.faces]
+    for z in heights:
+        ring = np.flatnonzero(np.abs(mesh.vertices[:, 2] - z) < 1e-9)
+        ring = ring[np.argsort(np.arctan2(*mesh.vertices[ring, :2].T))]
+        middle = np.full(len(ring), len(vertices))
+        faces.append(np.stack([ring, np.roll(ring, -1), middle], axis=1))
+        vertices = np.append(vertices, [[0.0, 0.0, z]], axis=0)
+    return Mesh(vertices, np.concatenate(faces))
+
+
 def together(*meshes: Mesh) -> Mesh:
     """Return all meshes as one."""
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])

@@ -12,7 +12,7 @@ The files, in reading order:
 """
 
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
-from .fit import fit_cages, suggested_size
+from .fit import fit_cages, require_cage_vertices, suggested_size
 from .mean_value import mean_value_coordinates
 
 __all__ = [
@@ -22,5 +22,6 @@ __all__ = [
     "encloses_region",
     "fit_cages",
     "mean_value_coordinates",
+    "require_cage_vertices",
     "suggested_size",
 ]

@@ -134,7 +134,7 @@ def fit_cages(
         regions = Regions(mesh, regions.membership)
     _check_offset(offset, mesh)
     n_regions = regions.n_regions
-    _require_enough(n_vertices, n_regions)
+    require_cage_vertices(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
     shape, membership = mesh, regions.membership
     held = np.zeros(mesh.n_vertices, dtype=bool)
@@ -221,12 +221,12 @@ def fit_cage(
     if not mask.any():
         raise RegionError("members is empty; a cage must enclose at least one vertex")
     patch = Patch.of(Surface.of(mesh), mask)
-    _require_enough(n_vertices, 1)
+    require_cage_vertices(n_vertices, 1)
     return _fit(patch, n_vertices, offset, progress)
 
 
-def _require_enough(n_vertices: int, n_regions: int) -> None:
-    """Raise a CageError if the total number of cage vertices is too small or too large."""
+def require_cage_vertices(n_vertices: int, n_regions: int, name: str = "n_vertices") -> None:
+    """Raise a CageError if the total of cage vertices, called *name*, is too small or too large."""
     fewest, most = _FEWEST * n_regions, MOST_CAGE_VERTICES
     if fewest > most:
         raise CageError(
@@ -235,7 +235,7 @@ def _require_enough(n_vertices: int, n_regions: int) -> None:
         )
     if not is_whole(n_vertices, fewest, most):
         raise CageError(
-            f"n_vertices must be {fewest} to {most}, at least {_FEWEST} for each of {n_regions} "
+            f"{name} must be {fewest} to {most}, at least {_FEWEST} for each of {n_regions} "
             f"regions; got {shown(n_vertices)}"
         )
 

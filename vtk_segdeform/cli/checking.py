@@ -5,7 +5,7 @@ With ``--json`` it prints one object with these keys:
     file, points, polygons      as given; null what cannot be read
     vertices, faces             of the mesh that is deformed; null if there is none
     components, closed          their number; whether none has a border
-    holes                       number of edges of each border
+    holes                       number of edges of each border, without those of inner walls
     encloses                    whether each component encloses a volume
     flattened                   whether it does not because it is an open body pressed flat
     volume_under_lids           whether some volume is preserved under lids over holes
@@ -122,10 +122,12 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
         "faces": mesh.n_faces,
         "components": len(lids.encloses),
         "closed": mesh.is_closed,
-        "holes": sorted((len(loop) for loop in mesh.borders), reverse=True),
+        "holes": sorted(
+            (len(mesh.borders[k]) for k in np.flatnonzero(~lids.of_wall)), reverse=True
+        ),
         "encloses": lids.encloses.tolist(),
         "flattened": lids.flattened.tolist(),
-        "volume_under_lids": bool(lids.used.any()),
+        "volume_under_lids": bool(lids.holes.any()),
         "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
     }

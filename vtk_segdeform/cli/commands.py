@@ -41,7 +41,7 @@ from .outputs import (
     written,
 )
 from .selection import Role, parse_selection
-from .turns import turn
+from .turns import turns_off
 
 SESSION = ".segdeform"  # suffix of session files
 LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
@@ -246,13 +246,12 @@ def _require_turns(options: Namespace, surface: Surface, fixed: IntArray, x: Flo
         axis, angle = motion.parse_rotation(handle.get("rotate", "z,0"))
         if motion.legs([angle]) > 1 and "matrix" not in handle:
             own = _selected(handle["select"], surface, "handle")
-            found = turn(surface.mesh, x, axis, fixed=fixed, handle=own)
-            if found is not None and abs(found - angle) > math.pi:
+            if off := turns_off(surface.mesh, x, axis, angle, fixed=fixed, handle=own):
+                asked = math.degrees(angle)
                 raise MeshError(
-                    f"{options.output} was written, but the body is not wound by "
-                    f"{math.degrees(angle):.4g} degrees: it has snapped back to "
-                    f"{math.degrees(found):.0f}; turn less, or leave more room between handle and "
-                    f"fixed vertices"
+                    f"{options.output} was written, but the body is not wound by {asked:.4g} "
+                    f"degrees: it has snapped back to {asked + 360.0 * off:.4g}; turn less, or "
+                    f"leave more room between handle and fixed vertices"
                 )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from .. import sizes
 from ..arrays import FloatArray, is_whole
-from ..cages import fit_cages, suggested_size
+from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag, require_sequence, shown
 from ..errors import ArgumentError, Cancelled, ConstraintError, SegDeformError
 from ..mesh import Mesh, require_mesh
@@ -116,6 +116,7 @@ def deform(
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
     regions = segment(mesh, n_regions, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
+    require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[stays] = True
     regions, rigid = clamped(

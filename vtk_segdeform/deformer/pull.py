@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from ..cages import fit_cages, suggested_size
+from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag
 from ..errors import ConstraintError
 from ..mesh import Mesh, SurfacePoint, require_mesh
@@ -116,6 +116,7 @@ def pull(
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
     regions = segment(mesh, n_regions, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
+    require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, density="thickness", progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,

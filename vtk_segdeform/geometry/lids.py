@@ -24,6 +24,9 @@ q = a / 2 pi, so that of a long half pipe is 1/2; above 1 the surface is rolled 
     its volume, with lids, is 0 to rounding     no: a closed shell that is folded flat
     the sum of all volumes is 0 to rounding     no
 
+Along the border of a wall between two bodies three faces meet, so it is part of the boundary and
+gets a lid as well, which closes one of the bodies; but it is not counted as a hole.
+
 The absolute value is taken because an open surface may be turned inside out.
 
 An open body that has been pressed flat is none of these sheets, although its q is small as well: it
@@ -47,7 +50,7 @@ from scipy import sparse
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import shown
 from ..errors import ArgumentError
-from ..mesh import HalfEdges, Mesh, ragged_arange, require_mesh
+from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
 from .volume import corner_and_edges, signed_volume
 
 _LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
@@ -78,6 +81,8 @@ class Lids:
         From vertices to vertices and centres: rows of the identity, then of means.
     component : (k,) int
         The component of the mesh that each loop bounds.
+    of_wall : (k,) bool
+        Whether three or more faces meet at every edge of a loop: it is no hole.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
     flattened : (c,) bool
@@ -90,6 +95,7 @@ class Lids:
     loop: IntArray
     extension: sparse.csr_array
     component: IntArray
+    of_wall: BoolArray
     encloses: BoolArray
     flattened: BoolArray
     option: bool | None = None
@@ -105,13 +111,18 @@ class Lids:
         return self.encloses[self.component]
 
     @property
+    def holes(self) -> BoolArray:
+        """(k,) bool: those of the `used` loops that are holes, not borders of walls."""
+        return self.used & ~self.of_wall
+
+    @property
     def is_open(self) -> BoolArray:
         """(c,) bool: the components of the mesh that have borders."""
         return np.bincount(self.component, minlength=len(self.encloses)) > 0
 
     def summary(self, *, preserved: bool = True) -> str:
         """Return in one line what has a volume, and whether it is *preserved*."""
-        is_open, holes = self.is_open, int(self.used.sum())
+        is_open, holes, walls = self.is_open, int(self.holes.sum()), int(self.of_wall.sum())
         if not self.has_volume:
             if not is_open.any() or self.option:
                 return "No enclosed volume: nothing to preserve"
@@ -126,7 +137,8 @@ class Lids:
                 return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
             return f"{many} open parts: {_NOTHING}"
         done = "kept" if preserved else "measured"
-        parts = [f"Closed surface: volume {done}"]
+        inside = f" with {'an inner wall' if walls == 1 else 'inner walls'}" if walls else ""
+        parts = [f"Closed surface{inside}: volume {done}"]
         if holes:
             lids = "a lid" if holes == 1 else "lids"
             parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
@@ -189,9 +201,21 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
     extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), means]))
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    found = Lids(faces, loop, extension, component, every, ~every, wanted)
+    of_wall = _walls(mesh, tail, head, loop, k)
+    found = Lids(faces, loop, extension, component, of_wall, every, ~every, wanted)
     found = replace(found, encloses=_enclosing(mesh, found, wanted))
     return replace(found, flattened=_flattened(mesh, found))
+
+
+def _walls(mesh: Mesh, tail: IntArray, head: IntArray, loop: IntArray, k: int) -> BoolArray:
+    """Return which of the *k* loops, of edges from *tail* (b,) to *head*, are borders of walls."""
+    at_border = np.zeros(mesh.n_vertices, dtype=bool)
+    at_border[tail] = True
+    faces = mesh.faces[at_border[mesh.faces].sum(axis=1) > 1]
+    keys = edge_keys(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), mesh.n_vertices)
+    found, counts = np.unique(keys, return_counts=True)
+    meet = counts[np.searchsorted(found, edge_keys(tail, head, mesh.n_vertices))]
+    return np.asarray(np.bincount(loop, meet < 3, k) == 0)
 
 
 def volume_summary(mesh: Mesh, lids: bool | None = None) -> str:

@@ -33,7 +33,7 @@ from ..errors import ArgumentError, MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
-from .array_names import set_names, warn_of_rounding, with_storable_texts
+from .array_names import set_names, warn_left_out, warn_of_rounding, with_storable_texts
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
 from .groups import GROUP, names_key
@@ -57,6 +57,7 @@ _WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
 }  # fmt: skip
 _VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
 _VTK_WRITES = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
+_SHORT = 200  # characters of a name in messages
 # Formats of point arrays of any name and colours.
 _STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"})
 
@@ -167,6 +168,7 @@ def write_mesh(
             elif suffix in _VTK_WRITES:
                 write_with_vtk(draft, surface)
             else:
+                warn_left_out(f"{suffix} written by PyMeshLab", surface, {})
                 _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
@@ -277,7 +279,7 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
     """
     if isinstance(mesh, pv.PolyData):
         return mesh
-    name, expected = as_text(name, "name"), as_text(expected, "expected")
+    name, expected = as_text(name, "name", _SHORT), as_text(expected, "expected", _SHORT)
     line = conversion_of(mesh)
     data = pv.wrap(mesh) if line == "Surface(mesh)" else None
     if isinstance(data, pv.PolyData):

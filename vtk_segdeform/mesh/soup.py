@@ -96,7 +96,12 @@ class Soup:
         A vertex that is several points with *targets* (q, 3) goes to the mean.
         """
         ids = as_ids(points, len(self.points), "points")
-        ends = as_points(targets, "targets", len(ids))
+        ends = as_points(targets, "targets")
+        if len(ends) != len(ids):
+            raise ConstraintError(
+                f"targets must be a point for each of the {len(ids)} points of the handle; got "
+                f"shape {ends.shape}"
+            )
         is_vertex = ~np.isin(ids, self.loose)
         if len(ids) and not is_vertex.any():
             raise ConstraintError(

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from ..arrays import IntArray, is_number, is_whole
+from ..arrays import FloatArray, IntArray, is_number, is_whole
 from ..checks import shown
-from ..errors import ArgumentError
+from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh
 from .implicit import Limb, standing_body
 
@@ -132,7 +132,7 @@ def bar(
             count += len(side)
     lattice, number = np.unique(np.concatenate(sides), axis=0, return_inverse=True)
     vertices = (lattice / divisions - [0.5, 0.5, 0.0]) * size
-    return Mesh(vertices, number.ravel()[np.concatenate(faces)])
+    return _made(vertices, number.ravel()[np.concatenate(faces)], f"size {shown(size)}")
 
 
 def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) -> Mesh:
@@ -161,7 +161,7 @@ def torus(n_vertices: int = 3000, *, major: float = 1.0, minor: float = 0.35) ->
     faces = np.concatenate(
         [np.stack([k, above, beyond], axis=-1), np.stack([k, beyond, next_], axis=-1)]
     )
-    return Mesh(vertices, faces)
+    return _made(vertices, faces, f"major {shown(major)} and minor {shown(minor)}")
 
 
 def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
@@ -177,7 +177,15 @@ def sphere(n_vertices: int = 2562, *, radius: float = 1.0) -> Mesh:
     a, b, c = vertices[faces.T]
     inward = np.einsum("ij,ij->i", a, np.cross(b, c)) < 0
     faces[inward] = faces[inward, ::-1]
-    return Mesh(radius * vertices, faces)
+    return _made(radius * vertices, faces, f"radius {shown(radius)}")
+
+
+def _made(vertices: FloatArray, faces: IntArray, what: str) -> Mesh:
+    """Return the mesh; ArgumentError if *what* gives none, being too small or too large."""
+    try:
+        return Mesh(vertices, faces)
+    except MeshError as fault:
+        raise ArgumentError(f"cannot make a mesh with {what}: {fault}") from None
 
 
 def _require(n_vertices: int, least: int) -> None:

@@ -273,7 +273,7 @@ def checked_motion(mesh: Mesh, to: ArrayLike) -> FloatArray:
     if array.ndim == 2:
         raise ConstraintError(f"to must be a point (3,) or a matrix (4, 4); got {array.shape}")
     point = checked_point(array)
-    require_near(mesh, point, "the pulled positions")
+    require_near(mesh, point, "the pulled positions (to)")
     return point
 
 

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, frozen, is_whole, plain
-from ..cages import Cage, fit_cages, suggested_size
+from ..cages import Cage, fit_cages, require_cage_vertices, suggested_size
 from ..checks import require, require_sequence, shown
 from ..deformer import (
     Deformer,
@@ -733,7 +733,7 @@ class Session(Timeline):
                 grasp = pulling.as_it_is(grasp, self.turned(), self.vertices)
         targets = grasp.targets(motion)
         for points in targets.values():
-            handles.require_near(self.mesh, points, "the pulled positions")
+            handles.require_near(self.mesh, points, "the pulled positions (to)")
         state = grasp.state
         assert state.pose is not None
         wanted = {**state.pose.targets, **targets}
@@ -1074,6 +1074,7 @@ class Session(Timeline):
     ) -> tuple[Cage, ...]:
         wanted, offset = options.n_cage_vertices, options.offset
         size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
+        require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
         return fit_cages(
             self.mesh, regions, size, fixed=self.fixed, offset=offset, progress=progress
         )

@@ -237,6 +237,6 @@ def _with_modifiers(key: str, held: Mapping[str, bool]) -> str:
 
 def _require_action(name: object, names: Collection[str], argument: str) -> None:
     if not isinstance(name, str) or name not in names:
-        near = difflib.get_close_matches(str(name), names, n=1)
+        near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
         hint = f"; did you mean {near[0]!r}?" if near else ""
         raise ArgumentError(f"{argument}: there is no action {shown(name)}{hint}")

@@ -84,8 +84,7 @@ class Recorder:
         skips: Callable[[Input], bool] | None = None,
     ) -> None:
         self.view = View.of(view)
-        if len(as_text(keys, "keys")) > _MOST_KEYS:
-            raise ArgumentError(f"keys must be {_MOST_KEYS} at most; got {len(keys)}")
+        as_text(keys, "keys", _MOST_KEYS)
         self._skips = None if skips is None else as_callable(skips, "skips")
         self.lines: list[str] = []
         self._start = time.monotonic()
@@ -121,9 +120,9 @@ class Recorder:
 
     def assign(self, keys: Mapping[str, Sequence[str]]) -> None:
         """Note that actions of the editor have other *keys* from now on."""
-        require(keys, Mapping, "keys")
+        entry = Keys.of(keys)
         self._record_ticks()
-        self._record(Keys(tuple((name, tuple(each)) for name, each in keys.items())))
+        self._record(entry)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the recording so far to a text file; SessionError if that fails."""

@@ -15,10 +15,12 @@ limits.  A replay does nothing but send these events.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Protocol
 
-from vtk_segdeform.errors import SessionError
+from vtk_segdeform.checks import all_of, require, shown
+from vtk_segdeform.errors import ArgumentError, SessionError
 
 from ..scene import View
 from .confinement import set_recorded_keys
@@ -252,6 +254,16 @@ class Keys:
     """The keys of actions of the editor; the other actions have their default keys."""
 
     assigned: tuple[tuple[str, tuple[str, ...]], ...]
+
+    @classmethod
+    def of(cls, keys: Mapping[str, Sequence[str]]) -> Keys:
+        """Return the *keys* of actions; ArgumentError if a recording cannot store them."""
+        names = all_of([*require(keys, Mapping, "keys")], str, "keys")
+        entry = cls(tuple((name, all_of(keys[name], str, f"keys[{name!r:.40}]")) for name in names))
+        words = str(entry).split(" ")[1:]
+        if len(words) > _MOST_ACTIONS or not all(map(_ASSIGNED.fullmatch, words)):
+            raise ArgumentError(f"keys must be those of actions, undo=u; got {shown(keys)}")
+        return entry
 
     @classmethod
     def read(cls, words: list[str]) -> Keys:

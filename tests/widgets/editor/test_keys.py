@@ -42,6 +42,13 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
             assert [key_name(key_cap(key)) for key in b.keys] == [*b.keys]
 
 
+class Nameless:
+    """Has no text."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError
+
+
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
@@ -53,6 +60,7 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
         ({"undo": [3]}, "a key must be a text"),
         ("emacs", "'pyvista' or 'Blender'"),
         (3, "a preset or a mapping"),
+        ({Nameless(): "u"}, "keys: there is no action"),
     ],
 )
 def test_an_invalid_choice_is_named(choice, message):

@@ -13,7 +13,7 @@ from scenes import sausage
 from soaking import slender
 
 from vtk_segdeform import Session
-from vtk_segdeform.errors import SessionError
+from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.puller.puller import Puller as SurfacePuller
 from vtk_segdeform.widgets.recording.recording import Recorder, replay
@@ -165,6 +165,21 @@ def test_the_size_of_the_window_is_recorded():
     replay(again.view, recorder.lines)
     assert tuple(again.view.window.GetSize()) == (320, 280)
     assert same(desk, again)
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"undo": None}, {"undo": "u"}, {3: ["u"]}, {"undo": [3]}, {"undo": ["u v"]}, {"un do": ["u"]}],
+)
+def test_keys_that_a_recording_cannot_store_are_refused(keys):
+    recorder = Recorder(plain_view())
+    lines = [*recorder.lines]
+    with pytest.raises(ArgumentError, match="keys"):
+        recorder.assign(keys)
+    assert recorder.lines == lines
+    recorder.assign({"undo": ("ctrl+z", "u"), "redo": ()})
+    recorder.stop()
+    assert any(line.endswith("Keys undo=ctrl+z,u redo=") for line in recorder.lines)
 
 
 def test_each_line_is_written_at_once(tmp_path):
