@@ -119,7 +119,7 @@ def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_on
     least = 0.02 * solver.energy.scale
     weight = solver.steadying(squeezed, least)
     assert weight > 0.0
-    places = held()._constraints.places(held()._targets)
+    places = held()._constraints.places(held()._path.targets)
 
     def slope(k, q):
         anchors = Anchors(k * solver.energy.mass, squeezed, np.zeros_like(p))

@@ -97,7 +97,7 @@ from .locality import Ring, SurfaceSamples
 from .path import Path
 
 _POSITION_WEIGHT = 2700.0  # of a handle or fixed patch, times the scale of the shape energy
-_ANCHOR_WEIGHT = 1.0  # kappa of a local deformer, in weights of a handle; see `locality`
+_ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _GAIN = 0.7  # the factor by which errors of pulled points must fall
@@ -212,7 +212,7 @@ class Deformer:
         preserve_volume: bool = True,
         preserve_region_volumes: bool = False,
         lids: bool | None = None,
-        stretch: float = 10.0,
+        stretch: float = 1.0,
         rotation_groups: int | None = 300,
         tolerance: float = 1e-7,
         max_steps: int = 500,
@@ -348,7 +348,7 @@ class Deformer:
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
         near = point, float(reach) / self._frame.size, follows
-        weight = _ANCHOR_WEIGHT * _POSITION_WEIGHT * self._binding.energy.scale
+        weight = _ANCHOR_WEIGHT * self._binding.energy.scale
         quadratic = weight * self._samples.quadratic(*near) + self._drag_of(*near)
         quadratic += self._of_loose_parts()
         before, p = self._constraints.solver, self._path.p
@@ -446,7 +446,7 @@ class Deformer:
         positions = positions.local(positions.rows, anchors)
         without = replace(self._constraints.solver, energy=energy, positions=positions)
         far = _FAR_PULL * self.mesh.diagonal / self._frame.size
-        most = _POSITION_WEIGHT * energy.scale
+        most = _ANCHOR_WEIGHT * energy.scale
         for target, point, ring in rings:
             rows, row = ring.combinations @ self.subspace.at(ring.vertices), self._row_of(point)
             (own, both), (_, offset) = without.compliance(np.stack([row, rows[0]]))

@@ -227,7 +227,7 @@ class GaussNewton:
         # Cage vertices that move nothing (a region without fixed vertices or handles, weights
         # near zero) leave H singular.  A share of the identity damps the step there; d, and with
         # it every stationary point, stays the same.
-        trace = np.trace(hessian) / len(hessian)
+        trace = np.trace(self.energy.quadratic) / len(hessian)
         share = np.eye(len(hessian))
         if not len(self.positions.rows):  # without positions rounding would move the whole mesh
             mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
