@@ -33,7 +33,7 @@ LOCALITY, SPREAD = 0.2, 0.5
 FARTHEST_APART = 20.0
 """Diagonals of the mesh between two targets or fixed vertices, at most.
 
-At this distance volumes are rounded to about 1e-12 of themselves; the error grows with its cube."""
+At this distance volumes are rounded to a few 1e-12 of themselves; the error grows with its cube."""
 
 
 def check_options(stretch: float, rotation_groups: int | None) -> None:

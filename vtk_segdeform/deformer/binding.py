@@ -179,5 +179,6 @@ def _with_interior(inputs: BindingInputs, energy: Energy) -> Energy:
     p = np.split(inputs.rest_cages, ends)
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
     weights = regions.weights if inputs.blend is None else inputs.blend
-    interior = Interior.of(mesh, lids_of(regions.mesh).encloses)
-    return with_interior(energy, mesh, weights, cages, interior)
+    interior = Interior.of(mesh, weights, lids_of(regions.mesh).encloses)
+    gradients = interior.gradients(cages, energy.subspace)
+    return with_interior(energy, gradients, interior.volumes)
