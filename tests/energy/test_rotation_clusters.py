@@ -9,6 +9,7 @@ from scenes import Scene, sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.deformer import binding
 from vtk_segdeform.energy import rotation_clusters
 from vtk_segdeform.energy.energy import Energy
 from vtk_segdeform.geometry.kmeans import cluster_within_parts
@@ -21,7 +22,9 @@ SCENE = sausage()
 @functools.cache
 def fine(scene: Scene) -> tuple[Energy, np.ndarray, tuple[np.ndarray, ...]]:
     """Return the energy with a rotation for each vertex, the cages at rest, and the patches."""
-    deformer = scene.deformer(rotation_groups=scene.mesh.n_vertices)
+    with pytest.MonkeyPatch.context() as surface_only:
+        surface_only.setattr(binding, "_with_interior", lambda _, energy: energy)
+        deformer = scene.deformer(rotation_groups=scene.mesh.n_vertices)
     n = scene.mesh.n_vertices
     patches = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
     return deformer._binding.energy, deformer._rest_cages, patches
