@@ -96,7 +96,7 @@ from .frame import Frame
 from .locality import Ring, SurfaceSamples
 from .path import Path
 
-_POSITION_WEIGHT = 2700.0  # of a handle or fixed patch, times the scale of the shape energy
+_POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
 _ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most

@@ -125,7 +125,6 @@ def bench():
 @pytest.fixture
 def roughly(monkeypatch):
     """Solve one step per event, far from convergence: for tests of targets, which are exact."""
-    monkeypatch.setattr(live_solve, "_WITHIN", None)
     for name in ("_LEAST_STEPS", "_MOST_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
 
@@ -846,6 +845,7 @@ def test_a_pose_reached_by_undo_is_not_refined(bench):
     assert not bench.has_timer
 
 
+@pytest.mark.usefixtures("roughly")
 def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     place = bench.aim(FREE)
     bench.hand.press(place)
@@ -865,6 +865,7 @@ def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     assert bench.session.state.pose is None
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
     place = bench.aim(FREE)
     bench.hand.drag([place, place + [-40.0, 60.0]])
