@@ -283,7 +283,7 @@ def test_nearest_points_are_those_of_scipy(monkeypatch):
     for n in ("1", "3"):
         monkeypatch.setattr(threads, "n_threads", lambda n=n: int(n))
         for k, within in (((1,), 0.05), (range(1, 4), np.inf), ((2,), 0.1)):
-            ours = threads.nearest(tree, points, k)
+            ours = threads.nearest(tree, points, k, within=within)
             theirs = tree.query(points, k=list(k), distance_upper_bound=within)
             for a, b in zip(ours, theirs, strict=True):
                 np.testing.assert_array_equal(a, b)

@@ -258,7 +258,7 @@ def test_a_mark_that_moves_is_culled_and_clipped_as_in_the_view(page, scene):
         assert set(send(page, here.due(marks=marks))) == {""}
         expected, got = here.picture(), drawn(page)
         red = [(p[..., 0] > 200) & (p[..., 1] < 60) for p in (expected, got)]
-        assert (red[0] ^ red[1]).sum() <= 0.03 * (red[0] | red[1]).sum()
+        assert (red[0] ^ red[1]).sum() <= 0.05 * (red[0] | red[1]).sum()  # at edges
         counts.append(int(red[0].sum()))
     here.view.remove_foreground()
     assert min(counts[0], counts[1], counts[3]) > 2000
