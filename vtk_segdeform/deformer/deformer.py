@@ -100,6 +100,7 @@ _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of th
 _ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
+_FRAME = 3e-5  # tolerance of the first solve for targets of a drag, which go on
 _GAIN = 0.7  # the factor by which errors of pulled points must fall
 _PULLED = 1e-5  # largest error of pulled points in a final pose
 _SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
@@ -763,6 +764,9 @@ class Deformer:
         limit = self._options.max_steps if max_steps is None else max_steps
         options = replace(self._options, max_steps=limit, progress=progress)
         path, is_live = self._path, max_steps is not None
+        is_frame = is_live and not np.array_equal(goal, path.targets)
+        if is_frame:
+            options = replace(options, tolerance=max(options.tolerance, _FRAME))
         steps = self._follow_waypoints(goal, options)
         path.targets, error = goal, math.inf
         while True:
@@ -774,6 +778,8 @@ class Deformer:
             if is_there or result.status is Status.STEP_LIMIT or limit <= 0:
                 break
             path.offsets = path.offsets + off
+        if is_frame and result.status is Status.CONVERGED:
+            result = replace(result, status=Status.STEP_LIMIT)
         solution = self._solution(result, x, steps)
         return solution if is_live else self._with_remaining(solution, goal)
 
