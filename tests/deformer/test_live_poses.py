@@ -71,4 +71,4 @@ def test_a_pull_of_a_soft_body_keeps_the_point_and_follows():
             assert np.linalg.norm(session.vertices[vertex] - to) < 1e-4 * mesh.diagonal
             worst = max(worst, farthest(converged(session, preparation), session.vertices))
     print(f"{worst / mesh.diagonal:.2%} away")
-    assert worst < 0.01 * mesh.diagonal
+    assert worst < 0.015 * mesh.diagonal

@@ -45,7 +45,7 @@ from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
 from ..errors import ArgumentError, ConstraintError
-from ..finish import CellEnergy, Finisher, Unbalanced
+from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
 from ..geometry import Lids, lids_of, turned_over
 from ..kernels import compiled_kernels, one_blas_thread
@@ -100,7 +100,7 @@ _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of th
 _ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `locality`
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
-_FRAME = 3e-5  # tolerance of the first solve for targets of a drag, which go on
+_FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
 _GAIN = 0.7  # the factor by which errors of pulled points must fall
 _PULLED = 1e-5  # largest error of pulled points in a final pose
 _SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
@@ -122,7 +122,6 @@ _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
 _UNMOVED = 0.1 * CONVERGED  # diagonals: a finish that moves less has come to its end
-_PARTS = 1.0, 0.5, 0.25  # of the finish of a pull: the first that lowers the energy is used
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
@@ -589,22 +588,21 @@ class Deformer:
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
         """Return the pose of the last solve, finished on the mesh itself; see `finish`.
 
-        A few steps over all vertices, which take as long as 10 to 35 iterations of
-        as-rigid-as-possible, or longer where parts cross: triangles are less distorted, joints bend
-        in less space, and the handles and fixed vertices are exact.  The volume is preserved as
-        before.  The next solve starts from the cages, as if the pose had not been finished.  Of a
-        deformer made by `local` only the surface within the reach is finished: it stays from 1.15
-        times the reach on, and around a handle of one vertex, which would become a bump.  A pose
-        that would lose its volume, because hardly a vertex is free, is returned unchanged.  Of the
-        finish of a pull half is used, or a quarter, if all of it would add energy or folds; if
-        these do as well, the pose is returned unchanged.
+        As rigid as possible within the spacing of the cages, and where they are beyond it.  This
+        takes as long as 5 to 50 iterations of as-rigid-as-possible: triangles are less distorted,
+        and the handles and fixed vertices are exact.  The volume is preserved as before.  The next
+        solve starts from the cages, as if the pose had not been finished.  Of a deformer made by
+        `local` only the surface within the reach is finished: it stays from 1.15 times the reach
+        on, and around a handle of one vertex, which would become a bump.  A pose that would lose
+        its volume, because hardly a vertex is free, is returned unchanged.
 
-        Where *solution* has no crossings there are none after it, either.
+        A deformer that avoids contact separates parts that cross, and keeps others from crossing.
 
         Parameters
         ----------
         solution : Solution
-            That of the last solve, or a finished one, which is finished further.
+            That of the last solve, or a finished one, which is finished further, near the same pose
+            of the cages.
         progress : Progress, optional
             Called before every step; may raise `Cancelled`.
 
@@ -613,8 +611,7 @@ class Deformer:
         Solution
             With the finished `vertices`; ``cage_vertices`` are those of *solution*, and ``merits``
             those of the last steps.  The status is measured on the finished mesh: it is STEP_LIMIT
-            where finishing it again would still move it, and STALLED where only crossings, folds or
-            the like keep it from its minimum.
+            where finishing it again would still move it.
 
         Raises
         ------
@@ -635,37 +632,28 @@ class Deformer:
         places = np.array(self._rest_pose.vertices)
         places[self.fixed] = frame.about_origin(self._constraints.fixed_at)
         places[self.handle] = frame.about_origin(frame.outward(self._path.targets))
-        start = frame.about_origin(solution.vertices)
-        keeps, shares = self._constraints.keeps, None
+        unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
+        pose = start = frame.about_origin(unfinished)
+        if solution.is_finished:
+            start = frame.about_origin(solution.vertices)
+        keeps = self._constraints.keeps
         if keeps is not None:
             away = self._samples.smooth_at_vertices(np.minimum(np.sqrt(keeps / _STAYS), 1.0))
-            away = np.maximum(away, self._near_pulled_vertices())
-            stays = (away == 1.0) & ~held
-            places[stays] = start[stays]
+            stays = ((away == 1.0) | self._is_near_pulled_points()) & ~held
+            places[stays] = pose[stays]
             held |= stays
             self._place_points(places, stays)
-            shares = (1.0 - away * away * (3.0 - 2.0 * away))[:, None]
-        volumes = self.preserved_volumes
-        given = self._rest_pose, self._cell_energy, held, volumes, progress
-        finisher = Finisher(*given, avoid_contact=self._avoid_contact)
-        found = finisher.run(start, places[held], progress, further=solution.is_finished)
-        end = found.vertices
-        if shares is not None and end is not start:
-            unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
-            base = frame.about_origin(unfinished)
-            ways = (finisher.between(base, end, part * shares) for part in _PARTS)
-            found = replace(
-                found,
-                vertices=next((x for x in ways if finisher.is_better(start, x)), start),
-            )
+        given = self._rest_pose, self._cell_energy, held, self.preserved_volumes
+        finisher = Finisher(*given, self._cage_weights, progress, avoid_contact=self._avoid_contact)
+        found = finisher.run(pose, places[held], progress, start=start)
         # Without enough free vertices exact handles and exact volumes exclude each other.
         off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
         if max(off, default=0.0) > _VOLUME_KEPT:
-            found, end = replace(found, vertices=start), start
+            found = replace(found, vertices=start)
         is_start = found.vertices is start
         if is_start and not solution.is_finished:
             return solution
-        remaining = self._remaining_of_finish(finisher.unbalanced(end), shares)
+        remaining = found.remaining / self.mesh.diagonal
         status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
         moved = _largest(found.vertices - start) / self.mesh.diagonal
         if status is Status.STEP_LIMIT and moved <= _UNMOVED:
@@ -679,41 +667,23 @@ class Deformer:
             volume=partial(self._total_volume.relative, found.vertices),
             region_volumes=self._region_volume_changes,
             remaining=remaining,
-            unfinished=solution.vertices if solution.unfinished is None else solution.unfinished,
+            unfinished=unfinished,
             unmoved=self._constraints.unmoved,
         )
         return replace(finished, status=self._missed_status if _is_off(finished) else status)
 
-    def _remaining_of_finish(self, off: Unbalanced, shares: FloatArray | None) -> float:
-        """Return the estimate `Solution.remaining` of a finished pose, of which *shares* move.
+    def _is_near_pulled_points(self) -> BoolArray:
+        """Return which vertices are within the spread of pulled points, or next to these, (n,).
 
-        The steps of the finish hardly see the smooth motions that are left at its end.  These are
-        motions of the cages, so it is the larger of the next step and Newton's step of the cages
-        against the same forces, with the Hessian of their own energy.  That is scaled to the energy
-        of the finish: both are the same for a pose that is collapsed to a point.
-        """
-        solver, size = self._path.solver, self._frame.size
-        scale = self._binding.energy.constant / self._cell_energy.constant * size
-        forces = [each if shares is None else shares * each for each in (off.slope, *off.rows)]
-        slope, *rows = self.subspace.adjoints(forces)
-        step = self.subspace.map(solver.response(self._path.p, scale * slope, rows)) * size
-        step[off.stays] = 0.0
-        return max(_largest(step), _largest(off.step)) / self.mesh.diagonal
-
-    def _near_pulled_vertices(self) -> FloatArray:
-        """Return 1 within the spread of pulled points, 0 beyond twice the spread, (n,) float.
-
-        And 1 at their corners and the neighbours of these.  Triangles resist no bending, so the
-        finish would concentrate the load of a pulled point in a crease around it.  The cages
-        distribute it, so their pose is kept here.
+        Triangles resist no bending, so the finish would concentrate the load of a pulled point in a
+        crease around it.  The cages distribute it, so their pose is kept here.
         """
         x, pulled = self._rest_pose.vertices, self._constraints.pulled
-        near = np.zeros(len(x))
+        near = np.zeros(len(x), dtype=bool)
         for each in pulled.points:
-            away = np.linalg.norm(x - each.at(x), axis=1) / pulled.spread
-            near = np.maximum(near, np.clip(2.0 - away, 0.0, 1.0))
+            near |= np.linalg.norm(x - each.at(x), axis=1) <= pulled.spread
             corners = list(each.corners)
-            near[corners] = near[self.mesh.adjacency[corners].indices] = 1.0
+            near[corners] = near[self.mesh.adjacency[corners].indices] = True
         return near
 
     def _place_points(self, places: FloatArray, stays: BoolArray) -> None:
@@ -727,8 +697,15 @@ class Deformer:
                 places[corners[free]] += (goal - point.at(places)) / shares[free].sum()
 
     @cached_property
+    def _cage_weights(self) -> FloatArray:
+        """Weights w (n,) of `finish.finisher`: 1 for each cage vertex, over its region by area."""
+        own = self.regions.weights * self.mesh.vertex_areas
+        counts = np.array([len(cage.vertices) for cage in self.cages])
+        return np.asarray((counts / own.sum(axis=1)) @ own)
+
+    @cached_property
     def _cell_energy(self) -> CellEnergy:
-        return CellEnergy.of(self._rest_pose)
+        return CellEnergy.of(self._rest_pose, self.mesh.n_vertices / len(self._rest_cages))
 
     def _is_plausible(self, x: FloatArray, goal: FloatArray, before: FloatArray) -> bool:
         """Tell whether no vertex of *x* (n, 3) is farther away than a motion to *goal* explains.

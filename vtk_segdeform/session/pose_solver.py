@@ -305,7 +305,7 @@ class PoseSolver:
             region_volumes=lambda _: np.empty(0),
             crossed=partial(new_crossings, rest=rest, faces=faces),
             folded=partial(turned_over, rest=rest, faces=faces),
-            unfinished=x if is_further else None,
+            unfinished=self._surface(state, pose.cage_vertices) if is_further else None,
         )
         aims = np.array(wanted)
         if state.locality is not None and beside is not None:  # where the deformer differs

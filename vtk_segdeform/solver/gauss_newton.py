@@ -28,8 +28,8 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
 2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
    needed, and a small step does not mean that the minimum is near.  With the derivatives of the
    rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
-   They are computed again after 12 steps.  If H is not convex, it contains a share of the rotations'
-   derivatives only, and h is shorter than that.
+   They are computed again after 6 steps.  If H is not convex, it contains a share of the
+   rotations' derivatives only, and h is shorter than that.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
@@ -81,7 +81,7 @@ _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough f
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
-_OLD = 12  # steps after which H is computed again
+_OLD = 6  # steps after which H is computed again
 _OLD_ACTIVE = 3  # the same while a term is active
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
