@@ -701,7 +701,8 @@ class Deformer:
         """Weights w (n,) of `finish.finisher`: 1 for each cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
-        return np.asarray((counts / own.sum(axis=1)) @ own)
+        areas = np.maximum(own.sum(axis=1), np.finfo(float).tiny)
+        return np.asarray((counts / areas) @ own)
 
     @cached_property
     def _cell_energy(self) -> CellEnergy:

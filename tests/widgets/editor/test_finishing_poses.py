@@ -450,8 +450,7 @@ def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F8
     assert not session.is_unsettled
     bench.type("shift+f")
     assert session.solution.is_finished
-    assert np.abs(session.vertices - before).max() < 0.1 * session.mesh.diagonal
-    assert not np.array_equal(session.vertices, before)
+    assert np.abs(session.vertices - before).max() < 1e-3 * session.mesh.diagonal
 
 
 def test_a_part_that_no_handle_moves_is_named_once():
