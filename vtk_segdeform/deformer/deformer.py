@@ -701,8 +701,9 @@ class Deformer:
         """Weights w (n,) of `finish.finisher`: 1 for each cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
-        areas = np.maximum(own.sum(axis=1), np.finfo(float).tiny)
-        return np.asarray((counts / areas) @ own)
+        areas = own.sum(axis=1)
+        density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
+        return np.asarray(density @ own)
 
     @cached_property
     def _cell_energy(self) -> CellEnergy:
