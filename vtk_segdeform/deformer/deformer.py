@@ -122,6 +122,10 @@ _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
 _UNMOVED = 0.1 * CONVERGED  # diagonals: a finish that moves less has come to its end
+# l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
+# four bodies is 1.5 times that of as-rigid-as-possible, with 2, 1.3 times; poses of a dog are 2 %
+# farther from the true ones.
+_SPACINGS = 2.0
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
@@ -698,12 +702,12 @@ class Deformer:
 
     @cached_property
     def _cage_weights(self) -> FloatArray:
-        """Weights w (n,) of `finish.finisher`: 1 for each cage vertex, over its region by area."""
+        """Weights w (n,) of `finish.finisher`: 1 / 4 of a cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
         areas = own.sum(axis=1)
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
-        return np.asarray(density @ own)
+        return np.asarray(density @ own) / _SPACINGS**2
 
     @cached_property
     def _cell_energy(self) -> CellEnergy:

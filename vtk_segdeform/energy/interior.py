@@ -33,8 +33,8 @@ from ..mesh import Mesh
 from ..subspace import Subspace
 from .energy import Energy
 
-# Share of the trace of the energy.  With 0.1 twists still jump, with 1 poses of a dog are 4 %
-# farther from the true ones.
+# Share of the trace of the energy.  With 0.1 twists of a bar jump and with 0.2 a short one unwinds;
+# with 1 poses of a dog are 4 % farther from the true ones.
 _SHARE = 0.3
 _PATCHES = 200  # with 100, the twist of a bar jumps
 _DEPTH = 0.75  # of the points, in radii of their balls

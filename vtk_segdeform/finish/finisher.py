@@ -4,11 +4,12 @@
     subject to  x = u at fixed vertices and handles,   g(x) = 0                              (9)
 
 E is the energy of `cell_energy` and y the pose of the cages, with fixed vertices and handles put in
-their places; A_i is the area around vertex i, and l_i the spacing of the cages there, so that l_i^2
-is the area around one of their vertices.  The Hessian of E is at most its Laplacian C, which is
-A_i k^2 for a wave with the wave number k.  So waves longer than l stay as the cages found them, and
-shorter ones, which cages cannot represent, relax.  How limbs bend is left to the cages: their
-energy has the detail term (5), and the minimum of E alone is farther from where real bodies are.
+their places; A_i is the area around vertex i, and l_i twice the spacing of the cages there, whose
+square is the area around one of their vertices.  The Hessian of E is at most its Laplacian C, which
+is A_i k^2 for a wave with the wave number k.  So waves that are long beside l stay as the cages
+found them, and shorter ones, which cages hardly represent, relax.  How limbs bend is left to the
+cages: their energy has the detail term (5), and the minimum of E alone is farther from where real
+bodies are.
 
 The equations are those of `solver.gauss_newton`, with the rows of the free vertices of C + diag(w)
 in place of H, which is factored once; fixed vertices and handles are eliminated, so they are exact:
