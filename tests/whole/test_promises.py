@@ -154,7 +154,7 @@ def coarser(vertices, faces, selection, n):
         [
             ("cactus", 800, 0.11, 0.09, 0.96),
             ("cactus", None, 0.10, 0.085, 0.95),
-            ("cylinder", None, 0.20, 0.11, 0.95),
+            ("cylinder", None, 0.22, 0.15, 0.95),
         ],
     ),
 )

@@ -78,7 +78,7 @@ class Interior:
             return cls(points, radius, volume, weights[:, own])
         patch = cluster_positions(x, _PATCHES)
         patch = np.unique([patch, component], axis=1, return_inverse=True)[1].ravel()
-        total = np.bincount(patch, volume)
+        total = np.asarray(np.bincount(patch, volume), dtype=np.float64)
 
         def mean(values: FloatArray) -> FloatArray:
             return np.asarray(np.bincount(patch, volume * values) / total)
