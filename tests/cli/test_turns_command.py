@@ -63,14 +63,18 @@ def test_turns_that_the_body_loses_are_an_error(turned, capsys):
 
 @pytest.mark.parametrize("divisions", [(2, 2, 2), (2, 2, 6), (3, 3, 12)])
 @pytest.mark.parametrize("axis", "xz")
-def test_a_coarse_bar_bends_by_half_a_turn_either_way_and_snaps_back_from_more(
+def test_a_coarse_bar_bends_by_half_a_turn_either_way_and_it_is_told_whether_by_more(
     tmp_path, capsys, divisions, axis
 ):
-    """On a coarse bar, the sums of rotations are far from the angle, by up to half a turn."""
+    """On a coarse bar, the sums of rotations are far from the angle, by up to half a turn.
+
+    A twist, about z, follows to 270 degrees where there is more than one vertex along the bar.
+    """
     path = tmp_path / "bar.ply"
     write_mesh(path, models.bar((0.2, 0.2, 1.0), divisions))
     words = [str(path), "-o", str(tmp_path / "bent.ply"), "--fixed", "z<0.01", "--handle", "z>0.99"]
-    for degrees, back in ((180, ""), (-180, ""), (270, "-90")):
+    follows = axis == "z" and divisions[2] > 2
+    for degrees, back in ((180, ""), (-180, ""), (270, "" if follows else "-90")):
         code = main(["deform", *words, "--regions", "1", "--rotate", f"{axis},{degrees}"])
         assert code == bool(back)
         message = f"by {degrees} degrees: it has snapped back to {back};" if back else ""

@@ -35,7 +35,7 @@ def in_a_live_drag() -> Deformer:
     """Return a deformer on the way to targets far away."""
     deformer = SCENE.held()
     for _ in range(2):
-        deformer.solve(SCENE.turned(50), max_steps=3, within=2.5e-3)
+        deformer.solve(SCENE.turned(50), max_steps=3)
     return deformer
 
 
@@ -50,7 +50,7 @@ def in_a_pull() -> Deformer:
     """Return a local deformer whose pulled vertex has an offset from where it pulls."""
     deformer = SCENE.held().hold(fixed=SCENE.fixed, handle=[TIP]).local(TIP, 0.3 * D, 0.1 * D)
     for share in (0.5, 1.0):
-        deformer.solve(X[[TIP]] + share * NEAR, max_steps=30, within=2.5e-3)
+        deformer.solve(X[[TIP]] + share * NEAR, max_steps=30)
     assert np.abs(deformer._constraints.pulled.offsets).max() > 0.0
     return deformer
 
@@ -68,10 +68,10 @@ def targets(deformer: Deformer, degrees: float) -> np.ndarray:
 
 def what_comes_next(deformer: Deformer) -> list[bytes]:
     """Return what a *deformer* does from where it is, bit for bit."""
-    last = deformer._frame.outward(deformer._targets)
+    last = deformer._frame.outward(deformer._path.targets)
     solutions = [
         deformer.solve(last, max_steps=1),
-        deformer.solve(targets(deformer, 55), max_steps=3, within=2.5e-3),
+        deformer.solve(targets(deformer, 55), max_steps=3),
         deformer.solve(targets(deformer, 58), max_steps=3),
         deformer.solve(targets(deformer, 58)),
     ]
@@ -86,7 +86,7 @@ def solve_far(deformer, progress=None):
 
 
 def solve_live(deformer, progress=None):
-    deformer.solve(targets(deformer, 60), max_steps=6, within=2.5e-3, progress=progress)
+    deformer.solve(targets(deformer, 60), max_steps=6, progress=progress)
 
 
 def solve_some_steps(deformer, progress=None):
@@ -94,7 +94,7 @@ def solve_some_steps(deformer, progress=None):
 
 
 def solve_and_finish(deformer, progress=None):
-    solution = deformer.solve(deformer._frame.outward(deformer._targets), max_steps=1)
+    solution = deformer.solve(deformer._frame.outward(deformer._path.targets), max_steps=1)
     deformer.finish(deformer.finish(solution, progress=progress), progress=progress)
 
 

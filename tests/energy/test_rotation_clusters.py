@@ -9,6 +9,7 @@ from scenes import Scene, sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform.cages.cage import Cage
+from vtk_segdeform.deformer import Deformer, binding
 from vtk_segdeform.energy import rotation_clusters
 from vtk_segdeform.energy.energy import Energy
 from vtk_segdeform.geometry.kmeans import cluster_within_parts
@@ -18,10 +19,17 @@ from vtk_segdeform.regions.regions import Regions
 SCENE = sausage()
 
 
+def of_surface(scene: Scene) -> Deformer:
+    """Return a deformer with a rotation for each vertex, and none inside."""
+    with pytest.MonkeyPatch.context() as hollow:
+        hollow.setattr(binding, "_with_interior", lambda _, energy: energy)
+        return scene.deformer(rotation_groups=scene.mesh.n_vertices)
+
+
 @functools.cache
 def fine(scene: Scene) -> tuple[Energy, np.ndarray, tuple[np.ndarray, ...]]:
     """Return the energy with a rotation for each vertex, the cages at rest, and the patches."""
-    deformer = scene.deformer(rotation_groups=scene.mesh.n_vertices)
+    deformer = of_surface(scene)
     n = scene.mesh.n_vertices
     patches = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
     return deformer._binding.energy, deformer._rest_cages, patches
@@ -43,9 +51,9 @@ def plain(scene: Scene, n_groups: int = 100) -> Energy:
 @functools.cache
 def bent() -> np.ndarray:
     """Return the cages of the sausage, bent by 50 degrees, with a rotation for each vertex."""
-    deformer = SCENE.deformer(rotation_groups=SCENE.mesh.n_vertices)
+    deformer = of_surface(SCENE)
     deformer.solve(SCENE.turned(50))
-    return deformer._p
+    return deformer._path.p
 
 
 def value(energy: Energy, p: np.ndarray) -> float:

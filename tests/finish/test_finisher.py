@@ -17,15 +17,14 @@ from solids import exact_volume_change, icosphere, rotation
 
 from vtk_segdeform import deform, sizes
 from vtk_segdeform.errors import ArgumentError, Cancelled
-from vtk_segdeform.finish import CellEnergy, Finish, Finisher, Folds, cell_energy
+from vtk_segdeform.finish import CellEnergy, Finish, Finisher, cell_energy
 from vtk_segdeform.finish import finisher as finishing
-from vtk_segdeform.finish.creases import smoothed
-from vtk_segdeform.finish.unfolding import unfolded
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
 from vtk_segdeform.mesh import Mesh, new_crossings
 from vtk_segdeform.solver import Bodies, total_volume
 
 SCENE = sausage(2, is_coarse=True)
+PER_CAGE = 60.0  # vertices, so that the cells are larger than a ring
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,17 +36,17 @@ class Problem:
     places: np.ndarray
     start: np.ndarray
 
-    def finish(self, progress=None) -> Finish:
+    def finisher(self, length: float = 0.06, **options) -> Finisher:
+        """Return the problem, with l in diagonals."""
+        bodies = Bodies(self.mesh, total_volume(self.mesh), lids_of(self.mesh))
+        constraints = bodies.constraints(bodies.numbers(np.flatnonzero(self.held)))
+        weights = self.mesh.vertex_areas / (length * self.mesh.diagonal) ** 2
+        energy = CellEnergy.of(self.mesh, PER_CAGE)
+        return Finisher(self.mesh, energy, self.held, constraints, weights, **options)
+
+    def finish(self, length: float = 0.06, **options) -> Finish:
         """Return the finish of the start."""
-        volume = total_volume(self.mesh)
-        lids = lids_of(self.mesh)
-        moved = np.flatnonzero(self.held)
-        bodies = Bodies(self.mesh, volume, lids)
-        constraints = bodies.constraints(bodies.numbers(moved))
-        energy = CellEnergy.of(self.mesh)
-        return Finisher(self.mesh, energy, self.held, constraints).run(
-            self.start, self.places, progress
-        )
+        return self.finisher(length, **options).run(self.start, self.places)
 
     def moved(self, turn, scale, shift) -> Problem:
         """Return the same, turned, scaled and shifted."""
@@ -75,11 +74,10 @@ def sheet() -> Mesh:
     return Mesh(np.stack([u.ravel(), v.ravel(), 0.1 * np.sin(5 * u.ravel())], 1), faces)
 
 
-def until_nothing_is_gained(monkeypatch) -> None:
-    """Let a finish converge, since where it ends early depends on rounding."""
-    monkeypatch.setattr(finishing, "_STEPS", 200)
-    monkeypatch.setattr(finishing, "_TOLERANCE", 1e-9)
-    monkeypatch.setattr(finishing, "_GAIN", 0.0)
+def converging(monkeypatch) -> None:
+    """Let a finish converge to rounding, to compare it with another."""
+    monkeypatch.setattr(finishing, "_STEPS", 500)
+    monkeypatch.setattr(finishing, "_TOLERANCE", 1e-10)
 
 
 SAUSAGE = bent(SCENE.mesh)
@@ -101,15 +99,14 @@ def test_places_and_volume_are_exact_and_the_energy_falls(closed):
             < 1e-13
         )
     rises = np.diff(found.merits) > 1e-12 * found.merits[0]
-    assert found.steps > 4
+    assert found.steps > 2
     assert not rises.any()
-    assert found.merits[-1] < 0.999 * found.merits[0]
-    assert distortion(problem, found.vertices) < 0.5 * distortion(problem, problem.start)
+    assert distortion(problem, found.vertices) < 0.95 * distortion(problem, problem.start)
 
 
 @pytest.mark.parametrize(("scale", "shift"), [(1e-7, 0.0), (1e6, 1e6)])
 def test_a_motion_or_another_unit_moves_the_finish_alike(monkeypatch, scale, shift):
-    until_nothing_is_gained(monkeypatch)
+    converging(monkeypatch)
     turn = rotation([1, 2, 3], 1.2)
     shift = shift * np.array([0.6, -0.8, 0.0])
     moved = SAUSAGE.moved(turn, scale, shift).finish()
@@ -118,52 +115,27 @@ def test_a_motion_or_another_unit_moves_the_finish_alike(monkeypatch, scale, shi
     assert np.abs(error).max() < 1e-4 * SCENE.mesh.diagonal
 
 
-def test_a_pose_is_better_if_it_has_less_energy_and_no_more_folds():
-    mesh, start, found = SAUSAGE.mesh, SAUSAGE.start, SAUSAGE.finish().vertices
-    finisher = Finisher(mesh, CellEnergy.of(mesh), SAUSAGE.held, [])
-    assert finisher.is_better(start, found)
-    assert not finisher.is_better(found, start)
-    folded = mesh.vertices.copy()
-    (free,) = np.flatnonzero(~SAUSAGE.held)[:1]
-    folded[free] += 2.0 * (mesh.vertices[mesh.adjacency[[free]].indices[0]] - folded[free])
-    assert Folds.of(mesh).at(folded).any()
-    assert not Folds.of(mesh).at(start).any()
-    assert finisher.is_better(start, mesh.vertices)
-    assert not finisher.is_better(start, folded)
-
-
 def test_at_rest_the_mesh_stays_bit_for_bit():
     mesh = SCENE.mesh
     rest = Problem(mesh, SAUSAGE.held, mesh.vertices[SAUSAGE.held], mesh.vertices)
     found = rest.finish()
     assert found.vertices is mesh.vertices
     assert found.steps == 0
+    assert found.remaining < 1e-12 * mesh.diagonal
 
 
 def test_components_without_places_stay_where_they_are(monkeypatch):
-    until_nothing_is_gained(monkeypatch)
+    converging(monkeypatch)
     one, n = SAUSAGE, SCENE.mesh.n_vertices
     aside = SCENE.mesh.vertices + [0.0, 5.0, 0.0]
     points = np.concatenate([SCENE.mesh.vertices, aside])
     mesh = Mesh(points, np.concatenate([SCENE.mesh.faces, SCENE.mesh.faces + n]))
     held = np.concatenate([one.held, np.zeros(n, bool)])
     start = np.concatenate([one.start, aside + 0.1])
-    found = Problem(mesh, held, one.places, start).finish()
+    length = 0.06 * SCENE.mesh.diagonal / mesh.diagonal
+    found = Problem(mesh, held, one.places, start).finish(length)
     assert_array_equal(found.vertices[n:], start[n:])
     assert_allclose(found.vertices[:n], one.finish().vertices, atol=1e-6)
-
-
-def test_a_body_in_the_way_that_nothing_holds_stays_where_it_is():
-    x, (ball, faces) = SCENE.mesh.vertices, icosphere(2)
-    start = np.concatenate([x, 0.4 * ball + [0.0, 0.9, 0.0]])
-    mesh = Mesh(start, np.concatenate([SCENE.mesh.faces, faces + len(x)]))
-    held = np.append(np.abs(x[:, 0]) > 2.4, np.zeros(len(ball), dtype=bool))
-    places = start.copy()
-    right = np.flatnonzero(held & (start[:, 0] > 0.0))  # pushed to the left: the middle bulges
-    places[right] = start[right] @ rotation([0, 0, 1], 0.6).T - [0.8, 0.0, 0.0]
-    found = Problem(mesh, held, places[held], start).finish()
-    assert not len(new_crossings(found.vertices, start, mesh.faces))
-    assert_array_equal(found.vertices[len(x) :], start[len(x) :])
 
 
 def test_all_vertices_held_are_put_in_their_places():
@@ -173,19 +145,20 @@ def test_all_vertices_held_are_put_in_their_places():
     assert_array_equal(found.vertices, places)
 
 
-def test_the_energy_and_its_gradient_are_those_of_the_formula(monkeypatch):
-    """E is summed here over cells and triangles, and the gradient is a difference of energies."""
+@pytest.mark.parametrize("rounds", [0, 1, 3])
+def test_the_energy_and_its_gradient_are_those_of_the_formula(rounds):
+    """E is summed here over cells and triangles."""
     ball, faces = icosphere(1)
     mesh = Mesh(ball * [1.0, 0.7, 0.5], faces)
-    energy, rng = CellEnergy.of(mesh), np.random.default_rng(0)
+    energy, rng = CellEnergy.of(mesh, 40.0 * rounds), np.random.default_rng(0)
     x = [1.0, 1.0, 0.6] * (mesh.vertices + 0.1 * rng.normal(size=mesh.vertices.shape))
-    monkeypatch.setattr("vtk_segdeform.finish.cell_energy.SHARE", t := 0.4)
+    t = 0.4  # 40 vertices per cage vertex: that of one round
 
     n, a = mesh.n_vertices, mesh.adjacency.toarray() > 0.0
     p = (1.0 - t) * np.eye(n) + t * a / a.sum(axis=0)
     share = np.zeros((n, mesh.n_faces))
     share[mesh.faces.T, np.arange(mesh.n_faces)] = 1.0 / 3.0
-    share = p @ share
+    share = np.linalg.matrix_power(p, rounds) @ share
     gradients, areas = [], []
     for face in mesh.faces:
         e, y = (np.diff(points[face], axis=0).T for points in (mesh.vertices, x))
@@ -199,22 +172,152 @@ def test_the_energy_and_its_gradient_are_those_of_the_formula(monkeypatch):
         for w, j, face in zip(weights, gradients, mesh.faces, strict=True):
             e = np.diff(mesh.vertices[face], axis=0).T
             total += w * np.sum((j - r @ e @ np.linalg.pinv(e)) ** 2)
-    value, slope = energy.value_and_slope(x)
-    band, _ = energy.band.value_and_slope(x)
-    assert band > 1e-3 * total
-    assert value == pytest.approx(total + band, rel=1e-10)
-    way = rng.normal(size=x.shape)
-    both = [energy.value_and_slope(x + h * way)[0] for h in (1e-6, -1e-6)]
-    assert 2.0 * np.vdot(slope, way) == pytest.approx((both[0] - both[1]) / 2e-6, rel=1e-6)
+    assert energy.value_and_slope(x)[0] == pytest.approx(total, rel=1e-10)
 
 
-def test_a_finish_ends_before_it_gains_nothing(monkeypatch):
-    problem = bent(sausage(3).mesh, 40.0)
-    early = problem.finish()
-    until_nothing_is_gained(monkeypatch)
-    late = problem.finish()
-    assert 2 * early.steps < late.steps
-    assert early.merits[-1] < 1e-4 * early.merits[0]
+def test_the_gradient_of_the_objective_is_its_derivative():
+    """The error of f(x + h d) - f(x - h d) falls with the square of h."""
+    finisher, rng = SAUSAGE.finisher(), np.random.default_rng(0)
+    finisher.run(SAUSAGE.start, SAUSAGE.places)  # which sets y
+    x, way = (rng.normal(size=SAUSAGE.start.shape) for _ in range(2))
+    x = SAUSAGE.start + 0.02 * x
+    exact = 2.0 * np.vdot(finisher._evaluated(x).slope, way)
+    errors = []
+    for h in (1e-3, 5e-4):
+        ahead, behind = (finisher._evaluated(x + s * h * way).value for s in (1.0, -1.0))
+        errors.append(abs((ahead - behind) / (2.0 * h) - exact))
+    assert errors[0] < 1e-2 * abs(exact)
+    assert 3.0 < errors[0] / errors[1] < 5.0
+
+
+def test_a_general_minimiser_finds_the_same_minimum(monkeypatch):
+    converging(monkeypatch)
+    ball, faces = icosphere(1)
+    problem = bent(Mesh(ball * [2.0, 0.7, 0.6], faces), 30.0)
+    found = problem.finish().vertices
+    energy, volume = CellEnergy.of(problem.mesh, PER_CAGE), total_volume(problem.mesh)
+    free, mesh = ~problem.held, problem.mesh
+    w = mesh.vertex_areas[:, None] / (0.06 * mesh.diagonal) ** 2
+    y = problem.start
+
+    def at(z):
+        x = found.copy()
+        x[free] = z.reshape(-1, 3)
+        return x
+
+    def value(z):
+        x = at(z)
+        e, slope = energy.value_and_slope(x)
+        return e + np.sum(w * (x - y) ** 2), 2.0 * (slope + w * (x - y))[free].ravel()
+
+    exact = {
+        "type": "eq",
+        "fun": lambda z: volume.violation(at(z)),
+        "jac": lambda z: volume.gradient(at(z))[free].ravel(),
+    }
+    begin = problem.start[free].ravel()
+    told = optimize.minimize(
+        value, begin, jac=True, constraints=[exact], method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
+    assert_allclose(told.x.reshape(-1, 3), found[free], atol=1e-4)
+
+
+def test_without_length_the_cages_stay_and_with_an_infinite_one_the_energy_alone_counts(
+    monkeypatch,
+):
+    converging(monkeypatch)
+    start = SAUSAGE.start
+    lengths = [1e-4, 0.04, 0.08, 1e4]
+    found = [SAUSAGE.finish(length).vertices for length in lengths]
+    off = [np.linalg.norm(x - found[0], axis=1).max() for x in found]
+    near = np.linalg.norm(found[0] - start, axis=1).max()
+    assert near < 0.02 * SCENE.mesh.diagonal  # on the volume, which the start is not
+    assert off == sorted(off)
+    energy = CellEnergy.of(SCENE.mesh, PER_CAGE)
+    values = [energy.value_and_slope(x)[0] for x in found]
+    assert values == sorted(values, reverse=True)
+    finisher = SAUSAGE.finisher()
+    finisher._factor(np.zeros(SCENE.mesh.n_vertices), None)
+    alone = finisher.run(start, SAUSAGE.places)
+    assert_allclose(found[3], alone.vertices, atol=1e-4)
+
+
+def test_waves_longer_than_the_length_stay_and_shorter_ones_relax():
+    """A flat sheet with bumps as the pose of the cages; its ends are held."""
+    u, v = np.meshgrid(np.linspace(0, 4, 161), np.linspace(0, 0.5, 21), indexing="ij")
+    a = (np.arange(160)[:, None] * 21 + np.arange(20)).ravel()
+    faces = np.concatenate([np.stack([a, a + 21, a + 22], 1), np.stack([a, a + 22, a + 1], 1)])
+    mesh = Mesh(np.stack([u.ravel(), v.ravel(), 0.0 * u.ravel()], 1), faces)
+    held = (mesh.vertices[:, 0] < 0.1) | (mesh.vertices[:, 0] > 3.9)
+
+    def left(wavelength: float) -> float:
+        wave = np.where(held, 0.0, np.sin(2.0 * np.pi / wavelength * mesh.vertices[:, 0]))
+        pose = mesh.vertices + wave[:, None] * [1e-3, 0.0, 0.0]  # in the sheet
+        found = Problem(mesh, held, pose[held], pose).finish(0.4 / mesh.diagonal).vertices
+        return float(np.vdot(found[:, 0] - mesh.vertices[:, 0], wave) / (1e-3 * wave @ wave))
+
+    long, short = left(4.0), left(0.4)
+    assert long > 0.5
+    assert short < 0.1
+
+
+def test_a_finish_from_another_start_ends_at_the_same_pose():
+    finisher = SAUSAGE.finisher()
+    found = finisher.run(SAUSAGE.start, SAUSAGE.places)
+    assert found.remaining <= 1e-5 * SCENE.mesh.diagonal
+    again = finisher.run(SAUSAGE.start, SAUSAGE.places, start=found.vertices)
+    assert again.steps == 0
+    assert_array_equal(again.vertices, found.vertices)
+    wave = 0.05 * np.sin(3.0 * SAUSAGE.start[:, [1, 2, 0]])
+    other = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, wave)
+    there = finisher.run(SAUSAGE.start, SAUSAGE.places, start=other)
+    assert there.steps > 0
+    assert (
+        np.linalg.norm(there.vertices - found.vertices, axis=1).max() < 1e-3 * SCENE.mesh.diagonal
+    )
+
+
+def test_a_denser_mesh_with_the_same_cages_is_finished_alike():
+    """Levels of an icosphere share their first vertices."""
+    poses, counts = [], []
+    for level in (2, 3, 4):
+        ball, faces = icosphere(level)
+        problem = bent(Mesh(ball * [2.0, 0.7, 0.6], faces), 40.0)
+        start = problem.start.copy()
+        start[~problem.held] -= 0.01 * np.sin(
+            7.0 * problem.mesh.vertices[~problem.held][:, [1, 2, 0]]
+        )
+        mesh, weights = problem.mesh, problem.mesh.vertex_areas / (0.1 * problem.mesh.diagonal) ** 2
+        energy = CellEnergy.of(mesh, mesh.n_vertices / 10.0)
+        finisher = Finisher(mesh, energy, problem.held, [total_volume(mesh)], weights)
+        poses.append(finisher.run(start, start[problem.held]).vertices)
+        counts.append(len(ball))
+    some = slice(0, counts[0])
+    one, two = (
+        np.linalg.norm((a[some] - b[some]), axis=1).max() for a, b in itertools.pairwise(poses)
+    )
+    assert two < 0.02
+    assert two < one
+
+
+def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for():
+    """Between its ends, a sheet above another one is an arch, which would relax through it."""
+    one = sheet()
+    x, n = one.vertices, one.n_vertices
+    flat = np.stack([2.5 - x[:, 1], x[:, 0] - 1.5, np.full(n, 0.5)], 1)
+    mesh = Mesh(np.concatenate([x, flat]), np.concatenate([one.faces, one.faces + n]))
+    ends = (x[:, 0] < 0.1) | (x[:, 0] > 3.9)
+    arch = flat + np.stack([0.0 * x[:, 0]] * 2 + [np.sin(0.25 * np.pi * x[:, 0]) - 0.5], 1)
+    start = np.concatenate([x, arch])
+    held = np.concatenate([ends, ends])
+    problem = Problem(mesh, held, start[held], start)
+    assert not len(new_crossings(start, mesh.vertices, mesh.faces))
+    crossing, apart = (problem.finish(10.0, avoid_contact=each).vertices for each in (False, True))
+    assert len(new_crossings(crossing, mesh.vertices, mesh.faces))
+    assert not len(new_crossings(apart, mesh.vertices, mesh.faces))
+    assert_array_equal(apart[held], start[held])
+    assert distortion(problem, apart) < distortion(problem, start)
 
 
 def test_far_from_what_moves_there_is_no_energy():
@@ -234,167 +337,6 @@ def test_far_from_what_moves_there_is_no_energy():
     assert value - rise == pytest.approx(least - more, rel=1e-9)
     rows = whole.laplacian[moving] - near.laplacian[moving]
     assert_allclose(rows.toarray(), 0.0, atol=1e-12)
-
-
-def test_a_general_minimiser_finds_the_same_minimum(monkeypatch):
-    until_nothing_is_gained(monkeypatch)
-    ball, faces = icosphere(1)
-    problem = bent(Mesh(ball * [2.0, 0.7, 0.6], faces), 30.0)
-    found = problem.finish().vertices
-    energy, volume = CellEnergy.of(problem.mesh), total_volume(problem.mesh)
-    free = ~problem.held
-
-    def at(z):
-        x = found.copy()
-        x[free] = z.reshape(-1, 3)
-        return x
-
-    def value(z):
-        e, slope = energy.value_and_slope(at(z))
-        return e, 2.0 * slope[free].ravel()
-
-    exact = {
-        "type": "eq",
-        "fun": lambda z: volume.violation(at(z)),
-        "jac": lambda z: volume.gradient(at(z))[free].ravel(),
-    }
-    begin = problem.start[free].ravel()
-    told = optimize.minimize(
-        value, begin, jac=True, constraints=[exact], method="SLSQP",
-        options={"ftol": 1e-14, "maxiter": 500},
-    )  # fmt: skip
-    assert_allclose(told.x.reshape(-1, 3), found[free], atol=1e-4)
-
-
-def test_a_start_with_folds_has_none_after_it_and_a_good_one_gets_none():
-    folds = Folds.of(SCENE.mesh)
-    assert not folds.at(SAUSAGE.finish().vertices).any()
-    noise = np.random.default_rng(1).normal(size=SAUSAGE.start.shape)
-    start = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, 0.15 * noise)
-    crumpled = Problem(SCENE.mesh, SAUSAGE.held, SAUSAGE.places, start)
-    assert np.count_nonzero(folds.at(start)) > 9
-    found = crumpled.finish().vertices
-    assert not folds.at(found).any()
-    assert_array_equal(found[SAUSAGE.held], SAUSAGE.places)
-
-
-def test_folds_are_opened_and_nothing_else_moves():
-    """Folded are: a triangle turned over its edge, and one pressed flat."""
-    mesh = sheet()
-    folds, free = Folds.of(mesh), np.ones(mesh.n_vertices, dtype=bool)
-    free[:6] = False
-    for vertex, to in ((62, mesh.vertices[62] + [0.6, 0.0, 0.0]), (62, mesh.vertices[68])):
-        x = mesh.vertices.copy()
-        x[vertex] = to
-        assert np.count_nonzero(folds.at(x)) > 0
-        opened = unfolded(mesh, folds, x, free)
-        assert not folds.at(opened).any()
-        far = np.abs(mesh.vertices[:, 0] - mesh.vertices[vertex, 0]) > 1.5
-        assert_array_equal(opened[far], x[far])
-    free[:] = False
-    assert_array_equal(unfolded(mesh, folds, x, free), x)
-
-
-def creased() -> tuple[Mesh, np.ndarray]:
-    """Return a sheet with bumps, and a bend of 160 degrees narrower than they are high."""
-    n, w, z = 121, 25, 0.12
-    u, v = (each.ravel() for each in np.meshgrid(np.linspace(-2, 2, n), np.linspace(0, 0.8, w)))
-    u, v = (each.reshape(w, n).T.ravel() for each in (u, v))
-    height = z * np.cos(20.0 * (u + 2.0)) * np.cos(20.0 * v)
-    a = (np.arange(n - 1)[:, None] * w + np.arange(w - 1)).ravel()
-    faces = np.concatenate([np.stack([a, a + w, a + w + 1], 1), np.stack([a, a + w + 1, a + 1], 1)])
-    s = np.linspace(-2.0, 2.0, 4001)
-    angle = np.clip(s / 0.2 + 0.5, 0.0, 1.0) * np.radians(160.0)
-    x, y = (np.cumsum(f(angle)) * (s[1] - s[0]) for f in (np.cos, np.sin))
-    t, x, y = (np.interp(u, s, each) for each in (angle, x, y))
-    pose = np.stack([x - np.sin(t) * height, v, y + np.cos(t) * height], 1)
-    return Mesh(np.stack([u, v, height], 1), faces), pose
-
-
-def test_creases_that_cross_themselves_are_smoothed_and_nothing_else_moves():
-    mesh, x = creased()
-    folds, free = Folds.of(mesh), np.ones(mesh.n_vertices, dtype=bool)
-
-    def crossing(pose):
-        return new_crossings(pose, mesh.vertices, mesh.faces)
-
-    assert len(crossing(x)) > 30
-    smooth = smoothed(mesh, x, free, crossing)
-    assert not len(crossing(smooth))
-    assert folds.at(smooth).sum() <= folds.at(x).sum()
-    moved = (smooth != x).any(axis=1)
-    assert np.abs(mesh.vertices[moved, 0]).max() < 0.4
-    assert moved.mean() < 0.1
-    # In another unit and place, the same.
-    turn, scale = rotation([1, 2, 3], 1.0), 1e3
-    larger = mesh.with_vertices(scale * mesh.vertices)
-    elsewhere = smoothed(larger, scale * x @ turn.T, free, crossing)
-    assert_allclose(elsewhere, scale * smooth @ turn.T, atol=1e-9 * scale)
-    free[mesh.vertices[:, 1] < 0.4] = False
-    partly = smoothed(mesh, x, free, crossing)
-    assert_array_equal(partly[~free], x[~free])
-    # The finish leaves none either, although its start has some.
-    held = np.abs(mesh.vertices[:, 0]) > 0.3
-    found = Finisher(mesh, CellEnergy.of(mesh), held, []).run(x, x[held])
-    assert not len(crossing(found.vertices))
-    assert_array_equal(found.vertices[held], x[held])
-
-
-def test_a_vertex_of_flat_triangles_only_stays_where_it_is():
-    mesh = sheet()
-    faces = mesh.faces
-    flat = mesh.vertices.copy()
-    flat[faces[(faces == 62).any(axis=1)]] = flat[62]
-    mesh, free = mesh.with_vertices(flat), np.ones(mesh.n_vertices, dtype=bool)
-    pose = flat + 0.1 * np.sin(3.0 * flat[:, [1, 2, 0]])
-    answers = [np.flatnonzero((faces == 62).any(axis=1)), np.array([], dtype=int)]
-    smooth = smoothed(mesh, pose, free, lambda _: answers.pop(0))
-    assert np.isfinite(smooth).all()
-    assert (smooth != pose).any()
-    assert_array_equal(smooth[62], pose[62])
-
-
-def test_parts_pushed_through_each_other_are_not_smoothed():
-    one, mesh = sheet(), creased()[0]
-    across = one.vertices[:, [2, 0, 1]] - [0.0, 1.5, 0.3]
-    faces = np.concatenate([mesh.faces, one.faces + mesh.n_vertices])
-    rest = np.concatenate([mesh.vertices, one.vertices + [0.0, 0.0, 5.0]])
-    both, pose = Mesh(rest, faces), np.concatenate([mesh.vertices, across])
-    free = np.ones(both.n_vertices, dtype=bool)
-    assert len(new_crossings(pose, rest, faces)) > 20
-    searched = []
-
-    def crossing(y):
-        searched.append(y)
-        return new_crossings(y, rest, faces)
-
-    assert_array_equal(smoothed(both, pose, free, crossing), pose)
-    assert len(searched) == 2  # given up after the first averages
-
-
-@pytest.mark.parametrize("height", [1.5, 0.2])
-def test_an_arch_over_a_sheet_stays_over_it(height):
-    """Held at its lower ends, it would end in a plane that crosses the sheet."""
-    one = sheet()
-    x, n = one.vertices, one.n_vertices
-    flat = np.stack([2.5 - x[:, 1], x[:, 0] - 1.5, np.full(n, 0.5)], 1)
-    mesh = Mesh(np.concatenate([x, flat]), np.concatenate([one.faces, one.faces + n]))
-    ends = (x[:, 0] < 0.1) | (x[:, 0] > 3.9)
-    arch = flat + np.stack([0.0 * x[:, 0]] * 2 + [height * np.sin(0.25 * np.pi * x[:, 0]) - 0.5], 1)
-    start = np.concatenate([x, arch])
-    held = np.concatenate([ends, ends])
-    problem = Problem(mesh, held, start[held], start)
-    assert not len(new_crossings(start, mesh.vertices, mesh.faces))
-    found = Finisher(mesh, CellEnergy.of(mesh), held, []).run(start, start[held])
-    assert not len(new_crossings(found.vertices, mesh.vertices, mesh.faces))
-    assert_array_equal(found.vertices[held], start[held])
-    assert found.merits  # it is not the start
-    if height > 1.0:
-        assert distortion(problem, found.vertices) < 0.9 * distortion(problem, start)
-    through = start.copy()
-    through[n:] = flat - [0.0, 0.0, 0.6]
-    found = Finisher(mesh, CellEnergy.of(mesh), held, []).run(through, start[held])
-    assert distortion(problem, found.vertices) < 0.5 * distortion(problem, start)
 
 
 def test_the_finish_of_a_pull_moves_its_reach_only():
@@ -418,9 +360,8 @@ def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_oth
     monkeypatch.setattr(sizes, "COMPILED", 0)
     deformer = SCENE.held()
     solution = deformer.solve(SCENE.turned(40))
-    starts = solution, deformer.finish(solution)  # a finished pose is finished further
+    starts = solution, solution
     expected = [deformer.finish(start).vertices for start in starts]
-    assert np.abs(expected[0] - expected[1]).max() > 1e-6
     together, met = threading.Barrier(2, timeout=20.0), []
     run_kernel = cell_energy.in_parallel
 
@@ -438,7 +379,7 @@ def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_oth
     monkeypatch.setattr(cell_energy, "in_parallel", in_turns)
     with ThreadPoolExecutor(2) as threads:
         found = [*threads.map(finish, starts)]
-    assert len(met) > 20
+    assert len(met) > 10
     for each, alone in zip(found, expected, strict=True):
         assert_array_equal(each, alone)
 
@@ -485,7 +426,6 @@ def test_cancelling_at_any_step_changes_nothing_of_the_solution():
     assert finished.steps > solution.steps
     assert finished.status is solution.status
     assert_allclose(deformer.solve(targets).vertices, before, atol=1e-6)
-    assert np.abs(deformer.finish(finished).vertices - finished.vertices).max() < 1e-2
     deformer.solve(SCENE.turned(10))
     with pytest.raises(ArgumentError, match="last solve"):
         deformer.finish(solution)

@@ -116,12 +116,12 @@ def test_a_finish_draws_apart_what_crossed_before_it_if_it_is_asked_to(avoid_con
     bodies = Bodies(REST, total_volume(REST), lids)
     constraints = bodies.constraints(bodies.numbers(np.flatnonzero(AWAY)))
     energy = CellEnergy.of(REST)
-    finisher = Finisher(REST, energy, AWAY, constraints, avoid_contact=avoid_contact)
+    weights = 100.0 * REST.vertex_areas
+    finisher = Finisher(REST, energy, AWAY, constraints, weights, avoid_contact=avoid_contact)
     found = finisher.run(TOUCHING, TOUCHING[AWAY])
     assert (len(crossings().at(found.vertices)) == 0) == avoid_contact
     assert_array_equal(found.vertices[AWAY], TOUCHING[AWAY])
     assert max(abs(each.relative(found.vertices)) for each in constraints) < 1e-13
-    assert not energy.folds.at(found.vertices).any()
 
 
 def test_drawing_apart_can_be_cancelled():

@@ -12,7 +12,6 @@ from solids import CUBE, icosphere, rotation, torus
 from vtk_segdeform import sizes
 from vtk_segdeform.geometry import local_volume
 from vtk_segdeform.geometry.local_volume import LocalVolume, local_volume_change
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh.mesh import Mesh
 
 MESHES = {"sphere": icosphere(3), "torus": torus(), "cube": CUBE}
@@ -174,43 +173,3 @@ def test_a_sheet_beside_a_body_does_not_change_its_local_volume():
     n = waves().n_vertices
     assert not change[:n].any()
     assert_allclose(change[n:], local_volume_change(body, posed[n:]), atol=1e-12)
-
-
-@pytest.fixture(params=["numba", "numpy"])
-def kernels(request, monkeypatch):
-    """Run with and without compiled kernels, whatever the size."""
-    if request.param == "numba":
-        pytest.importorskip("numba")
-        monkeypatch.setattr(sizes, "COMPILED", 0)
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
-
-
-@pytest.mark.usefixtures("either", "kernels")
-@pytest.mark.parametrize("name", ["closed", "with a sheet"])
-def test_the_slope_is_the_derivative_of_the_change(name):
-    body = Mesh(*icosphere(3))
-    mesh = body if name == "closed" else together(waves(), body)
-    local, rng = LocalVolume(mesh), np.random.default_rng(4)
-    x = mesh.vertices + 0.05 * np.sin(4.0 * mesh.vertices[:, [1, 2, 0]])
-    s, slope = local.change_with_slope(x)
-    assert len(s) == len(local.areas)
-    weights, d = rng.normal(size=len(s)), rng.normal(size=x.shape)
-    after, before = (local.change_with_slope(x + step * d)[0] for step in (1e-5, -1e-5))
-    found = np.vdot(slope(weights), d)
-    assert found == pytest.approx(weights @ (after - before) / 2e-5, rel=1e-6, abs=1e-7)
-    outside = np.setdiff1d(np.arange(mesh.n_vertices), np.arange(body.n_vertices))
-    assert slope(weights).shape == x.shape
-    if name != "closed":
-        assert not slope(weights)[: waves().n_vertices].any()
-        assert len(outside)
-    assert local.is_defined
-    assert not LocalVolume(waves()).is_defined
-
-
-@pytest.mark.usefixtures("kernels")
-def test_places_of_the_change_have_the_area_of_the_surface():
-    for mesh in (Mesh(*icosphere(3)), Mesh(*torus())):
-        local = LocalVolume(mesh)
-        assert_allclose(local.areas, mesh.vertex_areas)
-        assert_allclose(local.change_with_slope(1.1 * mesh.vertices)[0], 0.331, atol=1e-12)

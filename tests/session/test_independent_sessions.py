@@ -40,13 +40,13 @@ def new() -> Session:
 
 def in_a_drag(session: Session) -> None:
     session.move_handle("tip", turned(0.2), max_steps=3)
-    session.move_handle("tip", turned(0.4), max_steps=3, within=2.5e-3)
+    session.move_handle("tip", turned(0.4), max_steps=3)
 
 
 def after_a_pull(session: Session) -> None:
     session.pull(TIP, X[TIP] + UP)
     session.commit()
-    session.pull(TIP, X[TIP] + 1.3 * UP, max_steps=4, within=2.5e-3)
+    session.pull(TIP, X[TIP] + 1.3 * UP, max_steps=4)
 
 
 def on_from_a_finished_pose(session: Session) -> None:
@@ -71,7 +71,7 @@ def what_comes_next(session: Session) -> list[bytes]:
     seen = [session.vertices]
     for act in (
         lambda: session.refine(max_steps=1),
-        lambda: session.move_handle("tip", turned(0.1), max_steps=3, within=2.5e-3),
+        lambda: session.move_handle("tip", turned(0.1), max_steps=3),
         session.refine,
         session.commit,
         session.finish,
@@ -96,7 +96,7 @@ def drag(session: Session) -> None:
 
 
 def pull(session: Session) -> None:
-    session.pull(TIP, X[TIP] - UP, max_steps=5, within=2.5e-3)
+    session.pull(TIP, X[TIP] - UP, max_steps=5)
     session.pull(TIP, X[TIP] - UP)
     session.finish()
 

@@ -28,7 +28,7 @@ def one_pull(session: Session, rng: np.random.Generator, near: int) -> int:
         turn = np.eye(4)
         turn[:3, :3] = rotation(axis, part * angle)
         turn[:3, 3] = x[vertex] + part * shift - turn[:3, :3] @ x[vertex]
-        live = {} if share is None else {"max_steps": 8, "within": 0.0025}
+        live = {} if share is None else {"max_steps": 8}
         session.pull(vertex, turn if angle else x[vertex] + part * shift, **options, **live)
         after, targets = session.vertices, session.targets
         aims = [

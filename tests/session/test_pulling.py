@@ -303,7 +303,7 @@ def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
         turn = np.eye(4)
         turn[:3, :3] = rotation([0.0, 1.0, 0.0], angle)
         turn[:3, 3] = x[vertex] - turn[:3, :3] @ x[vertex]
-        session.pull(vertex, turn, radius=radius, locality=0.0, max_steps=8, within=0.0025)
+        session.pull(vertex, turn, radius=radius, locality=0.0, max_steps=8)
         all_turned = x @ turn[:3, :3].T + turn[:3, 3]
         assert np.abs(session.vertices - x).max() < np.abs(all_turned - x).max()
         assert most_stretched() < 1.5
@@ -321,7 +321,8 @@ def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
         carried = way @ whole / (whole @ whole)
         assert_allclose(way, carried * whole, atol=1e-9)
         assert 0.5 < carried < 0.9
-    assert session.refine().status is Status.CONVERGED
+    assert session.refine().status in (Status.CONVERGED, Status.MISSED)
+    assert session.solution.handle_error < 2e-3
     assert most_stretched() < 1.5  # it was 7.8
 
 
@@ -571,11 +572,10 @@ def test_in_a_live_pull_the_grabbed_vertex_keeps_to_the_pointer():
     session = ready()
     for share in (0.0, 0.5, 1.5, 0.5, 1.0, 1.5, 2.0):
         to = X[HIGH] + share * UP
-        solution = session.pull(HIGH, to, max_steps=3, within=0.0025)
-        place = to if solution.targets is None else solution.targets[0]
-        assert np.linalg.norm(session.vertices[HIGH] - place) < 4e-3 * D
+        session.pull(HIGH, to, max_steps=3)
+        assert np.linalg.norm(session.vertices[HIGH] - to) < 1e-4 * D
         assert abs(session.volume_change) < 1e-12
-    while session.refine(max_steps=3, within=0.0025).status is Status.STEP_LIMIT:
+    while session.refine(max_steps=3).status is Status.STEP_LIMIT:
         pass
     assert moved(session, pulled(shift=2.0 * UP).vertices) < 1e-4
 

@@ -95,7 +95,7 @@ def test_there_is_a_way_back_from_a_folded_pose(barrier, scales):
     rest = SCENE.mesh.vertices[SCENE.handle]
     deformer.resume([cage.vertices * scales for cage in SCENE.cages], rest)
     assert deformer.solve(rest).status is Status.CONVERGED
-    assert barrier.ratios(deformer._p).min() > 0.99
+    assert barrier.ratios(deformer._path.p).min() > 0.99
     inverted = barrier.ratios(folded) < 0.0
     assert (barrier.value_and_slope(folded)[0] == np.inf) == inverted.any()
     begun = barrier.begun_at(folded)
@@ -112,7 +112,7 @@ def test_a_bend_folds_without_the_barrier_only(barrier):
     ):
         solution = deformer.solve(targets)
         assert abs(solution.volume_change) < 1e-13
-        least.append(barrier.ratios(deformer._p).min())
+        least.append(barrier.ratios(deformer._path.p).min())
     assert least[0] > 0.0
     assert least[1] < -0.05
 
@@ -121,7 +121,7 @@ def test_without_a_volume_to_preserve_it_maps_the_surface_itself(barrier):
     deformer = deformer_of(avoid_folds=True).hold(**HELD, preserve_volume=False)
     assert not deformer.step_volumes.constraints
     deformer.solve(SCENE.turned(150), max_steps=10)
-    assert barrier.ratios(deformer._p).min() > 0.0
+    assert barrier.ratios(deformer._path.p).min() > 0.0
 
 
 def test_a_surface_that_is_known_is_not_mapped_again(barrier, squeezed):
@@ -144,7 +144,7 @@ def test_the_solver_passes_the_surface_of_the_same_pose(monkeypatch):
 
     monkeypatch.setattr(Barrier, "value_and_slope", recorded)
     deformer = deformer_of(avoid_folds=True).hold(**HELD)
-    deformer.solve(SCENE.turned(20), max_steps=3)
+    deformer.solve(SCENE.turned(20))
     assert len(seen) > 3
     for p, x in seen:
         assert_allclose(x, deformer.step_volumes.surface.map(p), atol=1e-12)

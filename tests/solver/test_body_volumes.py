@@ -82,7 +82,7 @@ def test_large_bodies_are_scaled_one_by_one_unless_a_cage_moves_two(separate, mo
     first, last = int(mesh.vertices[:, 0].argmin()), int(mesh.vertices[:, 0].argmax())
     deformer = deformer.hold(fixed=[first], handle=[last])
     solution = deformer.solve(mesh.vertices[[last]] + [0.5, 0.0, 0.7])
-    assert (deformer._constraints.scaled is not None) is separate
+    assert (deformer._constraints.preserved.scaled is not None) is separate
     assert_allclose(
         [c.relative(solution.vertices) for c in deformer.preserved_volumes], 0, atol=3e-15
     )
@@ -126,7 +126,7 @@ def test_a_direction_that_is_only_rounding_moves_nothing(monkeypatch):
     target = mesh.vertices[[high]] + [0.0, 0.0, 0.3]
     expected = deformer.solve(target).vertices
     places = deformer._constraints.places(deformer._frame.inward(target))
-    result = deformer._continuation.solve(places, deformer._options)
+    result = deformer._path.solve(places, deformer._options)
     noise = 1e-20 * np.random.default_rng(1).normal(size=result.p.shape)  # of a vanishing volume
     result = replace(result, directions=(result.directions[0], noise))
     x = deformer._frame.in_scene(deformer._with_exact_volume(result)[0])

@@ -37,7 +37,7 @@ def through(fork):
     """Return the pose without avoiding contact, and its cages in the units of the solver."""
     deformer, targets = fork
     free = deformer.hold(fixed=deformer.fixed, handle=deformer.handle, avoid_contact=False)
-    return free.solve(targets), free._p
+    return free.solve(targets), free._path.p
 
 
 def test_what_crosses_without_it_does_not_with_it(fork, through):
@@ -186,7 +186,7 @@ def test_no_two_samples_pass_through_each_other_in_a_step(fork):
     radii = contact.surface.radii
     rng = np.random.default_rng(1)
     for size in (1e-3, 10.0):
-        step = size * rng.standard_normal(deformer._p.shape)
+        step = size * rng.standard_normal(deformer._path.p.shape)
         far = np.linalg.norm(contact.surface.rows @ step, axis=1).max()
         share = contact.share(step)
         assert share * 2.0 * far <= 1.5 * 2.0 * np.median(radii) * (1.0 + 1e-12)

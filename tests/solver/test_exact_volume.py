@@ -80,8 +80,8 @@ def test_a_large_mesh_is_scaled_and_its_cages_with_it():
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer._continuation.solver.volumes.constraints[0].target != pytest.approx(
-        deformer._constraints.volumes.constraints[0].target, rel=1e-9
+    assert deformer._path.solver.volumes.constraints[0].target != pytest.approx(
+        deformer.step_volumes.constraints[0].target, rel=1e-9
     )  # the coarse volume of the pose in which the mesh has its own
 
 
@@ -155,7 +155,7 @@ def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
     deformer = SCENE.deformer()
     there = deformer.solve(TARGETS)
     assert_array_equal(there.vertices, here.vertices)
-    assert deformer._constraints.scaled._gpu is None
+    assert deformer._constraints.preserved.scaled._gpu is None
 
 
 def test_bodies_whose_coarse_volume_vanishes_keep_theirs(monkeypatch):

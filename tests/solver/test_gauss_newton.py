@@ -93,7 +93,7 @@ def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
 def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
     ahead, behind = SCENE.held(), SCENE.held()
     for angle in (1.0, 2.0, 3.0, 4.0):
-        behind._continuation.solver._way = Way()
+        behind._path.solver._way = Way()
         fast, slow = (each.solve(SCENE.turned(angle), max_steps=50) for each in (ahead, behind))
         assert abs(fast.volume_change) < 1e-13
         assert distance(fast, slow) < 1e-4
@@ -110,7 +110,7 @@ def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
     ends = []
     for deformer in (straight, roundabout):
         deformer.solve(SCENE.turned(40.0))
-        ends.append(deformer._constraints.solver._way.ends[-1])
+        ends.append(deformer._path.solver._way.ends[-1])
     (first,), (second,) = (end.directions for end in ends)
     assert np.linalg.norm(first - second) < 1e-4 * np.linalg.norm(first)
 
@@ -125,10 +125,10 @@ def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():
     # Karush-Kuhn-Tucker: the slope is a multiple of the gradient of the constraint.
     deformer = SCENE.deformer(tolerance=1e-10, max_steps=2000, rotation_groups=50)
     deformer.solve(SCENE.turned(40))
-    solver, targets = deformer._continuation.solver, deformer._constraints.places(deformer._targets)
-    x = solver.energy.subspace.map(deformer._continuation.p)
-    _, slope = solver.energy.local_step(deformer._continuation.p, x)
-    slope = slope + solver.positions.value_and_slope(deformer._continuation.p, targets)[1]
+    solver, targets = deformer._path.solver, deformer._constraints.places(deformer._path.targets)
+    x = solver.energy.subspace.map(deformer._path.p)
+    _, slope = solver.energy.local_step(deformer._path.p, x)
+    slope = slope + solver.positions.value_and_slope(deformer._path.p, targets)[1]
     gradient = solver.energy.subspace.adjoint(solver.volumes.constraints[0].gradient(x))
     factor = np.vdot(slope, gradient) / np.vdot(gradient, gradient)
     assert np.linalg.norm(slope - factor * gradient) < 1e-5 * np.linalg.norm(slope)

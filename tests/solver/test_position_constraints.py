@@ -19,7 +19,7 @@ def test_shared_places_are_as_accurate_as_separate_ones(monkeypatch):
     monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
     monkeypatch.setattr(sizes, "PLACES", 30)
     deformer = SCENE.held()
-    assert len(deformer._continuation.solver.positions.rows) == 60
+    assert len(deformer._path.solver.positions.rows) == 60
     shared = deformer.solve(targets)
     assert shared.handle_error < 1.5 * each.handle_error + 1e-4
     assert shared.fixed_error < 1.5 * each.fixed_error + 1e-4
@@ -27,30 +27,12 @@ def test_shared_places_are_as_accurate_as_separate_ones(monkeypatch):
     assert away < 4e-3 * SCENE.mesh.diagonal  # a quarter as many places
 
 
-def test_a_set_with_shared_places_is_checked_at_its_largest_error(monkeypatch):
-    monkeypatch.setattr(sizes, "SHARED_PLACES", 20)
-    monkeypatch.setattr(sizes, "PLACES", 30)
-    deformer, targets = SCENE.held(), SCENE.turned(40)
-    solution, goal = deformer.solve(targets), SCENE.mesh.vertices.copy()
-    goal[SCENE.handle] = targets
-    away = np.linalg.norm(solution.vertices - goal, axis=1) / deformer._frame.size
-    largest = [away[ids].max() for ids in (SCENE.handle, SCENE.fixed)]
-    term, places = (
-        deformer._continuation.solver.positions,
-        deformer._constraints.places(deformer._targets),
-    )
-    shared, checked = term.errors(deformer._continuation.p, places)
-    assert_allclose(1.5 * checked, largest, rtol=1e-6)
-    assert (shared < 0.7 * np.array(largest)).all()  # errors at the places are smaller
-
-
 def test_many_vertices_of_a_set_are_equivalent_to_few_rows():
     rng = np.random.default_rng(6)
     rows = rng.normal(size=(500, 40)) * (np.arange(40) < 12)  # moved by 12 of the cage vertices
     rows = np.vstack([rows, rng.normal(size=(7, 40))])
     set_of = np.repeat([0, 1], [500, 7])
-    base, strength = np.where(set_of == 0, 0.3, 2.0), np.array([5.0, 1.0])
-    term = PositionTerm(rows, set_of, base, strength)
+    term = PositionTerm(rows, set_of, np.where(set_of == 0, 1.5, 2.0))
     p, u = rng.normal(size=(40, 3)), rng.normal(size=(507, 3))
     few = term.toward(u)
     assert len(few.rows) == 12 + 7
@@ -58,7 +40,3 @@ def test_many_vertices_of_a_set_are_equivalent_to_few_rows():
     value, slope = few.value_and_slope(p)
     assert value == pytest.approx((term.weights * np.square(away).sum(axis=1)).sum(), rel=1e-13)
     assert_allclose(slope, rows.T @ (term.weights[:, None] * away), rtol=1e-11, atol=1e-10)
-    other = term.with_strength(np.array([50.0, 1.0]))
-    value, slope = other.value_and_slope(p, u)
-    assert value == pytest.approx((other.weights * np.square(away).sum(axis=1)).sum(), rel=1e-13)
-    assert_allclose(slope, rows.T @ (other.weights[:, None] * away), rtol=1e-11, atol=1e-9)

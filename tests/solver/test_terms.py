@@ -96,7 +96,7 @@ def test_no_pose_is_beyond_where_a_term_is_infinite(free, exact_hessian):
     assert solution.steps < 120
     assert abs(solution.volume_change) < 1e-13
     assert (np.diff(solution.merits) <= 1e-9 * solution.merits[0]).all()
-    assert deformer._continuation.solver.terms == (wall,)  # at raised weights, too
+    assert deformer._path.solver.terms == (wall,)  # at raised weights, too
 
 
 def test_an_inactive_term_changes_no_bit(free):
@@ -109,7 +109,7 @@ def test_an_inactive_term_changes_no_bit(free):
 
 def test_a_term_limits_every_step():
     deformer = SCENE.held()
-    own, start, limit = deformer._constraints, deformer._p, 0.01
+    own, start, limit = deformer._constraints, deformer._path.p, 0.01
     targets = deformer._frame.inward(SCENE.turned(10))
     solver, places = replace(own.solver, terms=(Slow(limit),)), own.places(targets)
     p, moves = start, []

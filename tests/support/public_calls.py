@@ -371,7 +371,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "frames": lambda: [None],
     "handle": _right,
     "history": lambda: 5,
-    "hold_tolerance": lambda: 1e-3,
     "interactor": lambda: view().interactor,
     "keys": lambda: "",
     "label": lambda: "a step",

@@ -549,7 +549,6 @@ OTHERS = {
         distance_of_welding, largest_hole, steps_of_a_drag,
         *(named(option_of_a_deformer, name) for name in (
             "stretch", "tolerance", "max_steps", "acceleration", "rotation_groups",
-            "hold_tolerance",
         )),
         *(named(option_of_a_session, name) for name in (
             "n_cage_vertices", "offset", "stretch", "rotation_groups",

@@ -93,6 +93,6 @@ def test_the_bar_twists_by_135_degrees_at_its_volume_without_crossings(bar, n_re
 )
 def test_the_plane_does_not_fold_and_hardly_stretches(step, n_cage_vertices):
     mesh, solution = posed(*coarser_plane(step), 3, n_cage_vertices)
-    assert distortion(mesh, solution.vertices) < 0.035
+    assert distortion(mesh, solution.vertices) < 0.06  # it stays near the cages, which are few
     assert triangle_distortion(mesh, solution.vertices).max() < 0.5
     assert sharpest(mesh, solution.vertices) > sharpest(mesh, mesh.vertices) - 0.2

@@ -152,9 +152,9 @@ def coarser(vertices, faces, selection, n):
     every(
         3,
         [
-            ("cactus", 800, 0.10, 0.09, 0.96),
-            ("cactus", None, 0.10, 0.06, 0.95),
-            ("cylinder", None, 0.20, 0.10, 0.95),
+            ("cactus", 800, 0.11, 0.09, 0.96),
+            ("cactus", None, 0.10, 0.085, 0.95),
+            ("cylinder", None, 0.22, 0.15, 0.95),
         ],
     ),
 )

@@ -54,11 +54,10 @@ def test_a_long_drag_back_and_forth_ends_at_rest(count):
 
 
 @pytest.mark.parametrize("count", [20, pytest.param(20_000, marks=pytest.mark.campaign)])
-def test_a_long_drag_with_raised_position_weights_ends_at_rest(count):
+def test_a_long_drag_far_from_rest_ends_there(count):
     drag = LongDrag(sausage())
     scene = drag.scene
     far = scene.turned(20.0) + np.array([0.2, 0.4, 0.0])
-    assert scene.deformer(hold_tolerance=1.0).solve(far).handle_error > 5e-4  # so weights rise
     drag_and_return(drag, sways(scene, count, degrees=30.0), far, every=min(200, count // 2))
 
 

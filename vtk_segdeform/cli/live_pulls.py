@@ -14,7 +14,6 @@ The top of a cactus is pulled along prescribed paths, in prescribed steps and wi
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -30,7 +29,7 @@ _PATHS = {  # places of the pointer, in diagonals
     "fast": np.linspace(0.0, 0.3, 11)[1:],
     "jerky": np.array([0.02, 0.25, 0.25, -0.1, -0.1, 0.2, 0.02, 0.3]),
 }
-_STEPS, _WITHIN = 3, 0.0025  # as in the widgets: of an event, and diagonals
+_STEPS = 3  # of an event, as in the widgets
 _RADIUS = 0.15  # diagonals, of a pull by default
 _MOST_REFINEMENTS = 12
 _HEAD = (
@@ -69,15 +68,14 @@ def _row(session: Session, preparation: Preparation, path: FloatArray) -> str:
     for place in path:
         before, began = session.vertices, time.perf_counter()
         to = start + [place * mesh.diagonal, 0.0, 0.0]
-        solution = session.pull(top, to, max_steps=_STEPS, within=_WITHIN)
+        solution = session.pull(top, to, max_steps=_STEPS)
         times.append(1e3 * (time.perf_counter() - began))
         steps.append(solution.steps)
         is_new = session.vertices is not before
         waited = 0.0 if is_new else waited + times[-1]
         frozen, volume = max(frozen, waited), max(volume, abs(session.volume_change))
         if is_new:
-            target = to if solution.targets is None else solution.targets[0]
-            lag = max(lag, float(np.linalg.norm(session.vertices[top] - target)))
+            lag = max(lag, float(np.linalg.norm(session.vertices[top] - to)))
             off = np.linalg.norm(converged(session, preparation) - session.vertices, axis=1)
             error = max(error, float(off[is_far].max(initial=0.0)))
     share = 100.0 / mesh.diagonal
@@ -88,14 +86,8 @@ def _row(session: Session, preparation: Preparation, path: FloatArray) -> str:
 
 
 def converged(session: Session, preparation: Preparation) -> FloatArray:
-    """Return the converged pose (n, 3) for the targets that *session* has reached."""
-    state, solution = session.state, session.solution
-    if state.pose is not None and solution is not None and solution.targets is not None:
-        lengths = [len(ids) for ids in state.handles.values()]
-        parts = np.split(solution.targets, np.cumsum(lengths)[:-1])
-        targets = dict(zip(state.handles, parts, strict=True))
-        state = replace(state, pose=replace(state.pose, targets=targets))
-    other = Session(session.mesh, state=state)
+    """Return the converged pose (n, 3) for the targets of *session*."""
+    other = Session(session.mesh, state=session.state)
     other.accept(preparation)
     for _ in range(_MOST_REFINEMENTS):
         if other.refine().status is not Status.STEP_LIMIT:

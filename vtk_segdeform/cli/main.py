@@ -455,7 +455,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--no-volume", action="store_true", help="do not preserve the volume")
     add("--avoid-folds", action="store_true", help="keep the body from turning inside out")
     _contact_and_lids(parser)
-    text = "stretch resistance relative to detail preservation (default: 10)"
+    text = "stretch resistance relative to detail preservation (default: 1)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
     text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)

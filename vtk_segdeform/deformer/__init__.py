@@ -3,6 +3,8 @@
 The files, in reading order:
 
     deformer         `Deformer`: targets in, `Solution` out
+    constraints      fixed vertices, handles and volumes, made once for a set of them
+    path             the last pose, and what the next solve continues with
     frame            the coordinates in which a mesh is deformed
     arguments        checks of its arguments
     locality         what stays when one point is pulled

@@ -33,13 +33,11 @@ LOCALITY, SPREAD = 0.2, 0.5
 FARTHEST_APART = 20.0
 """Diagonals of the mesh between two targets or fixed vertices, at most.
 
-At this distance volumes are rounded to about 1e-12 of themselves; the error grows with its cube."""
+At this distance volumes are rounded to a few 1e-12 of themselves; the error grows with its cube."""
 
 
-def check_options(hold_tolerance: float, stretch: float, rotation_groups: int | None) -> None:
+def check_options(stretch: float, rotation_groups: int | None) -> None:
     """Raise an ArgumentError unless all are numbers in their range."""
-    if not is_number(hold_tolerance, 0.0):
-        raise ArgumentError(f"hold_tolerance must be 0 or more; got {shown(hold_tolerance)}")
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {shown(stretch)}")
     if rotation_groups is not None and not is_whole(rotation_groups, 1):

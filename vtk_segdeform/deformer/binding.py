@@ -1,7 +1,8 @@
 """Binding: all that is computed once for a mesh, its regions and its cages, in seconds.
 
     W~                 `subspace.cage_subspace`, figure 6 of the paper
-    E(p)               `energy.shape_energy`, eqs. (5), (10), (20), and the stiffness of the cages
+    E(p)               `energy.shape_energy`, eqs. (5), (10), (20), with the stiffness of the cages
+                       and the interior
     coarse volume      `coarse_volume.CoarseVolume`, of a large mesh
 
 It does not depend on fixed vertices, handles or targets.  `binding_cache` keeps it on disk.
@@ -18,15 +19,22 @@ import numpy as np
 from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
-from ..energy import Energy, join_rotations, shape_energy, with_cage_stiffness
-from ..geometry import cluster_within_parts, decimated
+from ..energy import (
+    Energy,
+    Interior,
+    join_rotations,
+    shape_energy,
+    with_cage_stiffness,
+    with_interior,
+)
+from ..geometry import cluster_within_parts, decimated, lids_of
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
 from ..solver import CoarseVolume
 from ..subspace import cage_subspace
 
-_FORMAT = 11  # increment whenever the content of a binding changes
+_FORMAT = 12  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +123,8 @@ class Binding:
         if clusters is not None and energy.has_exact_gradient:
             faces = [cage.faces for cage in cages]
             energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
-            energy = _joined(inputs, energy, clusters, part(progress, 0.82, 0.93))
+            energy = _joined(inputs, energy, clusters, part(progress, 0.82, 0.91))
+            energy = _with_interior(inputs, energy)
         share, whole = part(progress, 0.93, 1.0), energy.has_vertex_rotations
         coarse = CoarseVolume.of(regions.mesh, subspace, whole=whole, progress=share)
         return cls(energy, coarse)
@@ -161,3 +170,15 @@ def _joined(
         shares=inputs.shares,
         progress=progress,
     )[0]
+
+
+def _with_interior(inputs: BindingInputs, energy: Energy) -> Energy:
+    """Return *energy* with the rotations inside the bodies of the mesh."""
+    mesh, regions = inputs.rest, inputs.regions
+    ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
+    p = np.split(inputs.rest_cages, ends)
+    cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
+    weights = regions.weights if inputs.blend is None else inputs.blend
+    interior = Interior.of(mesh, weights, lids_of(regions.mesh).encloses)
+    gradients = interior.gradients(cages, energy.subspace)
+    return with_interior(energy, gradients, interior.volumes)

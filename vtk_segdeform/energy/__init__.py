@@ -5,18 +5,21 @@ The files, in reading order:
     energy               `shape_energy`, eqs. (1), (10) and (20), and the stiffness of the cages
     operators            its operators on the mesh and in the subspace
     cubature             a weighted sample of vertices in place of all
+    interior             rotations inside the body
     rotation_clusters    one local rotation for several vertices
     hessian              the exact Hessian, local rotations included, and its factor
 """
 
 from .energy import Energy, shape_energy, with_cage_stiffness, with_rotating_rows
 from .hessian import Factor, full_factor, quadratic_factor, rotation_term
+from .interior import Interior, with_interior
 from .operators import reduced_operators, surface_operators
 from .rotation_clusters import join_rotations
 
 __all__ = [
     "Energy",
     "Factor",
+    "Interior",
     "full_factor",
     "join_rotations",
     "quadratic_factor",
@@ -25,5 +28,6 @@ __all__ = [
     "shape_energy",
     "surface_operators",
     "with_cage_stiffness",
+    "with_interior",
     "with_rotating_rows",
 ]

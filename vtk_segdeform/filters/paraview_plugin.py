@@ -144,7 +144,7 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
     def SetLids(self, choice: int) -> None:  # noqa: N802
         super().SetLids((None, True, False)[choice])
 
-    @smproperty.doublevector(name="Stretch", default_values=10.0)
+    @smproperty.doublevector(name="Stretch", default_values=1.0)
     @smdomain.doublerange(min=0.0, max=100.0)
     def SetStretch(self, strength: float) -> None:  # noqa: N802
         super().SetStretch(strength)

@@ -32,7 +32,7 @@ class Settings:
     angle: float = 0.0
     preserve_volume: bool = True
     lids: bool | None = None
-    stretch: float = 10.0
+    stretch: float = 1.0
     local_volume: bool = True
 
 

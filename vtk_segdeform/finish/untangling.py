@@ -31,7 +31,6 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import Crossings, Mesh
 from ..progress import Progress, tell
-from .gradients import around
 
 _RINGS = 16  # around crossing faces: what may move
 _STEP, _GROWTH = 0.2, 1.3  # of the length of an edge; a step that is too long is halved
@@ -133,6 +132,15 @@ def _shrunk(
         edge = float(np.median(edges))
         x = x - (step * edge / most) * slope
     return None
+
+
+def around(mesh: Mesh, some: IntArray, rings: int) -> BoolArray:
+    """Return the vertices within so many *rings* around the faces *some*, (n,) bool."""
+    near = np.zeros(mesh.n_vertices, dtype=bool)
+    near[mesh.faces[some]] = True
+    for _ in range(rings):
+        near |= mesh.adjacency @ near.astype(float) > 0.0
+    return near
 
 
 def contour(x: FloatArray, faces: IntArray, pairs: IntArray) -> tuple[float, FloatArray]:

@@ -26,8 +26,6 @@ neighbors and the normal field", The Visual Computer 28, 2012 (shrinking balls).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
@@ -58,15 +56,8 @@ class LocalVolume:
     mesh : Mesh
         The rest shape, n vertices.  For a large mesh the change is computed at the means of some
         thousand cells of neighbouring vertices and interpolated to the vertices.
-
-    Attributes
-    ----------
-    areas : (k,) float
-        Of the surface around the k places of `change_with_slope`, at rest; 0 at places with almost
-        no volume.
     """
 
-    areas: FloatArray
     _means: sparse.csr_array | None
     _interpolation: list[sparse.csr_array]
 
@@ -77,17 +68,16 @@ class LocalVolume:
         self._inside: IntArray | None = None
         if not encloses.all():
             mesh, self._inside = _part(mesh, encloses[mesh.components])
-        self._means, self._interpolation, self.areas = None, [], np.zeros(0)
+        self._means, self._interpolation = None, []
         if not encloses.any():
             return
-        points, faces, areas = mesh.vertices, mesh.faces, mesh.vertex_areas
+        points, faces = mesh.vertices, mesh.faces
         if mesh.n_vertices > sizes.LOCAL_VOLUME_CELLS:
             _, cells = voronoi_cells(mesh, sizes.LOCAL_VOLUME_POINTS, np.random.default_rng(0))
             between = faces_between(cells, faces)
             if len(between):  # none is left if every component is smaller than a cell
                 self._means, faces = _means(cells), between
                 points = self._means @ points
-                areas = np.asarray(np.bincount(cells, areas), dtype=float)
                 self._interpolation = _interpolation(
                     mesh.vertices, cells, points, _edges(faces, len(points))
                 )
@@ -95,7 +85,6 @@ class LocalVolume:
         self._rest = self._volumes.smoothed(points)
         floor = _LEAST * np.abs(self._rest).mean()
         self._reliable = self._rest > floor
-        self.areas = np.where(self._reliable, areas, 0.0)
 
     @property
     def is_defined(self) -> bool:
@@ -115,41 +104,6 @@ class LocalVolume:
         if len(self._inside):
             out[self._inside] = self._change(x[self._inside])
         return out
-
-    def change_with_slope(
-        self, vertices: FloatArray
-    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-        """Return s at k places on the surface, and the gradient of sums of it as a function.
-
-        The places are the vertices, or the means of their cells.  The function takes weights (k,)
-        and returns sum_i w_i ds_i/dx, (n, 3).
-        """
-        x = as_points(vertices, "vertices", self._shape[0])
-        if self._inside is None:
-            return self._change_with_slope(x)
-        inside = self._inside
-        s, slope = self._change_with_slope(x[inside])
-
-        def spread(weights: FloatArray) -> FloatArray:
-            out = np.zeros_like(x)
-            out[inside] = slope(weights)
-            return out
-
-        return s, spread
-
-    def _change_with_slope(
-        self, x: FloatArray
-    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-        points = x if self._means is None else self._means @ x
-
-        def slope(weights: FloatArray) -> FloatArray:
-            scaled = np.divide(
-                weights, self._rest, where=self._reliable, out=np.zeros_like(weights)
-            )
-            result = self._volumes.slope(points, scaled)
-            return result if self._means is None else self._means.T @ result
-
-        return self._relative(points), slope
 
     def _relative(self, points: FloatArray) -> FloatArray:
         now = self._volumes.smoothed(points)
@@ -182,7 +136,6 @@ class _Volumes:
         joined = sparse.coo_array((np.ones(len(i)), (i, j)), (n, n))
         ring = joined + joined.T + sparse.eye_array(n)
         self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
-        self._average_back = self._average.T.tocsr()
         edge = float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
         rounds = (_WIDTH * float(np.median(diameter)) / edge) ** 2
         self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
@@ -203,34 +156,6 @@ class _Volumes:
         for _ in range(self._rounds):
             volumes = np.asarray(self._average @ volumes)
         return np.asarray(volumes)
-
-    def slope(self, x: FloatArray, weights: FloatArray) -> FloatArray:
-        """Return sum_ij w_i k_ij dL_j/dx, (k, 3), for *weights* (k,).
-
-        With u = k^T w, e = x_b - x_a, f = x_c - x_a and P = sum of u_v (x_a - x_o(v)) over the
-        corners v of T, the sum of u_j L_j over j is one of P . (e x f) / 18 over the triangles.
-        """
-        for _ in range(self._rounds):
-            weights = np.asarray(self._average_back @ weights)
-        share, faces = weights / 18.0, self._faces
-        if kernels := compiled_kernels(len(faces)):
-            kernels.opposite_slope(
-                *inputs(x, faces, self._opposite, share), summed := np.zeros_like(x)
-            )
-            return summed
-        a, e, f = corner_and_edges(x - x.mean(axis=0), faces)
-        total = share[faces].sum(axis=1)[:, None]
-        normals = cross_rows(e, f)
-        apexes = (share[:, None] * (x - x.mean(axis=0))[self._opposite])[faces].sum(axis=1)
-        p = total * a - apexes
-        at_b, at_c = cross_rows(f, p), cross_rows(p, e)
-        at_o = -share[:, None] * (self._around @ normals)
-        result = np.empty_like(x)
-        places = np.concatenate([*faces.T, self._opposite])
-        values = np.concatenate([total * normals - at_b - at_c, at_b, at_c, at_o])
-        for axis in range(3):
-            result[:, axis] = np.bincount(places, values[:, axis], minlength=len(x))
-        return result
 
 
 def local_volume_change(mesh: Mesh, vertices: FloatArray) -> FloatArray:

@@ -18,7 +18,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
@@ -77,14 +76,6 @@ class _Aim:
             return self
         share = 1.0 / max(1, self.turns - _TURNS + 2)
         return _Aim(wanted, self.shift + share * (shift - self.shift), self.turns + 1)
-
-
-class _SolveOptions(NamedTuple):
-    """Options of `Deformer.solve`."""
-
-    max_steps: int | None
-    within: float | None
-    progress: Progress | None
 
 
 class PoseSolver:
@@ -194,14 +185,12 @@ class PoseSolver:
         state: State,
         targets: Mapping[str, FloatArray],
         max_steps: int | None,
-        within: float | None = None,
         *,
         is_passing: bool = False,
         progress: Progress | None = None,
     ) -> tuple[Pose, Solution]:
         """Solve for *targets* (k, 3) of every handle, starting from the pose of *state*.
 
-        The pose has these targets, even if its cages are still on the way; see `Deformer.solve`.
         Until `settle` the vertices of a passing pose, one in a drag, of a large mesh are those of
         the solution, so that each frame maps the mesh once.  They differ from W~ p by rounding.
 
@@ -218,12 +207,13 @@ class PoseSolver:
         self._start_from(state, deformer)
         current, aim = self._current if self._current is state.pose else None, self._aim
         self._current, self._aim = None, None  # in case the solve fails
-        options = _SolveOptions(max_steps, within, progress)
+        solve = partial(deformer.solve, max_steps=max_steps, progress=progress)
+        how = {"is_live": max_steps is not None, "is_passing": is_passing}
         if progress is None:
-            return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+            return self._solved(state, targets, deformer, aim, solve, **how)
         try:
             with deformer.restoring():
-                return self._solved(state, targets, deformer, aim, options, is_passing=is_passing)
+                return self._solved(state, targets, deformer, aim, solve, **how)
         except BaseException:
             self._current, self._aim = current, aim
             raise
@@ -234,21 +224,22 @@ class PoseSolver:
         targets: Mapping[str, FloatArray],
         deformer: Deformer,
         aim: _Aim | None,
-        options: _SolveOptions,
+        solve: Callable[[FloatArray], Solution],
         *,
+        is_live: bool,
         is_passing: bool,
     ) -> tuple[Pose, Solution]:
         """Return the result of `solve` with a *deformer* in the pose of *state*."""
         before, shift = state.pose, self._shift(state)
         wanted = _stacked(targets)
-        for _ in range(_TURNS if shift is not None and options.max_steps is None else 1):
+        for _ in range(1 if shift is None or is_live else _TURNS):
             if shift is None:
                 aim, places = None, wanted
             else:
                 own = shift[deformer.handle]
                 aim = _Aim(wanted, own) if aim is None else aim.turned(wanted, own)
                 places = wanted - aim.shift
-            solution = deformer.solve(places, **options._asdict())
+            solution = solve(places)
             if not np.isfinite(solution.vertices).all():
                 raise ConstraintError("no finite pose for these targets; move the handles less")
             cages, finished = solution.cage_vertices, None if before is None else before.finished
@@ -266,8 +257,7 @@ class PoseSolver:
                 break
         pose = Pose(cages, targets, finished)
         self._current = pose
-        if solution.targets is None:
-            self._aim = aim
+        self._aim = aim
         is_passing = is_passing and self._mesh.n_vertices > sizes.SCALED_VOLUME
         if is_passing and finished is None and cages is solution.cage_vertices:
             frozen(solution.vertices)
@@ -277,9 +267,8 @@ class PoseSolver:
         solution = replace(solution, vertices=x, volume=change)
         if aim is None:
             return pose, solution
-        reached = None if solution.targets is None else solution.targets + aim.shift
         errors = partial(self._errors, state, deformer, wanted, self._beside(state))
-        return pose, replace(solution, errors=errors, targets=reached)
+        return pose, replace(solution, errors=errors)
 
     def finish(self, state: State, pose: Pose) -> Finish:
         """Return the finish of *pose* of *state*, for another thread or for this one.
@@ -316,7 +305,7 @@ class PoseSolver:
             region_volumes=lambda _: np.empty(0),
             crossed=partial(new_crossings, rest=rest, faces=faces),
             folded=partial(turned_over, rest=rest, faces=faces),
-            unfinished=x if is_further else None,
+            unfinished=self._surface(state, pose.cage_vertices) if is_further else None,
         )
         aims = np.array(wanted)
         if state.locality is not None and beside is not None:  # where the deformer differs

@@ -645,7 +645,6 @@ class Session(Timeline):
         targets: Mapping[str, ArrayLike] | ArrayLike,
         *,
         max_steps: int | None = None,
-        within: float | None = None,
     ) -> Solution:
         """Move handles to *targets*, and start a drag unless one is ongoing.
 
@@ -655,11 +654,8 @@ class Session(Timeline):
             Targets by the name of the handle, where other handles keep theirs; or the targets of
             all handles, concatenated.
         max_steps : int, optional
-            Stop after this number of solver steps; the next move, or `refine`, continues.
-        within : float, optional
-            For live drags: the mesh takes only poses that are estimated to be within this distance,
-            in diagonals, of a converged one.  If it cannot reach *targets* in *max_steps*, it stops
-            on the way, or does not move; the next move, or `refine`, continues.
+            Stop after this number of solver steps; the next move, or `refine`, continues.  3 to 8
+            are enough for the frames of a drag.
 
         Returns
         -------
@@ -673,9 +669,9 @@ class Session(Timeline):
             cages.  The pose does not change then.
         """
         wanted = handles.checked_targets(self.mesh, self.handles, targets)
-        state, limits = self._released(self._state), (max_steps, within)
+        state = self._released(self._state)
         kept = self._rest_targets() if state.pose is None else state.pose.targets
-        return self._drag(state, {**kept, **wanted}, list(wanted), limits)
+        return self._drag(state, {**kept, **wanted}, list(wanted), max_steps)
 
     def pull(
         self,
@@ -685,7 +681,6 @@ class Session(Timeline):
         radius: float | None = None,
         locality: float | None = None,
         max_steps: int | None = None,
-        within: float | None = None,
     ) -> Solution:
         """Pull one point of the surface, as part of a drag like `drag`; see `pulling`.
 
@@ -704,7 +699,7 @@ class Session(Timeline):
             hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
             free.  By default 0.2; 0 if fixed vertices, pins and handles that were not made by pulls
             are three points or more, and 0.05 if they are fewer.
-        max_steps, within : int and float, optional
+        max_steps : int, optional
             As in `drag`.
 
         Raises
@@ -749,7 +744,7 @@ class Session(Timeline):
                 now = handles.targets_at(state.handles, self.vertices)
                 pose = replace(state.pose, cage_vertices=pose.cage_vertices, targets=now)
             state = replace(state, pose=pose)
-        solution = self._drag(state, wanted, [grasp.name], (max_steps, within))
+        solution = self._drag(state, wanted, [grasp.name], max_steps)
         self._grasp = start, grasp
         return solution
 
@@ -824,7 +819,6 @@ class Session(Timeline):
         motion: ArrayLike,
         *,
         max_steps: int | None = None,
-        within: float | None = None,
     ) -> Solution:
         """Move one handle by a matrix or to targets; otherwise like `drag`.
 
@@ -837,17 +831,17 @@ class Session(Timeline):
             moves the handle back.  A handle turns the shorter way from where it is: to wind the
             body up by 270 degrees, turn it by 90 and by 180 before.  Or a target for each vertex of
             the handle.
-        max_steps, within : int and float, optional
+        max_steps : int, optional
             As in `drag`.
         """
         handles.require_handle(self.handles, name)
         matrix = plain(motion, "motion")
         if matrix.shape != (4, 4):
-            return self.drag({name: matrix}, max_steps=max_steps, within=within)
+            return self.drag({name: matrix}, max_steps=max_steps)
         pose = self._released(self._drag_start or self._state).pose
         start = self._rest_targets() if pose is None else pose.targets
         targets = {name: handles.moved(start[name], matrix)}
-        return self.drag(targets, max_steps=max_steps, within=within)
+        return self.drag(targets, max_steps=max_steps)
 
     def move_cage(self, region: int, vertices: ArrayLike) -> None:
         """Move the vertices of one cage to *vertices* (m_r, 3); the mesh follows, x = W~ p.
@@ -877,19 +871,17 @@ class Session(Timeline):
         self,
         *,
         max_steps: int | None = None,
-        within: float | None = None,
         progress: Progress | None = None,
     ) -> Solution:
         """Continue solving for the current targets, for example after a drag with *max_steps*.
 
-        With *within*, as in `drag`, until the targets are reached; then until it has converged.
         *progress* is called before every step and may cancel; then nothing changes.
 
         Adds no undo step: the result becomes part of the ongoing drag, or else of the last step.
         """
-        limits, is_passing = (max_steps, within), self.is_dragging
+        is_passing = self.is_dragging
         pose, solution = self._solve(
-            self._state, self.targets, limits, is_passing=is_passing, progress=progress
+            self._state, self.targets, max_steps, is_passing=is_passing, progress=progress
         )
         here = self._state.pose
         # Converged already: keep the same pose object.  But even without a step, the final pose can
@@ -1020,10 +1012,10 @@ class Session(Timeline):
         state: State,
         targets: Mapping[str, FloatArray],
         moved: list[str],
-        limits: tuple[int | None, float | None],
+        max_steps: int | None,
     ) -> Solution:
         """Solve from *state* for *targets*, as part of a drag of the handles *moved*."""
-        pose, solution = self._solve(state, targets, limits, is_passing=True)
+        pose, solution = self._solve(state, targets, max_steps, is_passing=True)
         self._solution = pose, solution
         self._move(replace(state, pose=pose), *moved)
         return solution
@@ -1032,7 +1024,7 @@ class Session(Timeline):
         self,
         state: State,
         targets: Mapping[str, FloatArray],
-        limits: tuple[int | None, float | None],
+        max_steps: int | None,
         *,
         is_passing: bool = False,
         progress: Progress | None = None,
@@ -1040,7 +1032,7 @@ class Session(Timeline):
         began = time.perf_counter()
         wanted = MappingProxyType({**targets})
         pose, solution = self._pose_solver.solve(
-            state, wanted, *limits, is_passing=is_passing, progress=progress
+            state, wanted, max_steps, is_passing=is_passing, progress=progress
         )
         steps, seconds = self._effort
         self._effort = Effort(steps + solution.steps, seconds + time.perf_counter() - began)

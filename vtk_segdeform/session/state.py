@@ -83,7 +83,7 @@ class Options:
     preserve_volume: bool = True
     preserve_region_volumes: bool = False
     lids: bool | None = None
-    stretch: float = 10.0
+    stretch: float = 1.0
     rotation_groups: int | None = 300
     avoid_folds: bool = False
     avoid_contact: bool = False

@@ -5,7 +5,6 @@ The files, in reading order:
     gauss_newton            the iteration, eqs. (11) to (14) and (21)
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
-    weights                 continuation of the position weights
     terms                   further terms of the objective
     barrier                 a term against folds
     anderson                Anderson acceleration
@@ -41,7 +40,6 @@ from .volume_constraints import (
     total_volume,
 )
 from .waypoints import LONGEST_MOVE, waypoints
-from .weights import WeightContinuation
 
 __all__ = [
     "CONVERGED",
@@ -62,7 +60,6 @@ __all__ = [
     "Term",
     "VolumeConstraint",
     "Volumes",
-    "WeightContinuation",
     "are_met",
     "connected_sets",
     "errors_at",

@@ -59,7 +59,7 @@ _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _PARTS = 16  # of that distance, by which pairs are sorted
 _FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
-_STIFFNESS, _FIRM = 5e3, 2e4  # k, times the scale of the shape energy
+_STIFFNESS, _FIRM = 1.5e5, 6e5  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 

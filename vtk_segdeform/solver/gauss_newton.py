@@ -28,8 +28,8 @@ Six things are added; the numbers are of the cactus bent by 60 degrees:
 2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
    needed, and a small step does not mean that the minimum is near.  With the derivatives of the
    rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
-   They are computed again after 6 steps, and shared by solvers with other weights.  If H is not
-   convex, it contains a share of the rotations' derivatives only, and h is shorter than that.
+   They are computed again after 6 steps.  If H is not convex, it contains a share of the
+   rotations' derivatives only, and h is shorter than that.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
    since H was factored.
 4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
@@ -82,11 +82,8 @@ _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _OLD = 6  # steps after which H is computed again
-_OLDISH = 2  # the same if a solver with other weights has just computed most of it
 _OLD_ACTIVE = 3  # the same while a term is active
-_SIMILAR = 2.0  # ratio of weights up to which a factor of H serves for both
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
-_SLOWEST = 0.9  # largest ratio of two steps by which the later ones are extrapolated
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
 _ROUNDED = 1e-6  # longest step that may be due to rounding
@@ -102,7 +99,6 @@ class SolverOptions:
     acceleration: int = 5  # steps that Anderson acceleration remembers; 0 turns it off
     exact_hessian: bool = True  # False holds rotations and volumes' gradients fixed, as in (21)
     exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
-    within: float | None = None  # stop, after a step, where the estimated `remaining` is at most so
     progress: Progress | None = field(default=None, compare=False)  # called before every step
 
     def __post_init__(self) -> None:
@@ -127,14 +123,10 @@ class SolverResult:
     """The last iterate, and how it was reached."""
 
     p: FloatArray  # (m, 3), cage vertices
-    ahead: FloatArray  # (m, 3), p and the next step, which is not taken: nearer to the minimum
     multipliers: FloatArray
     directions: tuple[FloatArray, ...]  # Z with the H of (21), (m, 3) for each constraint
     status: Status
     steps: int
-    step_size: float  # of the last step, root mean square over the surface
-    remaining: float  # estimate of the largest distance to the minimum; infinite without `within`
-    shape: float  # E(p) and the further terms: the objective without the position term
     merits: tuple[float, ...]  # the objective at the start and after each step
 
 
@@ -157,19 +149,6 @@ class _Iterate:
         return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
 
 
-@dataclass(frozen=True, eq=False)
-class _Curvature:
-    """The part of H that takes long to compute, at a pose.
-
-    It hardly depends on the weights, so that solvers for the same targets share it.
-    """
-
-    p: FloatArray  # (m, 3)
-    targets: FloatArray
-    rotations: FloatArray  # (3m, 3m)
-    volumes: FloatArray | None  # (3, m, m)
-
-
 @dataclass(eq=False)
 class _State:
     """The running state of an iteration, from which a later call continues."""
@@ -179,7 +158,6 @@ class _State:
     age: int = _OLD  # of the factor, in steps
     step_size: float = math.inf  # of the last step
     has_terms: bool = False  # whether the factor is with those terms that were active
-    curvature: _Curvature | None = None  # in the factor
     _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
 
     def needs_factor(self, here: _Iterate) -> bool:
@@ -200,8 +178,7 @@ class _State:
 
     def renew_factor(self, factor: Factor, here: _Iterate) -> None:
         """Use a factor of H at this pose."""
-        is_own = self.curvature is None or self.curvature.p is here.p
-        self.factor, self.age, self.has_terms = factor, 0 if is_own else 1, here.is_active
+        self.factor, self.age, self.has_terms = factor, 0, here.is_active
 
     def drop_factor(self) -> None:
         """Have H computed again before the next step."""
@@ -209,9 +186,7 @@ class _State:
 
     def for_other_targets(self, acceleration: int) -> _State:
         """Return the state with which a solve for other targets begins."""
-        other = _State(Anderson(acceleration), self.factor, max(self.age, 1), 0.0, self.has_terms)
-        other.curvature = self.curvature
-        return other
+        return _State(Anderson(acceleration), self.factor, max(self.age, 1), 0.0, self.has_terms)
 
     def copy(self) -> _State:
         """Return a state from which another solver continues."""
@@ -245,7 +220,6 @@ class GaussNewton:
     _state: _State | None = field(init=False, repr=False, default=None)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
     _way: Way = field(init=False, repr=False, default=Way())
-    _shared: list[_Curvature] = field(init=False, repr=False, default_factory=list)  # the last one
     _begun: tuple[Term, ...] = field(init=False, repr=False, default=())  # the terms of this call
 
     def __post_init__(self) -> None:
@@ -253,7 +227,7 @@ class GaussNewton:
         # Cage vertices that move nothing (a region without fixed vertices or handles, weights
         # near zero) leave H singular.  A share of the identity damps the step there; d, and with
         # it every stationary point, stays the same.
-        trace = np.trace(hessian) / len(hessian)
+        trace = np.trace(self.energy.quadratic) / len(hessian)
         share = np.eye(len(hessian))
         if not len(self.positions.rows):  # without positions rounding would move the whole mesh
             mean = self.energy.subspace.adjoint(np.ones((self.energy.subspace.n_vertices, 1)))
@@ -274,31 +248,12 @@ class GaussNewton:
         """Return a solver that continues from here independently."""
         other = copy.copy(self)
         other._state = None if self._state is None else self._state.copy()
-        other._shared = [*self._shared]
         return other
 
-    def forget(self) -> None:
-        """Discard the running state: the next call begins like the first."""
-        self._state = self._last = None
-        self._way = Way()
-        self._shared.clear()
-
-    def share_with(self, other: GaussNewton) -> None:
-        """Share the curvature with another solver, for the same energy."""
-        self._shared = other._shared
-
-    def with_strength(self, strength: FloatArray) -> GaussNewton:
-        """Return a solver with other weights of the positions.
-
-        If they differ little, it continues with the factor of H and on the way of this one.
-        """
-        other = replace(self, positions=self.positions.with_strength(strength))
-        other.share_with(self)
-        ratio = strength / self.positions.strength
-        if max(ratio.max(initial=1.0), 1.0 / ratio.min(initial=1.0)) <= _SIMILAR:
-            if self._state is not None:
-                other._state = self._state.for_other_targets(self._state.acceleration.window)
-            other._last, other._way, other._begun = self._last, self._way, self._begun
+    def fresh(self) -> GaussNewton:
+        """Return a solver of the same problem that has not begun."""
+        other = copy.copy(self)
+        other._state, other._last, other._way = None, None, Way()
         return other
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
@@ -315,42 +270,22 @@ class GaussNewton:
         step = np.zeros_like(p)
         newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
-        remaining = length = math.inf
-        last = options.max_steps + (options.within is not None)  # which estimates what remains
-        while len(merits) <= last:
+        while len(merits) <= options.max_steps:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
             is_coupled = newton or here.is_active or state.has_terms
-            is_cheap = newton and state.age >= _OLDISH and self._is_known(here, state, targets)
-            if is_coupled and (is_cheap or state.needs_factor(here)):
-                factor = self._full_factor(here, state, targets, newton) or self._factor
+            if is_coupled and state.needs_factor(here):
+                factor = self._full_factor(here, state, newton) or self._factor
                 state.renew_factor(factor, here)
             step, multipliers, directions = self._step(here, state.factor)
             state.step_size = self._length(step)
             if is_coupled and state.step_is_doubtful:
                 state.drop_factor()
                 continue
-            if options.within is not None:
-                before, length = length, self.farthest(step)
-                remaining = _left(length, before if state.age else math.inf)
-                if (
-                    newton
-                    and state.age
-                    and remaining <= options.within
-                    and (state.factor.share < _EXACT or math.inf > before > options.within)
-                ):
-                    state.drop_factor()  # H of this pose may be softer, or convex
-                    continue
-                if newton and state.factor.share < _EXACT:
-                    remaining *= _SHORT
             share = share_of_step(self._begun, step) if here.is_active else 1.0
             if here.is_active:
                 step *= min(share, _LONGEST_ACTIVE / max(state.step_size, _LONGEST_ACTIVE))
             if state.step_size <= options.tolerance or self._is_still(here, merits, state):
                 status = Status.CONVERGED
-                break
-            if len(merits) > 1 and remaining <= (options.within or 0.0):
-                break
-            if len(merits) > options.max_steps:
                 break
             ahead = None
             is_accelerated = options.acceleration > 0 and share == 1.0
@@ -374,7 +309,7 @@ class GaussNewton:
                 if ahead is not None and ahead.merit >= here.merit - self._rounding(here):
                     ahead = None
             if ahead is None:
-                status, remaining, step = Status.STALLED, 0.0, np.zeros_like(step)
+                status, step = Status.STALLED, np.zeros_like(step)
                 break
             here, step = ahead, np.zeros_like(step)
             merits.append(here.merit)
@@ -385,14 +320,10 @@ class GaussNewton:
         self._way = self._way.on_to(End(here.p + step, targets, tuple(directions)))
         return SolverResult(
             p=here.p,
-            ahead=here.p + step,
             multipliers=multipliers,
             directions=tuple(directions),
             status=status,
             steps=len(merits) - 1,
-            step_size=state.step_size,
-            remaining=remaining,
-            shape=here.shape,
             merits=tuple(merits),
         )
 
@@ -494,9 +425,7 @@ class GaussNewton:
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
         return self._evaluate(p, moved_along(paths, t), term)
 
-    def _full_factor(
-        self, here: _Iterate, state: _State, targets: FloatArray, newton: bool
-    ) -> Factor | None:
+    def _full_factor(self, here: _Iterate, state: _State, newton: bool) -> Factor | None:
         """Return the factor of the exact Hessian; None if it is not convex.
 
         Unless *newton*, it is that of (21) with the further terms; None without them.
@@ -504,23 +433,12 @@ class GaussNewton:
         of_terms = hessian_of(self._begun, here.p, here.x) if here.is_active else None
         if not newton:
             return full_factor(self._hessian, None, added=of_terms) if here.is_active else None
-        if not self._is_known(here, state, targets):
-            of_volumes = None
-            step, multipliers, _ = self._step(here, self._factor)
-            if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
-                of_volumes = self.volumes.hessian(here.p, multipliers)
-            rotations = rotation_term(self.energy, here.p)
-            self._shared[:] = [_Curvature(here.p, targets, rotations, of_volumes)]
-        known = state.curvature = self._shared[0]
-        return full_factor(self._hessian, known.rotations, volumes=known.volumes, added=of_terms)
-
-    def _is_known(self, here: _Iterate, state: _State, targets: FloatArray) -> bool:
-        """Tell whether a solver with other weights has computed H near here."""
-        if not self._shared or here.is_active or self._shared[0] is state.curvature:
-            return False
-        known = self._shared[0]
-        is_same = np.array_equal(known.targets, targets)
-        return is_same and self._length(here.p - known.p) < _CLOSE
+        of_volumes = None
+        step, multipliers, _ = self._step(here, self._factor)
+        if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
+            of_volumes = self.volumes.hessian(here.p, multipliers)
+        rotations = rotation_term(self.energy, here.p)
+        return full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
 
     def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
         """Return the state from which a call with these arguments begins."""
@@ -625,8 +543,3 @@ def _constrained_step(
     for multiplier, direction in zip(multipliers, z, strict=True):
         h -= multiplier * direction
     return h, multipliers, z
-
-
-def _left(length: float, before: float) -> float:
-    """Return the sum of all steps that follow, of a *length* each time in the ratio to *before*."""
-    return length / (1.0 - min(_SLOWEST, length / before if before else 0.0))

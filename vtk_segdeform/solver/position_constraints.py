@@ -5,8 +5,7 @@
 Vertices joined by mesh edges form a *set*: a fixed patch, or a handle that moves independently.
 All sets have the same total weight, divided evenly among their vertices, so that a handle of one
 vertex is as strong as a patch of a thousand; in larger sets neighbours share a place, their mean.
-A coarse cage cannot put every vertex of a set in its place; `weights` raises the weight of sets
-that miss their places by too much.
+A coarse cage cannot put every vertex of a set in its place.
 
 Anchors keep samples of the surface where they are, softly and without a place to meet: the locality
 of a pull.
@@ -30,8 +29,6 @@ from ..geometry import cluster_positions
 from ..mesh import Mesh
 from ..subspace import Subspace
 
-_MOST_CHECKED = 5000  # vertices of a border
-_CHECK_FACTOR = 1.5  # between the errors allowed at a checked vertex and at a place
 _SetRows: TypeAlias = tuple[slice, FloatArray | None, FloatArray]
 
 
@@ -81,47 +78,26 @@ class TargetTerm:
 
 
 @dataclass(frozen=True, eq=False)
-class CheckedVertices:
-    """Vertices without a weight, at which the errors of sets with shared places are checked.
-
-    The largest error of a set is at its border, where the rest of the mesh pulls, or else far from
-    the middle of a place.
-    """
-
-    rows: FloatArray  # W~ at these vertices, (c, m)
-    set_of: IntArray  # (c,)
-
-
-@dataclass(frozen=True, eq=False)
 class PositionTerm:
-    """The term for k vertices in sets; `strength` (s,) multiplies the weight of each set.
+    """The term for k vertices in sets.
 
     A set of many vertices is moved by few cage vertices: its rows Q R are replaced by R, with
     targets Q^T u.  The rest of the targets, which no pose can meet, adds a constant.
-
-    With shared places, the targets are those of the k places and of the c checked vertices.
     """
 
     rows: FloatArray  # W~ at the k places, (k, m)
     set_of: IntArray  # (k,), in order
-    base: FloatArray  # omega before strength, (k,), the same within a set
-    strength: FloatArray
-    mean: sparse.csr_array | None = None  # (k + c, v), from the vertices of the sets to the targets
-    checks: CheckedVertices | None = None
+    weights: FloatArray  # omega, (k,), the same within a set
+    mean: sparse.csr_array | None = None  # (k, v), from the vertices of the sets to their places
     factored: list[_SetRows] | None = None  # `_sets`, if it has been computed
     anchors: Anchors | None = None
-
-    @property
-    def weights(self) -> FloatArray:
-        """omega, (k,)."""
-        return self.base * self.strength[self.set_of]
 
     @cached_property
     def _sets(self) -> list[_SetRows]:
         """For each set its places, Q and R; or None and its rows, if these are not more than R."""
         if self.factored is not None:
             return self.factored
-        size = np.bincount(self.set_of, minlength=len(self.strength))
+        size = np.bincount(self.set_of)
         ends = np.cumsum(size)
         sets: list[_SetRows] = []
         for start, end in zip(ends - size, ends, strict=True):
@@ -166,27 +142,6 @@ class PositionTerm:
         """Return the term at *p* and half its gradient (m, 3), for targets *u* (k, 3)."""
         return self.toward(u).value_and_slope(p)
 
-    def errors(self, p: FloatArray, u: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the largest errors of each set at *p* (m, 3): at its places, at checked vertices.
-
-        Both (s,).  The latter are divided by 1.5, and 0 for a set without shared places.
-        """
-        count = len(self.rows)
-        places = self._worst(self.rows @ p - u[:count], self.set_of)
-        if self.checks is None:
-            return places, np.zeros_like(places)
-        checks = self._worst(self.checks.rows @ p - u[count:], self.checks.set_of)
-        return places, checks / _CHECK_FACTOR
-
-    def _worst(self, away: FloatArray, set_of: IntArray) -> FloatArray:
-        worst = np.zeros(len(self.strength))
-        np.maximum.at(worst, set_of, np.sqrt(np.einsum("ij,ij->i", away, away)))
-        return worst
-
-    def with_strength(self, strength: FloatArray) -> PositionTerm:
-        """Return the term with other weights."""
-        return replace(self, strength=strength, factored=self._sets)
-
     def local(self, rows: FloatArray, anchors: Anchors) -> PositionTerm:
         """Return the term with other *rows* (k, m) of the places, and with *anchors*."""
         return replace(self, rows=rows, factored=None, anchors=anchors)
@@ -211,46 +166,16 @@ def position_term(
     places = [_places(mesh.vertices[ids]) for ids in sets]
     size = np.array([int(place.max()) + 1 for place in places], dtype=np.int64)
     set_of = np.repeat(np.arange(len(sets)), size)
-    base = weight / size[set_of]
-    strength = np.ones(len(sets))
+    weights = weight / size[set_of]
     ids = np.concatenate([np.zeros(0, dtype=np.int64), *sets])
     if len(ids) == len(set_of):
-        return PositionTerm(subspace.at(ids), set_of, base, strength)
+        return PositionTerm(subspace.at(ids), set_of, weights)
     begins = np.concatenate([[0], np.cumsum(size)])
     row = np.concatenate([begin + place for begin, place in zip(begins, places, strict=False)])
     share = 1.0 / np.bincount(row)[row]
     mean = sparse.coo_array((share, (row, np.arange(len(ids))))).tocsr()
     on_mesh = sparse.coo_array((share, (row, ids)), (len(set_of), mesh.n_vertices)).tocsr()
-    count = np.array([len(own) for own in sets])
-    begins = np.cumsum(count) - count
-    at, with_shared = [], np.flatnonzero(size < count)
-    for k in with_shared:
-        farthest = _farthest(mesh.vertices[sets[k]], places[k])
-        at.append(begins[k] + np.union1d(_border(mesh, sets[k]), farthest))
-    checked = np.concatenate(at)
-    checks = CheckedVertices(
-        subspace.at(ids[checked]), np.repeat(with_shared, [len(own) for own in at])
-    )
-    to_targets = sparse.vstack([mean, sparse.eye_array(len(ids)).tocsr()[checked]]).tocsr()
-    return PositionTerm(
-        subspace.premultiplied(on_mesh), set_of, base, strength, mean=to_targets, checks=checks
-    )
-
-
-def _border(mesh: Mesh, ids: IntArray) -> IntArray:
-    """Return indices into *ids* (k,) of vertices with other neighbours, at most some 5,000."""
-    outside = np.ones(mesh.n_vertices)
-    outside[ids] = 0.0
-    border = np.flatnonzero(mesh.adjacency[ids] @ outside)
-    return border[:: 1 + len(border) // _MOST_CHECKED]
-
-
-def _farthest(points: FloatArray, place: IntArray) -> IntArray:
-    """Return the index of the point farthest from the mean of each *place*, of points (k, 3)."""
-    share = 1.0 / np.bincount(place)
-    middle = np.stack([np.bincount(place, x) * share for x in points.T], axis=1)
-    order = np.lexsort((np.linalg.norm(points - middle[place], axis=1), place))
-    return order[np.cumsum(np.bincount(place)) - 1]
+    return PositionTerm(subspace.premultiplied(on_mesh), set_of, weights, mean=mean)
 
 
 def _places(points: FloatArray) -> IntArray:

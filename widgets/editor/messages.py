@@ -117,7 +117,8 @@ class Messages:
         self._preparing, self._work = preparing, "" if preparing is None else work
         if time.monotonic() > self._noted + _SECONDS and not self._question:
             self._note = ""
-        aside = "" if preparing is None else f"{work} ... {100.0 * preparing:.0f} % (Esc)"
+        share = f" {100.0 * preparing:.0f} %" if preparing else ""
+        aside = "" if preparing is None else f"{work} ...{share} (Esc)"
         if self._error:
             self._line.warn(self._error, mode, aside)
         else:

@@ -1,7 +1,7 @@
 """Settling: a pose that still converges after its release, and what waits for its end.
 
 A far drag converges for seconds after its release, above all one that avoids contact; see
-`LiveSolve`.  The status line shows how far it is.  Saving waits until then, so that a file contains
+`LiveSolve`.  The status line says so.  Saving waits until then, so that a file contains
 the settled pose, and so it does for a pull that was released before its session was ready.  What
 would change the pose meanwhile, a press or another action, lets the file be written first, and so
 does Escape, at which the pose remains as it is.
@@ -12,16 +12,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import numpy as np
-
-from vtk_segdeform.session import Session
-
 from ..scene import Stop, View
 from .widget_set import WidgetSet
 
 _PERIOD = 100  # milliseconds between two checks
 _SHOWN_AFTER = 0.5  # seconds; a pose often settles sooner
-_STEP = 0.05  # the fraction that is shown is a multiple of this
 
 
 class Settling:
@@ -42,7 +37,7 @@ class Settling:
     ) -> None:
         self._view, self._widgets, self._changed = view, widgets, changed
         self._stop_checking: Stop | None = None
-        self._since = self._distance = 0.0  # of the beginning
+        self._since = 0.0
         self._waiting: list[Callable[[], object]] = []
 
     @property
@@ -59,13 +54,12 @@ class Settling:
 
     @property
     def fraction(self) -> float | None:
-        """Completed fraction, 0..1, coarsely; None if nothing settles, or has only just begun."""
+        """0, as nothing tells how far it is; None if nothing settles, or has only just begun."""
         if self._stop_checking is None or not self.is_active:
             return None
         if time.monotonic() < self._since + _SHOWN_AFTER:
             return None
-        share = 1.0 - _distance(self._widgets().session) / self._distance if self._distance else 0.0
-        return _STEP * int(max(share, 0.0) / _STEP)
+        return 0.0
 
     @property
     def is_awaited(self) -> bool:
@@ -80,7 +74,7 @@ class Settling:
     def follow(self) -> None:
         """Notice that it has begun."""
         if self._stop_checking is None and self.is_pending:
-            self._since, self._distance = time.monotonic(), _distance(self._widgets().session)
+            self._since = time.monotonic()
             self._stop_checking = self._view.every(_PERIOD, self._check)
 
     def then(self, act: Callable[[], object]) -> bool:
@@ -125,11 +119,3 @@ class Settling:
             self.remove()
             self.flush()
             self._changed()
-
-
-def _distance(session: Session) -> float:
-    """Return how far the handles have still to go, in the mesh's unit."""
-    reached = None if session.solution is None else session.solution.targets
-    if reached is None:  # all of them are there, and only the surface between them converges
-        return 0.0
-    return float(np.abs(np.concatenate([*session.targets.values()]) - reached).max(initial=0.0))

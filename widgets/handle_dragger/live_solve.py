@@ -1,9 +1,8 @@
 """Solving during a drag: a few steps at each event, more from a timer between events.
 
-Every pose shown is near a converged one: if the steps of an event do not suffice, the session stops
-on the way to the pointer, and continues at the next event or tick; see `Session.drag`.
-
-The number of steps per event follows from the measured time of the last steps.  If a solve stops at
+Three steps from the last pose end near the converged one at almost every motion of a hand; where a
+body buckles, more of them follow it closer.  Their number per event follows from the measured time
+of the last steps.  If a solve stops at
 its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
 uses the recorded numbers of steps; see `StepBudget`.
 
@@ -22,11 +21,10 @@ from vtk_segdeform.solver import Solution
 
 from ..scene import Draft, StepBudget, Stop, View
 
-_WITHIN = 0.0025  # diagonals: estimated distance of a shown pose from its converged one, at most
 _EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
 _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
 _MOST_STEPS = 8  # per event: following the pointer matters more than converging
-_LEAST_STEPS = 3  # per event: fewer often stop between two poses that may be shown
+_LEAST_STEPS = 3  # per event
 _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no effect
 _PERIOD = 40  # milliseconds between two refinements
 
@@ -71,7 +69,7 @@ class LiveSolve:
         return self._stop is not None
 
     def solve(self, solve: Callable[..., Solution]) -> None:
-        """Call ``solve(max_steps=..., within=...)``, and refine its result later.
+        """Call ``solve(max_steps=...)``, and refine its result later.
 
         Targets that raise `ConstraintError` are reported to `View.on_failure` and leave the pose
         unchanged, so that the gesture can continue.
@@ -87,15 +85,14 @@ class LiveSolve:
         self.resume()
 
     def lead(self, moves: Sequence[Callable[..., Solution]]) -> None:
-        """Call each of *moves* as `solve` does, but until its targets are reached."""
+        """Call each of *moves* as `solve` does."""
         with self._view.guarded(only_refusals=True):
             for move in moves:
-                move(within=_WITHIN)
+                move(max_steps=_MOST_STEPS)
 
     def has_reached(self) -> bool:
-        """Whether the pose has reached the last targets."""
-        solution = self._session.solution
-        return not self.is_refused and solution is not None and solution.targets is None
+        """Whether the pose is that of the last targets."""
+        return not self.is_refused and self._session.solution is not None
 
     def resume(self) -> None:
         """Refine the current pose if it stopped at the step limit; otherwise stop refining.
@@ -164,5 +161,5 @@ class LiveSolve:
     def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
         """Solve and record the time per step."""
         began = time.perf_counter()
-        solution = solve(max_steps=self._budget.steps(steps), within=_WITHIN)
+        solution = solve(max_steps=self._budget.steps(steps))
         self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))

@@ -151,18 +151,15 @@ def settling(bench, monkeypatch):  # noqa: F811
     return bench.editor.controller.settling
 
 
-def test_a_pose_that_settles_after_its_release_shows_how_far_it_is(bench, settling):  # noqa: F811
+def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa: F811
     bench.editor.controller.refresh()
-    now, shares = status(bench.editor), []
+    now = status(bench.editor)
     assert (now.work, now.progress, now.is_busy) == ("Settling", 0.0, False)
     assert now.cancel.visible
     assert now.cancel.tip == "Stop at this pose"
-    assert bench.editor.controller.messages._line.aside == "Settling ... 0 % (Esc)"
+    assert bench.editor.controller.messages._line.aside == "Settling ... (Esc)"
     while settling.is_active:
-        shares.append(settling.fraction)
         bench.hand.tick()
-    assert shares == sorted(shares)
-    assert max(shares) > 0.4
     until(bench, lambda: bench.editor.controller.messages._line.aside == "")
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert not status(bench.editor).cancel.visible
@@ -453,8 +450,7 @@ def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F8
     assert not session.is_unsettled
     bench.type("shift+f")
     assert session.solution.is_finished
-    assert np.abs(session.vertices - before).max() < 0.1 * session.mesh.diagonal
-    assert not np.array_equal(session.vertices, before)
+    assert np.abs(session.vertices - before).max() < 1e-3 * session.mesh.diagonal
 
 
 def test_a_part_that_no_handle_moves_is_named_once():

@@ -134,7 +134,7 @@ def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):
     session, controller, surface = editor.session, editor.controller, editor.widgets.surface
     posed = session.vertices
     for k in range(3):
-        session.change_options(stretch=float(k + 1))  # only the last three are bound
+        session.change_options(stretch=float(k + 2))  # only the last three are bound
         session.bind()
     session.jump(0)
     assert session.vertices_at(2) is None

@@ -125,7 +125,6 @@ def bench():
 @pytest.fixture
 def roughly(monkeypatch):
     """Solve one step per event, far from convergence: for tests of targets, which are exact."""
-    monkeypatch.setattr(live_solve, "_WITHIN", None)
     for name in ("_LEAST_STEPS", "_MOST_STEPS"):
         monkeypatch.setattr(live_solve, name, 1)
 
@@ -846,6 +845,7 @@ def test_a_pose_reached_by_undo_is_not_refined(bench):
     assert not bench.has_timer
 
 
+@pytest.mark.usefixtures("roughly")
 def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     place = bench.aim(FREE)
     bench.hand.press(place)
@@ -865,6 +865,7 @@ def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     assert bench.session.state.pose is None
 
 
+@pytest.mark.usefixtures("roughly")
 def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
     place = bench.aim(FREE)
     bench.hand.drag([place, place + [-40.0, 60.0]])
@@ -997,36 +998,26 @@ def test_the_caption_shows_the_angle_during_a_rotation(bench):
 
 
 def converged(session):
-    """Return the converged pose for the targets that the session has reached, (n, 3)."""
-    state, reached = session.state, session.solution.targets
-    if reached is not None:
-        parts = np.split(reached, [len(session.handles[TIP])])
-        targets = dict(zip(session.handles, parts, strict=True))
-        state = replace(state, pose=replace(state.pose, targets=targets))
-    other = Session(SCENE.mesh, state=state)
+    """Return the converged pose for the targets of the session, (n, 3)."""
+    other = Session(SCENE.mesh, state=session.state)
     other.refine()
     return other.vertices
 
 
-def test_a_jerk_shows_only_poses_that_can_be_trusted_and_ends_as_without_hurry(bench, monkeypatch):
+def test_a_jerk_is_followed_and_ends_as_without_hurry(bench, monkeypatch):
     session, hand, window = bench.session, bench.hand, bench.view.window
     window.SetMultiSamples(4)
     prescribe_steps(bench.view.interactor, (2,) * 8)
     place, start, shown = bench.aim(FREE), bench.targets(), session.vertices
-    far, new = SCENE.mesh.vertices[:, 0] < 1.5, []
     hand.press(place)
     for way in (90.0, 90.0, -60.0, -60.0):
         hand.move(place + [0.3 * way, way])
         assert np.linalg.norm(bench.targets() - start, axis=1).min() > 0.5  # at the pointer
         assert abs(session.volume_change) < 1e-12
         assert window.GetMultiSamples() == 0
-        if session.vertices is not shown:
-            shown = session.vertices
-            assert np.array_equal(bench.dragger._surface.points, shown)
-            away = np.linalg.norm(converged(session) - shown, axis=1)[far].max()
-            new.append(away / SCENE.mesh.diagonal)
-    assert len(new) >= 2
-    assert max(new) < 0.01
+        assert session.vertices is not shown
+        shown = session.vertices
+        assert np.array_equal(bench.dragger._surface.points, shown)
     hand.release()
     assert session.undo_label == f"drag {TIP}"
     monkeypatch.setattr(draft, "_REST", 0.0)

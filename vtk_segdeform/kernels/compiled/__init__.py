@@ -71,7 +71,6 @@ from .triangles import (
 )
 from .volumes import (
     determinants,
-    opposite_slope,
     opposite_volumes,
     volume_along_sums,
     volume_gradient,
@@ -113,7 +112,6 @@ __all__ = [
     "numbers_of_lines",
     "one_fan_each",
     "opposite_pairs",
-    "opposite_slope",
     "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",

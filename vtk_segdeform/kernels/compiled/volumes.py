@@ -91,34 +91,3 @@ def opposite_volumes(x, faces, opposite, out):
             o = opposite[corner]
             height = (x[i, 0] - x[o, 0]) * nx + (x[i, 1] - x[o, 1]) * ny + (x[i, 2] - x[o, 2]) * nz
             out[corner] += height / 18.0
-
-
-@_compile
-def opposite_slope(x, faces, opposite, share, out):
-    """Add the gradient of 18 times the volumes above, in sum with weights *share*, to *out*."""
-    for f in range(len(faces)):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-        nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
-        px, py, pz, total = 0.0, 0.0, 0.0, 0.0
-        for corner in (i, j, k):
-            o, weight = opposite[corner], share[corner]
-            total += weight
-            px += weight * (x[i, 0] - x[o, 0])
-            py += weight * (x[i, 1] - x[o, 1])
-            pz += weight * (x[i, 2] - x[o, 2])
-            out[o, 0] -= weight * nx
-            out[o, 1] -= weight * ny
-            out[o, 2] -= weight * nz
-        jx, jy, jz = gy * pz - gz * py, gz * px - gx * pz, gx * py - gy * px
-        kx, ky, kz = py * ez - pz * ey, pz * ex - px * ez, px * ey - py * ex
-        out[i, 0] += total * nx - jx - kx
-        out[i, 1] += total * ny - jy - ky
-        out[i, 2] += total * nz - jz - kz
-        out[j, 0] += jx
-        out[j, 1] += jy
-        out[j, 2] += jz
-        out[k, 0] += kx
-        out[k, 1] += ky
-        out[k, 2] += kz

@@ -1,0 +1,130 @@
+"""Rotations inside the body: the surface alone is hollow, and crumples when it is twisted.
+
+    min_R  sum_k  v_k |F_k(p) - R_k|^2,      F_k = the gradient of the cages' map at a point inside
+
+The map of a cage is defined everywhere, x(q) = sum_j w_j(q) p_j, so its gradient at a point q is
+linear in p; here it is taken by central differences, and blended as the surface above it.  v_k is
+the volume around the point.  This is the elasticity of a solid, as rigid as possible, with few
+samples: each is one more rotation cluster, of three rows.
+
+Without it, bars and a cactus that were twisted in steps of 5 degrees to 270 and back jumped by .12
+to .17 of the diagonal, several times; with it the longest step is .012.
+
+The points are below patches of the surface, in the largest balls inside the body that touch it.
+
+Source
+------
+I. Chao, U. Pinkall, P. Sanan, P. Schroeder, "A simple geometric model for elastic deformations",
+SIGGRAPH 2010: the energy.  The balls: `geometry.local_volume`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import sizes
+from ..arrays import BoolArray, FloatArray
+from ..cages import Cage, mean_value_coordinates
+from ..geometry import cluster_positions, decimated, inner_balls
+from ..mesh import Mesh
+from ..subspace import Subspace
+from .energy import Energy
+
+# Share of the trace of the energy.  With 0.1 twists of a bar jump and with 0.2 a short one unwinds;
+# with 1 poses of a dog are 4 % farther from the true ones.
+_SHARE = 0.3
+_PATCHES = 200  # with 100, the twist of a bar jumps
+_DEPTH = 0.75  # of the points, in radii of their balls
+_STEP = 1e-3  # of the central differences, in radii
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """Points inside the bodies of a mesh, each below a patch of the surface."""
+
+    points: FloatArray  # (k, 3)
+    radii: FloatArray  # (k,), of their balls
+    volumes: FloatArray  # (k,), around them
+    weights: FloatArray  # (r, k): the blend weights
+
+    @classmethod
+    def of(cls, mesh: Mesh, weights: FloatArray, encloses: BoolArray) -> Interior:
+        """Return points in those components of *mesh* that are bodies.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            n vertices, c components.
+        weights : (r, n) float
+            Blend weights of the regions.
+        encloses : (c,) bool
+            Whether each component is a body.
+        """
+        component = mesh.components
+        if mesh.n_vertices > sizes.DECIMATED:
+            mesh, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+            component, weights = component[kept], weights[:, kept]
+        x, area = mesh.vertices, mesh.vertex_areas
+        inward, _, diameters = inner_balls(x, mesh.faces)
+        radius = 0.5 * diameters
+        own = encloses[component] & (area * radius > 0.0)
+        own &= diameters < mesh.diagonal  # otherwise nothing is opposite
+        x, radius, area, component = x[own], radius[own], area[own], component[own]
+        points, volume = x + _DEPTH * radius[:, None] * inward[own], area * radius
+        if not len(x):
+            return cls(points, radius, volume, weights[:, own])
+        patch = cluster_positions(x, _PATCHES)
+        patch = np.unique([patch, component], axis=1, return_inverse=True)[1].ravel()
+        total = np.asarray(np.bincount(patch, volume), dtype=np.float64)
+
+        def mean(values: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(patch, volume * values) / total)
+
+        middle = np.stack([mean(axis) for axis in points.T], axis=1)
+        blend = np.stack([mean(each) for each in weights[:, own]])
+        return cls(middle, mean(radius), total, blend)
+
+    def gradients(self, cages: Sequence[Cage], subspace: Subspace) -> FloatArray:
+        """Return the gradients (k, 3, m) of the map of *cages* at the points, in W~'s columns."""
+        found = np.zeros((len(self.points), 3, subspace.n_columns))
+        for cage, own, alpha in zip(cages, subspace.columns, self.weights, strict=True):
+            some = np.flatnonzero(alpha > 0.0)
+            step = _STEP * self.radii[some, None]
+            for axis in range(3):
+                way = step * np.eye(3)[axis]
+                sides = np.concatenate([self.points[some] + way, self.points[some] - way])
+                rows = mean_value_coordinates(sides, cage.vertices, cage.faces)
+                change = rows[: len(some)] - rows[len(some) :]
+                found[some, axis, own] = alpha[some, None] * change / (2.0 * step)
+        return found
+
+
+def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) -> Energy:
+    """Return *energy*, with rotations of clusters, plus that inside the body.
+
+    Parameters
+    ----------
+    energy : Energy
+        Of the surface.
+    gradients : (k, 3, m) float
+        Of the map of the cages, at k points.
+    volumes : (k,) float
+        Around them.
+    """
+    if not len(volumes):
+        return energy
+    flat = gradients.reshape(3 * len(volumes), -1)
+    stiffness = float(np.repeat(volumes, 3) @ np.einsum("km,km->k", flat, flat))
+    v = _SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
+    load = np.repeat(v, 3)[:, None] * flat
+    operator = np.concatenate([np.asarray(energy.covariance_operator), load])
+    return replace(
+        energy,
+        quadratic=energy.quadratic + flat.T @ load,
+        constant=energy.constant + 3.0 * float(v.sum()),
+        covariance_operator=operator,
+        load_operator=operator,
+    )
