@@ -86,8 +86,9 @@ _OLD_ACTIVE = 3  # the same while a term is active
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 _LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
-_ROUNDED = 1e-6  # longest step that may be due to rounding
-_STILL = 50  # steps without a lower merit, after which it counts as rounding
+# Steps of at most _ROUNDED that lower the merit by less than a share of _GAIN in _STILL steps are
+# due to rounding, which is amplified by the weights of positions.
+_ROUNDED, _GAIN, _STILL = 1e-5, 1e-10, 20
 
 
 @dataclass(frozen=True)
@@ -518,7 +519,8 @@ class GaussNewton:
         """Return whether the last steps were rounding only, as happens with high weights."""
         if len(merits) <= _STILL or state.step_size > _ROUNDED:
             return False
-        return merits[-1 - _STILL] - here.merit <= self._rounding(here)
+        gain = merits[-1 - _STILL] - here.merit
+        return gain <= _GAIN * (self.energy.constant + abs(here.merit))
 
     def farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
