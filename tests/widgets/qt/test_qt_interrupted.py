@@ -171,6 +171,7 @@ def test_a_job_ends_even_if_a_foreign_timer_ends_or_the_interactor_is_initialise
 
 
 def test_two_editors_in_one_view_do_not_block_each_other(stand):
+    stand.begin(Mode.DEFORM)  # before the other one, so that a press is ours
     view = View.of(stand.widget.plotter)
     view.render = lambda: None
     other = DeformEditor(view, ready())
