@@ -592,7 +592,7 @@ class Deformer:
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
         """Return the pose of the last solve, finished on the mesh itself; see `finish`.
 
-        As rigid as possible within the spacing of the cages, and where they are beyond it.  This
+        As rigid as possible within two spacings of the cages, and where these are beyond it.  This
         takes as long as 5 to 50 iterations of as-rigid-as-possible: triangles are less distorted,
         and the handles and fixed vertices are exact.  The volume is preserved as before.  The next
         solve starts from the cages, as if the pose had not been finished.  Of a deformer made by

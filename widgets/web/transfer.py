@@ -75,7 +75,7 @@ class Transfer:
         self._editor, self._folder, self.limit = editor, folder, limit
         self._names, self._changed = names, changed
         self._is_uploading = False
-        self._downloads: set[Path] = set()  # the folders of those that are being read again
+        self._downloads: set[Path] = set()  # folders of files being read again
 
     def add_routes(self, app: Any) -> None:
         """Add the routes to an aiohttp application."""
