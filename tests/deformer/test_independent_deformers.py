@@ -109,7 +109,6 @@ def hold_others(deformer):
         deformer.hold(fixed=deformer.fixed, handle=deformer.handle, preserve_volume=False),
         deformer.hold(fixed=SCENE.fixed, handle=[TIP]),
         deformer.local(TIP, 0.2 * D, 0.05 * D),
-        deformer.with_firm_contact(),
     ):
         other.solve(X[other.handle] + NEAR, max_steps=5)
 

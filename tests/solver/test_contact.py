@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import vtk_segdeform as sd
 from vtk_segdeform.mesh import self_intersections
 from vtk_segdeform.models.implicit import Limb, standing_body
-from vtk_segdeform.solver import Contact, contact
+from vtk_segdeform.solver import Contact
 from vtk_segdeform.solver.contact import ContactSurface, _Pairs
 
 SIDE = [(-0.35, 0, 1.2), (-0.35, 0, 0.6), (-0.2, 0, 0.3)]
@@ -68,23 +68,6 @@ def test_a_pull_avoids_contact_as_well(fork):
     assert abs(avoiding.volume_change) < 1e-12
     with pytest.raises(sd.errors.ArgumentError, match="avoid_contact"):
         sd.pull(mesh, tip, x[tip], avoid_contact="yes")
-
-
-def test_what_still_crosses_is_solved_once_more_with_firm_contact(fork, monkeypatch):
-    deformer, targets = fork
-    targets, crossing = targets - [0.13, 0.0, 0.0], {}
-    for firm in (contact._FIRM, 1.0):
-        monkeypatch.setattr(contact, "_STIFFNESS", 1.0)
-        monkeypatch.setattr(contact, "_FIRM", firm)
-        solution = sd.deform(
-            deformer.mesh, deformer.fixed, deformer.handle, targets, n_regions=1,
-            n_cage_vertices=40, avoid_contact=True, refine=False,
-        )  # fmt: skip
-        assert abs(solution.volume_change) < 1e-12
-        crossing[firm] = len(solution.crossings())
-    once_more, in_vain = crossing.values()
-    assert once_more == 0
-    assert in_vain > 10
 
 
 def test_crossings_at_rest_do_not_count(through, fork):

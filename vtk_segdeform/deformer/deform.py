@@ -136,29 +136,7 @@ def deform(
         progress=next(stages),
     )
     solution = solved_along(deformer, path, progress=next(stages))
-    last = next(stages)
-    if not avoid_contact:
-        return finished(deformer, solution, refine, progress=last)
-    solution = finished(deformer, solution, refine, progress=part(last, 0.0, 0.5))
-    solution = _kept_apart(deformer, solution, path, refine, part(last, 0.5, 1.0))
-    tell(last, 1.0, "solved")
-    return solution
-
-
-def _kept_apart(
-    deformer: Deformer,
-    solution: Solution,
-    path: Sequence[FloatArray],
-    refine: bool | None,
-    progress: Progress | None,
-) -> Solution:
-    """Return *solution*, or one with firmer contact if fewer of its faces cross."""
-    if not len(solution.crossings()):
-        return solution
-    firm = deformer.with_firm_contact()
-    again = solved_along(firm, path, progress=part(progress, 0.0, 0.5))
-    again = finished(firm, again, refine, progress=part(progress, 0.5, 1.0))
-    return again if len(again.crossings()) < len(solution.crossings()) else solution
+    return finished(deformer, solution, refine, progress=next(stages))
 
 
 def solved_along(

@@ -240,7 +240,6 @@ class Deformer:
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
         self._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
-        self._has_firm_contact = False
         self._lids_option = as_lids(lids)
         self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
@@ -301,17 +300,6 @@ class Deformer:
             other._lids_option = as_lids(lids)
             other._enclose()
         other._constrain(fixed, handle, fixed_at)
-        return other
-
-    @one_blas_thread()
-    def with_firm_contact(self) -> Deformer:
-        """Return a deformer at rest with the same constraints that avoids contact, and firmly.
-
-        Fewer parts cross each other than with ``avoid_contact=True``, but a solve takes more steps.
-        """
-        other = self._shared()
-        other._avoid_contact = other._has_firm_contact = True
-        other._constrain(self.fixed, self.handle)
         return other
 
     @one_blas_thread()
@@ -1068,7 +1056,7 @@ class Deformer:
         cells = self._samples.cells
         is_held = np.bincount(cells, held) >= 0.5 * np.bincount(cells)
         surface, scale = self._samples.contact_surface, self._binding.energy.scale
-        return Contact.of(surface, is_held, scale, is_firm=self._has_firm_contact)
+        return Contact.of(surface, is_held, scale)
 
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""

@@ -59,7 +59,7 @@ _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _PARTS = 16  # of that distance, by which pairs are sorted
 _FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
 _ROOM = 50  # pairs per sample for which a search makes room
-_STIFFNESS, _FIRM = 1.5e5, 6e5  # k, times the scale of the shape energy
+_STIFFNESS = 1.5e5  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
@@ -198,14 +198,9 @@ class Contact:
     _last: tuple[FloatArray, _Pairs | None] = field(default=(NO_SURFACE, None), repr=False)
 
     @classmethod
-    def of(
-        cls, surface: ContactSurface, held: BoolArray, scale: float, *, is_firm: bool = False
-    ) -> Contact:
-        """Return the term of *surface* beside a shape energy of this *scale*.
-
-        A firm one keeps parts apart more often, in more steps.
-        """
-        return cls(surface, held, (_FIRM if is_firm else _STIFFNESS) * scale)
+    def of(cls, surface: ContactSurface, held: BoolArray, scale: float) -> Contact:
+        """Return the term of *surface* beside a shape energy of this *scale*."""
+        return cls(surface, held, _STIFFNESS * scale)
 
     def value_and_slope(
         self, p: FloatArray, x: FloatArray = NO_SURFACE
