@@ -199,13 +199,12 @@ def _settings(options: Namespace) -> dict[str, Any]:
     settings: dict[str, Any] = {
         "preserve_volume": not options.no_volume,
         "lids": LIDS[options.lids],
-        "avoid_folds": options.avoid_folds,
         "avoid_contact": options.avoid_contact,
     }
     if options.stretch is not None:
         settings["stretch"] = options.stretch
     if options.rotation_groups is not None:
-        settings["rotation_groups"] = options.rotation_groups or None
+        settings["rotation_groups"] = options.rotation_groups
     return settings
 
 

@@ -453,11 +453,10 @@ def _handles(parser: argparse.ArgumentParser) -> None:
             f"--{name}", action=_HandleOption, metavar=metavar, help=text, required=required
         )
     add("--no-volume", action="store_true", help="do not preserve the volume")
-    add("--avoid-folds", action="store_true", help="keep the body from turning inside out")
     _contact_and_lids(parser)
     text = "stretch resistance relative to detail preservation (default: 1)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
-    text = "number of rotation clusters; 0: one rotation per vertex (default: 300)"
+    text = "number of rotation clusters (default: 300)"
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
     _refine(parser, f"up to {sizes.FINISHED:,} vertices")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")

@@ -36,11 +36,11 @@ FARTHEST_APART = 20.0
 At this distance volumes are rounded to a few 1e-12 of themselves; the error grows with its cube."""
 
 
-def check_options(stretch: float, rotation_groups: int | None) -> None:
+def check_options(stretch: float, rotation_groups: int) -> None:
     """Raise an ArgumentError unless all are numbers in their range."""
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {shown(stretch)}")
-    if rotation_groups is not None and not is_whole(rotation_groups, 1):
+    if not is_whole(rotation_groups, 1):
         raise ArgumentError(
             f"rotation_groups must be a whole number, 1 or more; got {shown(rotation_groups)}"
         )

@@ -34,7 +34,7 @@ from ..regions import Regions
 from ..solver import CoarseVolume
 from ..subspace import cage_subspace
 
-_FORMAT = 12  # increment whenever the content of a binding changes
+_FORMAT = 13  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,26 +51,18 @@ class BindingInputs:
         In scene coordinates.
     rest_cages : (m, 3) float
         The stacked cage vertices, in the coordinates of *rest*.
-    blend : (r, n) float or None
-        Blend weights instead of those of *regions*.
     stretch : float
         See `energy.shape_energy`.
-    n_clusters : int or None
-        Number of rotation clusters; None gives each vertex its own rotation.
+    n_clusters : int
+        Number of rotation clusters.
     """
 
     rest: Mesh
     regions: Regions
     cages: Sequence[Cage]
     rest_cages: FloatArray
-    blend: FloatArray | None
     stretch: float
-    n_clusters: int | None
-
-    @property
-    def is_reduced(self) -> bool:
-        """Whether the energy has reduced operators only, none on the mesh."""
-        return self.n_clusters is not None and self.stretch > 0.0
+    n_clusters: int
 
     @property
     def parts(self) -> IntArray:
@@ -94,11 +86,10 @@ class BindingInputs:
         regions = self.regions
         seen = hashlib.blake2b(digest_size=20)
         seen.update(repr((_FORMAT, self.stretch, self.n_clusters, regions.smoothness)).encode())
-        arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership, self.blend]
+        arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership]
         for array in [*arrays, *(a for cage in self.cages for a in (cage.vertices, cage.faces))]:
-            if array is not None:
-                seen.update(repr((array.shape, array.dtype.str)).encode())
-                seen.update(np.ascontiguousarray(array).view(np.uint8).data)
+            seen.update(repr((array.shape, array.dtype.str)).encode())
+            seen.update(np.ascontiguousarray(array).view(np.uint8).data)
         return seen.hexdigest()
 
 
@@ -115,44 +106,38 @@ class Binding:
         tell(progress, 0.0, "checking cages")
         rest, regions, cages = inputs.rest, inputs.regions, inputs.cages
         share = part(progress, 0.0, 0.38)  # shares of the time for 5,000 to 300,000 vertices
-        subspace = cage_subspace(regions, cages, blend=inputs.blend, progress=share)
+        subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
         clusters = _first_clusters(inputs)
         share = part(progress, 0.4, 0.82)
         energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
-        if clusters is not None and energy.has_exact_gradient:
-            faces = [cage.faces for cage in cages]
-            energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
-            energy = _joined(inputs, energy, clusters, part(progress, 0.82, 0.91))
-            energy = _with_interior(inputs, energy)
-        share, whole = part(progress, 0.93, 1.0), energy.has_vertex_rotations
-        coarse = CoarseVolume.of(regions.mesh, subspace, whole=whole, progress=share)
+        faces = [cage.faces for cage in cages]
+        energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
+        energy = _joined(inputs, energy, clusters, part(progress, 0.82, 0.91))
+        energy = _with_interior(inputs, energy)
+        coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
         return cls(energy, coarse)
 
 
-def _first_clusters(inputs: BindingInputs) -> IntArray | None:
-    """Return the rotation cluster of each vertex; many small ones where `_joined` follows."""
-    n, count = inputs.rest.n_vertices, inputs.n_clusters
-    if count is None:
-        return None
-    if inputs.is_reduced:
-        count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * count)
+def _first_clusters(inputs: BindingInputs) -> IntArray:
+    """Return the rotation cluster of each vertex: many small ones, which `_joined` joins."""
+    n = inputs.rest.n_vertices
+    count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * inputs.n_clusters)
     if count >= n:
         return np.arange(n)
     shares = inputs.shares
-    if inputs.is_reduced and n > sizes.DECIMATED:
+    if n > sizes.DECIMATED:
         _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
         parts, x = inputs.parts[kept], inputs.rest.vertices[kept]
         return cluster_within_parts(x, parts, count, shares=shares, quick=True)[of_vertex]
-    x, quick = inputs.rest.vertices, inputs.is_reduced
-    return cluster_within_parts(x, inputs.parts, count, shares=shares, quick=quick)
+    x = inputs.rest.vertices
+    return cluster_within_parts(x, inputs.parts, count, shares=shares, quick=True)
 
 
 def _joined(
     inputs: BindingInputs, energy: Energy, clusters: IntArray, progress: Progress | None
 ) -> Energy:
     """Return *energy* with the requested number of rotations."""
-    assert inputs.n_clusters is not None
     counts = np.bincount(clusters)
     if len(counts) <= inputs.n_clusters:
         return energy
@@ -178,7 +163,6 @@ def _with_interior(inputs: BindingInputs, energy: Energy) -> Energy:
     ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
     p = np.split(inputs.rest_cages, ends)
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
-    weights = regions.weights if inputs.blend is None else inputs.blend
-    interior = Interior.of(mesh, weights, lids_of(regions.mesh).encloses)
+    interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses)
     gradients = interior.gradients(cages, energy.subspace)
     return with_interior(energy, gradients, interior.volumes)

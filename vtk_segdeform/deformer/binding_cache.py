@@ -41,11 +41,8 @@ _log = logging.getLogger(__name__)
 def cached_binding(
     inputs: BindingInputs, folder: Path | None, progress: Progress | None = None
 ) -> Binding:
-    """Return the binding of *inputs*, read from *folder*, or else computed and written there.
-
-    A binding with operators on the mesh, as of a rotation for each vertex, is always computed.
-    """
-    if folder is None or not inputs.is_reduced:
+    """Return the binding of *inputs*, read from *folder*, or else computed and written there."""
+    if folder is None:
         return Binding.compute(inputs, progress)
     path = folder / (inputs.digest() + ENDING)
     binding = read_binding(path, inputs.rest.n_vertices)
@@ -60,14 +57,12 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
     try:
         arrays = _read(path)
         subspace = _subspace(arrays, "w", n_vertices)
-        operator = arrays["operator"]
         energy = Energy(
             quadratic=arrays["quadratic"],
             constant=float(arrays["constant"]),
             scale=float(arrays["scale"]),
             mass=arrays["mass"],
-            covariance_operator=operator,
-            load_operator=operator,
+            rotation_operator=arrays["operator"],
             subspace=subspace,
         )
         coarse = CoarseVolume(subspace)
@@ -92,7 +87,7 @@ def write_binding(path: Path, binding: Binding) -> None:
         "constant": np.array(energy.constant),
         "scale": np.array(energy.scale),
         "mass": energy.mass,
-        "operator": energy.load_operator,
+        "operator": energy.rotation_operator,
         **_arrays(energy.subspace, "w"),
     }
     if coarse.cells is not None:

@@ -41,7 +41,6 @@ def deform(
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
-    avoid_folds: bool = False,
     avoid_contact: bool = False,
     refine: bool | None = None,
     progress: Progress | None = None,
@@ -72,8 +71,6 @@ def deform(
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
-    avoid_folds : bool
-        Keep the body below the surface from turning inside out; see `Deformer`.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
     refine : bool or None
@@ -98,7 +95,6 @@ def deform(
     require_mesh(mesh)
     as_flag(preserve_volume, "preserve_volume")
     as_lids(lids)
-    as_flag(avoid_folds, "avoid_folds")
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     if n_cage_vertices is not None and not is_whole(n_cage_vertices, 4):
@@ -131,7 +127,6 @@ def deform(
         handle=handle,
         preserve_volume=preserve_volume,
         lids=lids,
-        avoid_folds=avoid_folds,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

@@ -40,7 +40,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from .. import sizes
-from ..arrays import BoolArray, FloatArray, IntArray, as_numbers, is_number
+from ..arrays import BoolArray, FloatArray, IntArray, is_number
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..energy import Energy, with_rotating_rows
@@ -56,7 +56,6 @@ from ..solver import (
     CONVERGED,
     LONGEST_MOVE,
     Anchors,
-    Barrier,
     Bodies,
     Contact,
     GaussNewton,
@@ -156,29 +155,16 @@ class Deformer:
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
-    rotation_groups : int or None
-        Number of rotation clusters; None gives each vertex its own rotation, as in the paper.
+    rotation_groups : int
+        Number of rotation clusters.  In the paper each vertex has its own rotation.
     tolerance, max_steps : float, int
         The solver stops when a step moves the surface by less, root mean square, as a share of
         the mesh's size (the diameter of a ball about its centre that contains it); or after so
         many steps.
-    acceleration : int
-        Number of steps that Anderson acceleration remembers; 0 turns it off.
-    exact_hessian : bool
-        Include the derivatives of local rotations and volumes in the Hessian.  False, with
-        ``acceleration=0``, is the paper's iteration.
-    exact_volume : bool
-        False leaves the paper's linearised multiplier, for comparison.
-    avoid_folds : bool
-        Keep the body below the surface from turning inside out, by a barrier (`solver.barrier`).
-        Far bends and twists then fold less, but distort the surface more and take longer.
     avoid_contact : bool
         Keep parts of the surface that are not near each other at rest from crossing; see
         `solver.contact`.  Handles take precedence: if their targets, or fixed vertices, force a
         crossing, the solution crosses or its status is MISSED.  `Solution.crossings` tells.
-    blend : (r, n) float, optional
-        Blend weights instead of ``regions.weights``, for comparison; `cage_distance_weights`
-        computes those of eq. (4) as printed.
     cache : path, optional
         A folder in which bindings are kept and found again; see `binding_cache`.
     progress : Progress, optional
@@ -192,7 +178,7 @@ class Deformer:
     CageError
         If there is not one cage per region, or a cage does not enclose its region.
     RegionError
-        If *regions* belong to another mesh, or *blend* is no partition of unity over them.
+        If *regions* belong to another mesh.
     Cancelled
         If *progress* raised it.
     """
@@ -217,15 +203,10 @@ class Deformer:
         preserve_region_volumes: bool = False,
         lids: bool | None = None,
         stretch: float = 1.0,
-        rotation_groups: int | None = 300,
+        rotation_groups: int = 300,
         tolerance: float = 1e-7,
         max_steps: int = 500,
-        acceleration: int = 5,
-        exact_hessian: bool = True,
-        exact_volume: bool = True,
-        avoid_folds: bool = False,
         avoid_contact: bool = False,
-        blend: ArrayLike | None = None,
         cache: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
     ) -> None:
@@ -233,15 +214,11 @@ class Deformer:
         require_regions(regions, mesh)
         cages = all_of(cages, Cage, "cages")
         check_options(stretch, rotation_groups)
-        self._options = SolverOptions(
-            tolerance, max_steps, acceleration, exact_hessian, exact_volume
-        )
+        self._options = SolverOptions(tolerance, max_steps)
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
-        self._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         self._lids_option = as_lids(lids)
-        self._own_blend = None if blend is None else as_numbers(blend, "blend")
         folder = None if cache is None else as_path(cache, "cache")
 
         self.mesh, self.regions, self.cages = mesh, regions, cages
@@ -250,7 +227,7 @@ class Deformer:
         inside = [self._frame.inward(cage.vertices) for cage in cages]
         self._rest_cages = np.concatenate([_NO_POINTS, *inside])
         inputs = BindingInputs(
-            self._rest, regions, cages, self._rest_cages, self._own_blend, stretch, rotation_groups
+            self._rest, regions, cages, self._rest_cages, stretch, rotation_groups
         )
         self._binding = cached_binding(inputs, folder, part(progress, 0.0, _BOUND))
 
@@ -275,13 +252,12 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
-        avoid_folds: bool | None = None,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
         ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``,
-        ``avoid_folds=None`` and ``avoid_contact=None`` are the values of this deformer.  The fixed
+        and ``avoid_contact=None`` are the values of this deformer.  The fixed
         vertices stay at *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at
         rest.
         """
@@ -292,8 +268,6 @@ class Deformer:
             other._preserve_region_volumes = as_flag(
                 preserve_region_volumes, "preserve_region_volumes"
             )
-        if avoid_folds is not None:
-            other._avoid_folds = as_flag(avoid_folds, "avoid_folds")
         if avoid_contact is not None:
             other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
         if lids is not ... and as_lids(lids) is not self._lids_option:
@@ -432,7 +406,7 @@ class Deformer:
             others = held[held != point.vertex]
             if ring is not None and not np.isin(ring.vertices, others).any():
                 rings.append((target, point, ring))
-        if energy.has_vertex_rotations or not rings:  # rotations of vertices act on the mesh
+        if not rings:
             return energy, flat
         positions = self._constraints.solver.positions
         positions = positions.local(positions.rows, anchors)
@@ -499,8 +473,8 @@ class Deformer:
     @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
-        blend = self.regions.weights if self._own_blend is None else self._own_blend
-        return bind_passengers(self.mesh, blend, self.cages, points, progress=progress)
+        weights = self.regions.weights
+        return bind_passengers(self.mesh, weights, self.cages, points, progress=progress)
 
     @one_blas_thread()
     def carry(self, points: ArrayLike) -> FloatArray:
@@ -757,7 +731,7 @@ class Deformer:
     def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
         """Return the *solution* for *goal* (k, 3) with its estimate, and the status by that."""
         solver, p = self._path.solver, self._path.end
-        if solution.status is Status.STEP_LIMIT or not solver.has_newton_steps:
+        if solution.status is Status.STEP_LIMIT:
             return solution
         remaining = solver.remaining(p, self._places(goal)) * self._frame.size / self.mesh.diagonal
         is_stalled = solution.status is Status.STALLED
@@ -844,7 +818,7 @@ class Deformer:
         The latter is 0 if the mesh was moved along the directions of the solver instead.
         """
         p, directions, size = result.p, result.directions, self._frame.size
-        if not directions or not self._options.exact_volume:
+        if not directions:
             return self._map(p * size), 0.0
         preserved, _, scaled = self._constraints.preserved
         if scaled is not None:
@@ -923,14 +897,6 @@ class Deformer:
         self._total_volume = total_volume(self._rest_pose, self._lids)
         self._bodies = Bodies(self._rest_pose, self._total_volume, self._lids)
 
-    @cached_property
-    def _barrier(self) -> Barrier:
-        samples, surface = self._samples, self._binding.coarse_volume.surface
-        encloses = np.zeros(surface.n_vertices, dtype=bool)
-        encloses[samples.cells] = lids_of(self._rest_pose).encloses[self.mesh.components]
-        scale, rest = self._binding.energy.scale, self._rest_cages
-        return Barrier.of(surface, samples.faces, rest, encloses=encloses, strength=scale)
-
     def _region_volume_changes(self, x: FloatArray) -> FloatArray:
         return np.array([each.relative(x) for each in self._region_volumes])
 
@@ -960,8 +926,7 @@ class Deformer:
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved = self._preserved_volumes()
         contact = self._contact_of()
-        terms: list[Term] = [self._barrier] if self._avoid_folds else []
-        terms += [] if contact is None else [contact]
+        terms: tuple[Term, ...] = () if contact is None else (contact,)
         fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
@@ -977,7 +942,7 @@ class Deformer:
             fixed_box=box[: 2 * len(self.fixed)],
             anchors=self._anchors(preserved.scaled, inside),
             preserved=preserved,
-            solver=GaussNewton(binding.energy, positions, preserved.volumes, terms=tuple(terms)),
+            solver=GaussNewton(binding.energy, positions, preserved.volumes, terms=terms),
             contact=contact,
             pulled=PulledPoints(),
             unmoved=self._unmoved_parts(),

@@ -46,11 +46,12 @@ geometric model for elastic deformations", SIGGRAPH 2010 (spokes and rims).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, is_number
@@ -70,66 +71,33 @@ _CAGE_STIFFNESS = 3e-4  # e, as a share of the shape energy by their traces
 
 @dataclass(frozen=True, eq=False)
 class Energy:
-    """E(p) in the subspace; made by `shape_energy`.
-
-    K has two roles, `covariance_operator` for S = K p, to which the rotations are fitted, and
-    `load_operator` for K^T R, the load of the rotations on the cages.  With a stretch term the two
-    are one array and E is a true minimum over R (`has_exact_gradient`).  Without one the rotations
-    still come from the one-ring, as the paper's frames do, and only the detail is a load.
-    """
+    """E(p) in the subspace; made by `shape_energy`."""
 
     quadratic: FloatArray  # Q, (m, m)
     constant: float
     scale: float  # trace of `quadratic`, without outliers
     mass: FloatArray  # W~^T diag(A) W~, (m, m), A summing to 1: mean square over the surface
-    covariance_operator: sparse.csr_array | FloatArray  # (3n, n) acting on x, or (3G, m) on p
-    load_operator: sparse.csr_array | FloatArray
+    rotation_operator: FloatArray  # K, (3G, m)
     subspace: Subspace
-
-    @property
-    def has_exact_gradient(self) -> bool:
-        """Whether E is a minimum over the rotations, so that `local_step` returns its gradient."""
-        return self.covariance_operator is self.load_operator
-
-    @property
-    def has_vertex_rotations(self) -> bool:
-        """Whether each vertex has its own rotation, fitted to x; clusters' are fitted to p."""
-        return sparse.issparse(self.covariance_operator)
 
     def covariances(self, p: FloatArray) -> FloatArray:
         """Return S_g = K_g p of every cluster, (G, 3, 3)."""
-        return self._covariances(p, self.subspace.map(p) if self.has_vertex_rotations else p)
+        return self._blocks.map(p).reshape(-1, 3, 3)
 
-    def _covariances(self, p: FloatArray, x: FloatArray) -> FloatArray:
-        if self.has_vertex_rotations:
-            return np.asarray(self.covariance_operator @ x).reshape(-1, 3, 3)
-        return self._covariance_blocks.map(p).reshape(-1, 3, 3)
-
-    def covariance_rows(self, count: int) -> Iterator[tuple[IntArray, list[slice], FloatArray]]:
-        """Yield the rows of K of S = K p, of some *count* clusters at a time.
+    @cached_property
+    def nonzero_rows(self) -> list[tuple[IntArray, list[slice], NDArray[np.float32]]]:
+        """K without its zeros, in single precision: clusters that the same cages move, together.
 
         As (clusters, columns, rows): the clusters (g,), the cages whose vertices move them, c
         vertices in all, and the rows (g, 3, c).
         """
-        if not sparse.issparse(self.covariance_operator):
-            yield from self._nonzero_rows
-            return
-        all_columns = [slice(0, self.subspace.n_columns)]
-        for start in range(0, self.covariance_operator.shape[0] // 3, count):
-            some = self.covariance_operator[3 * start : 3 * (start + count)]
-            rows = self.subspace.premultiplied(some)
-            clusters = np.arange(start, start + len(rows) // 3)
-            yield clusters, all_columns, rows.reshape(len(clusters), 3, -1)
-
-    @cached_property
-    def _nonzero_rows(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
-        """K without its zeros: clusters that the same cages move, together."""
         blocks = []
-        for ids in self._covariance_blocks.sets_by_cages():
-            columns, rows = self._covariance_blocks.nonzeros(ids)
+        for ids in self._blocks.sets_by_cages():
+            columns, rows = self._blocks.nonzeros(ids)
             cages = [own for own in self.subspace.columns if own.start in columns]
             if cages:
-                blocks.append((ids[::3] // 3, cages, rows.reshape(-1, 3, len(columns))))
+                rows = rows.reshape(-1, 3, len(columns)).astype(np.float32)
+                blocks.append((ids[::3] // 3, cages, rows))
         return blocks
 
     def vertex_rotations(self, p: FloatArray) -> FloatArray:
@@ -139,8 +107,6 @@ class Energy:
         rows of K, then those of the cage vertices by W~.  So they vary as smoothly as x.
         """
         rotations = closest_rotations(self.covariances(p))
-        if self.has_vertex_rotations:
-            return rotations
         of_cages = self._shares.T @ rotations.reshape(-1, 9)
         blended = self.subspace.map(of_cages).reshape(-1, 3, 3)
         return closest_rotations(np.swapaxes(blended, 1, 2))
@@ -148,41 +114,19 @@ class Energy:
     @cached_property
     def _shares(self) -> FloatArray:
         """The share of each cluster in the rotation of a cage vertex, (G, m)."""
-        k = np.asarray(self.covariance_operator)
+        k = self.rotation_operator
         shares = (k * k).reshape(len(k) // 3, 3, -1).sum(axis=1)
         shares /= np.maximum(shares.sum(axis=0), np.finfo(float).tiny)
         return np.asarray(shares)
 
     @cached_property
-    def _covariance_blocks(self) -> Subspace:
-        return _blocks_by_cage(np.asarray(self.covariance_operator), self.subspace.columns)
+    def _blocks(self) -> Subspace:
+        return _blocks_by_cage(self.rotation_operator, self.subspace.columns)
 
-    @cached_property
-    def _load_blocks(self) -> Subspace:
-        if self.has_exact_gradient:
-            return self._covariance_blocks
-        return _blocks_by_cage(np.asarray(self.load_operator), self.subspace.columns)
-
-    def local_step(self, p: FloatArray, x: FloatArray) -> tuple[float, FloatArray]:
-        """Return E(p) and half its gradient (m, 3), with the local rotations at x = W~ p."""
-        load = self.rotation_load(p, x)
-        if self.has_vertex_rotations:
-            load = self.subspace.adjoint(load)
-        return self.value_and_slope(p, load)
-
-    def rotation_load(self, p: FloatArray, x: FloatArray) -> FloatArray:
-        """Return K^T R for the local rotations at x = W~ p: on the cages (m, 3).
-
-        With a rotation for each vertex it is on the vertices (n, 3), and the caller applies W~^T.
-        """
-        rotations = closest_rotations(self._covariances(p, x))
-        stacked = np.swapaxes(rotations, 1, 2).reshape(-1, 3)
-        if self.has_vertex_rotations:
-            return np.asarray(self.load_operator.T @ stacked)
-        return self._load_blocks.adjoint(stacked)
-
-    def value_and_slope(self, p: FloatArray, load: FloatArray) -> tuple[float, FloatArray]:
-        """Return E(p) and half its gradient (m, 3), for the *load* of its rotations."""
+    def value_and_slope(self, p: FloatArray) -> tuple[float, FloatArray]:
+        """Return E(p) and half its gradient (m, 3), with the local rotations at *p*."""
+        rotations = closest_rotations(self.covariances(p))
+        load = self._blocks.adjoint(np.swapaxes(rotations, 1, 2).reshape(-1, 3))  # K^T R
         product = self.quadratic @ p
         value = np.vdot(p, product) - 2.0 * np.vdot(p, load) + self.constant
         return float(value), product - load
@@ -202,7 +146,7 @@ def shape_energy(
     mesh: Mesh,
     subspace: Subspace,
     stretch: float,
-    clusters: IntArray | None,
+    clusters: IntArray,
     *,
     progress: Progress | None = None,
 ) -> Energy:
@@ -216,8 +160,8 @@ def shape_energy(
         W~.
     stretch : float
         Trace of the stretch term in the subspace, as a multiple of that of the detail term.
-    clusters : (n,) int or None
-        The rotation cluster of each vertex; None gives each vertex its own rotation.
+    clusters : (n,) int
+        The rotation cluster of each vertex.
     progress : Progress, optional
         Called between the steps; may cancel.
     """
@@ -225,13 +169,12 @@ def shape_energy(
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
     tell(progress, 0.0, "sampling vertices")
     rows, own, weights, inner = subspace, clusters, None, inner_vertices(mesh)
-    if clusters is None or not (sample := Sample.of(mesh, clusters)):
+    if not (sample := Sample.of(mesh, clusters)):
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
     else:
         surface, weights = sample.surface, sample.weights
         rows, own, inner = sample.rows(subspace), clusters[sample.ids], inner[sample.ids]
-    vertices = np.arange(mesh.n_vertices)
-    shape = surface_operators(surface, vertices if own is None else own, weights, inner=inner)
+    shape = surface_operators(surface, own, weights, inner=inner)
     tell(progress, 0.5, "computing the energy")
     areas = shape.weights * shape.areas
     bending, stretching, mass, traces = reduced_operators(
@@ -245,12 +188,6 @@ def shape_energy(
     tell(progress, 0.9, "factoring")
     scale = _without_outliers(traces, areas)
     unit = scale / np.trace(stretching)
-    load = shape.detail + (stretch * unit) * shape.fans
-    covariance = load if stretch > 0.0 else shape.detail + unit * shape.fans
-    if clusters is not None:
-        is_exact = covariance is load
-        covariance = rows.premultiplied(covariance)
-        load = covariance if is_exact else rows.premultiplied(load)
     bent = float((shape.bends * shape.areas) @ (shape.delta**2).sum(axis=1))
     flat = float(np.vdot(surface.vertices, shape.stiffness @ surface.vertices))  # twice the area
     return Energy(
@@ -258,8 +195,7 @@ def shape_energy(
         constant=bent + stretch * unit * flat,
         scale=(1.0 + stretch) * scale,
         mass=mass,
-        covariance_operator=covariance,
-        load_operator=load,
+        rotation_operator=rows.premultiplied(shape.detail + (stretch * unit) * shape.fans),
         subspace=subspace,
     )
 
@@ -272,7 +208,7 @@ def with_cage_stiffness(
     Parameters
     ----------
     energy : Energy
-        With rotations of clusters.
+        Of the surface.
     rest : (m, 3) float
         The cage vertices at rest, stacked.
     faces : sequence of (f_r, 3) int
@@ -296,13 +232,11 @@ def with_cage_stiffness(
         half = 0.5 * offset[:, axis]  # row a: half of sum_b (q_a - q_b) (p_a - p_b), along the axis
         by_tail = sparse.coo_array((np.concatenate([half, -half]), ends), (m, m)).tocsr()
         rows[:, axis] = (by_tail.T @ share.T).T
-    operator = energy.covariance_operator + strength * rows.reshape(-1, m)
     return replace(
         energy,
         quadratic=energy.quadratic + strength * laplacian,
         constant=energy.constant + 0.5 * strength * float(np.vdot(offset, offset)),
-        covariance_operator=operator,
-        load_operator=operator,
+        rotation_operator=energy.rotation_operator + strength * rows.reshape(-1, m),
     )
 
 
@@ -314,7 +248,7 @@ def with_rotating_rows(
     Parameters
     ----------
     energy : Energy
-        With rotations of clusters.
+        Of the surface.
     rows : (k, m) float
         Differences of points of the surface, in p.
     offsets : (k, 3) float
@@ -322,17 +256,13 @@ def with_rotating_rows(
     weights : (k,) float
         w.
     """
-    rotation = (offsets.T * weights) @ rows
-    covariance, load = (
-        np.concatenate([np.asarray(own), rotation])
-        for own in (energy.covariance_operator, energy.load_operator)
-    )
     return replace(
         energy,
         quadratic=energy.quadratic + (rows.T * weights) @ rows,
         constant=energy.constant + float(weights @ (offsets**2).sum(axis=1)),
-        covariance_operator=covariance,
-        load_operator=covariance if energy.has_exact_gradient else load,
+        rotation_operator=np.concatenate(
+            [energy.rotation_operator, (offsets.T * weights) @ rows]
+        ),
     )
 
 

@@ -103,7 +103,7 @@ class Interior:
 
 
 def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) -> Energy:
-    """Return *energy*, with rotations of clusters, plus that inside the body.
+    """Return *energy* plus that inside the body.
 
     Parameters
     ----------
@@ -120,11 +120,9 @@ def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) ->
     stiffness = float(np.repeat(volumes, 3) @ np.einsum("km,km->k", flat, flat))
     v = _SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
     load = np.repeat(v, 3)[:, None] * flat
-    operator = np.concatenate([np.asarray(energy.covariance_operator), load])
     return replace(
         energy,
         quadratic=energy.quadratic + flat.T @ load,
         constant=energy.constant + 3.0 * float(v.sum()),
-        covariance_operator=operator,
-        load_operator=operator,
+        rotation_operator=np.concatenate([energy.rotation_operator, load]),
     )

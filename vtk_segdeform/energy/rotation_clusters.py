@@ -84,7 +84,7 @@ def join_rotations(
     Parameters
     ----------
     energy : Energy
-        With k rotations, and `has_exact_gradient`.
+        With k rotations.
     rest : (m, 3) float
         The cage vertices at rest, stacked.
     patches : (k, 3) float, (k,) int, (k,) int
@@ -98,7 +98,7 @@ def join_rotations(
         Called between the steps; may cancel.
     """
     positions, parts, counts = patches
-    rows = np.asarray(energy.covariance_operator).reshape(len(parts), 3, -1)
+    rows = energy.rotation_operator.reshape(len(parts), 3, -1)
     clusters = cluster_within_parts(positions, parts, n_clusters, shares=shares)
     tell(progress, 0.0, _MESSAGE)
     pulls = _pulls(energy, rest, progress)
@@ -126,8 +126,7 @@ def join_rotations(
 
 def _with_rotations(energy: Energy, rows: FloatArray) -> Energy:
     """Return *energy* with K of *rows* (G, 3, m)."""
-    k = rows.reshape(-1, rows.shape[2])
-    return replace(energy, covariance_operator=k, load_operator=k)
+    return replace(energy, rotation_operator=rows.reshape(-1, rows.shape[2]))
 
 
 def _pulls(energy: Energy, rest: FloatArray, progress: Progress | None) -> FloatArray:

@@ -44,7 +44,6 @@ _CONSTRAINT_OPTIONS = (
     "preserve_volume",
     "preserve_region_volumes",
     "lids",
-    "avoid_folds",
     "avoid_contact",
 )  # changed by `Deformer.hold`
 _TURNS = 3  # solves in which the offsets of handles in a finished pose turn with them, at most
@@ -415,7 +414,6 @@ class PoseSolver:
             preserve_volume=state.options.preserve_volume,
             preserve_region_volumes=state.options.preserve_region_volumes,
             lids=state.options.lids,
-            avoid_folds=state.options.avoid_folds,
             avoid_contact=state.options.avoid_contact,
         )
 

@@ -41,7 +41,6 @@ _WORDS = {
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
-    "avoid_folds": "fold avoidance",
     "avoid_contact": "contact avoidance",
 }
 
@@ -65,10 +64,8 @@ class Options:
         each connected part, as `Deformer` does.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
-    rotation_groups : int, optional
-        Number of rotation clusters; None for one rotation per vertex.
-    avoid_folds : bool
-        Keep the body below the surface from turning inside out, as `Deformer` does.
+    rotation_groups : int
+        Number of rotation clusters.
     avoid_contact : bool
         Keep parts of the surface from crossing each other, as `Deformer` does.
 
@@ -84,12 +81,11 @@ class Options:
     preserve_region_volumes: bool = False
     lids: bool | None = None
     stretch: float = 1.0
-    rotation_groups: int | None = 300
-    avoid_folds: bool = False
+    rotation_groups: int = 300
     avoid_contact: bool = False
 
     def __post_init__(self) -> None:
-        flags = "preserve_volume", "preserve_region_volumes", "avoid_folds", "avoid_contact"
+        flags = "preserve_volume", "preserve_region_volumes", "avoid_contact"
         for name in flags:
             value = getattr(self, name)
             if not isinstance(value, bool):
@@ -100,8 +96,7 @@ class Options:
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:
             _require_number("offset", self.offset, _TINY)
-        if self.rotation_groups is not None:
-            _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+        _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
 
 
 def label_of_change(before: Options, after: Options) -> str:

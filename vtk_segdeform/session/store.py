@@ -72,7 +72,6 @@ VERSION = 2
 
 _LATER = {
     "lids": None,
-    "avoid_folds": False,
     "avoid_contact": False,
 }  # options that version 1 does not have, and their defaults
 
@@ -314,7 +313,13 @@ def _checked_header(header: dict[str, Any]) -> dict[str, Any]:
 
 
 def _options(values: Mapping[str, Any]) -> Options:
-    """Return options of these *values*, which `Options` checks."""
+    """Return options of these *values*, which `Options` checks.
+
+    Versions up to 0.9 could also avoid folds, and have a rotation for each vertex.
+    """
+    values = {name: value for name, value in values.items() if name != "avoid_folds"}
+    if values.get("rotation_groups", 0) is None:
+        del values["rotation_groups"]
     unknown = values.keys() - {each.name for each in fields(Options)}
     if unknown:
         raise SessionError(f"there is no option {shown(sorted(unknown))}")

@@ -6,19 +6,14 @@ The files, in reading order:
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
-    barrier                 a term against folds
-    anderson                Anderson acceleration
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
-    terms                   further terms of the objective
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
 """
 
-from .anderson import Anderson
-from .barrier import Barrier
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
 from .exact_volume import (
@@ -45,8 +40,6 @@ __all__ = [
     "CONVERGED",
     "LONGEST_MOVE",
     "Anchors",
-    "Anderson",
-    "Barrier",
     "Bodies",
     "CoarseVolume",
     "Contact",

@@ -58,15 +58,14 @@ class CoarseVolume:
         mesh: Mesh,
         subspace: Subspace,
         *,
-        whole: bool = False,
         progress: Progress | None = None,
     ) -> CoarseVolume:
         """Return the coarse volume of a *mesh* at rest with W~ *subspace*.
 
-        Of a small mesh, or with *whole*, it is the volume of the mesh itself.
+        Of a small mesh it is the volume of the mesh itself.
         """
         n = mesh.n_vertices
-        if n <= sizes.COARSE_VOLUME or whole:
+        if n <= sizes.COARSE_VOLUME:
             return cls(subspace)
         rng = np.random.default_rng(0)
         areas = mesh.vertex_areas

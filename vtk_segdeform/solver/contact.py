@@ -230,10 +230,6 @@ class Contact:
         flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
-    def begun_at(self, _p: FloatArray, _x: FloatArray = NO_SURFACE) -> Contact:
-        """Return itself: the term is finite everywhere."""
-        return self
-
     def share(self, step: FloatArray) -> float:
         """Return the share of a *step* (m, 3), at most 1, that moves two samples by D_ab at most.
 

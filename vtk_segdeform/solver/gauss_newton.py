@@ -9,8 +9,8 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
 
     h = -H^-1 (d + G^T lambda),   lambda = (G H^-1 G^T)^-1 (g - G H^-1 d)
 
-    H  W~^T A^T A W~ plus the position weights: constant, factored once by Cholesky
-    d  half the gradient of the objective;  G = J_g W~, one row per constraint
+    H  half the Hessian of the objective
+    d  half its gradient;  G = J_g W~, one row per constraint
 
 (The paper prints a minus before its lambda; then G h = -g would not hold.)
 
@@ -19,33 +19,27 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
     `GaussNewton._retract`    p + h, moved along Z onto g = 0
     `GaussNewton.minimise`    the iteration
 
-Six things are added; the numbers are of the cactus bent by 60 degrees:
+Five things are added to the paper's iteration, which `deformer.as_printed` is:
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
    of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
    large mesh this is the volume of a coarse surface (`coarse_volume`), and `Deformer` restores that
    of the mesh itself at the end.
-2. *Exact Hessian* (`hessian`).  In (21) rotations follow one step behind: hundreds of steps are
-   needed, and a small step does not mean that the minimum is near.  With the derivatives of the
-   rotations and of the volumes in H, h is Newton's step, about as long as the remaining distance.
-   They are computed again after 6 steps.  If H is not convex, it contains a share of the
-   rotations' derivatives only, and h is shorter than that.
-3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p), for the rotation
-   since H was factored.
-4. *Safeguard.*  All iterates meet the constraints, so the objective itself is the merit: where it
-   rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).  If
-   that does not help, H is almost singular, and the step (21) of the paper is taken.
-5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
+2. *Exact Hessian* (`hessian`).  The paper's H is constant, W~^T A^T A W~ plus the position weights,
+   and rotations follow one step behind: hundreds of steps are needed, and a small step does not
+   mean that the minimum is near.  With the derivatives of the rotations and of the volumes in H, h
+   is Newton's step, about as long as the remaining distance.  H is computed again after 6 steps.
+   If it is not convex, it contains a share of the rotations' derivatives only, and h is shorter.
+3. *Line search.*  All iterates meet the constraints, so the objective itself is the merit: where it
+   rises, the step is shortened (epsilon, section 3.3).  If that does not help, H is almost
+   singular, and the step with the paper's H is taken.
+4. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
-6. *Further terms* (`terms`), such as a barrier against folds.  While one of them is active, its
-   Hessian is in H, and no step goes where it is infinite.
-
-Long because the formulas of the iteration are explained here, and the iteration is one class.
+5. *Further terms* (`terms`), such as contact.  While one of them is active, its Hessian is in H.
 
 Source
 ------
-Section 3.3 of the paper.  Y. Peng, B. Deng, J. Zhang, F. Geng, W. Qin, L. Liu, "Anderson
-acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (the safeguard).
+Section 3.3 of the paper.
 """
 
 from __future__ import annotations
@@ -59,11 +53,10 @@ import numpy as np
 from scipy import linalg
 
 from ..arrays import FloatArray, is_number, is_whole
-from ..checks import as_flag, shown
+from ..checks import shown
 from ..energy import Energy, Factor, full_factor, quadratic_factor, rotation_term
 from ..errors import ArgumentError, CageError
 from ..progress import Progress, tell
-from .anderson import Anderson
 from .exact_volume import moved_along, steps_to_volume
 from .extrapolation import End, Way
 from .position_constraints import PositionTerm, TargetTerm
@@ -75,17 +68,14 @@ _RISE = 1e-13  # relative rise of the merit that counts as rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
 _SHORTEST = 1.0 / 64.0  # least epsilon of section 3.3
-_SHORTEST_ACTIVE = 1.0 / 4096.0  # the same while a term is active
 # Step lengths, root mean square over the surface of a mesh of size 1:
 _CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _FAR = 2e-2  # beyond it volume Hessians are not valid at the end of the step
 _LONG = 1e-2  # beyond it H is computed again
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _OLD = 6  # steps after which H is computed again
-_OLD_ACTIVE = 3  # the same while a term is active
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
-_LONGEST_ACTIVE = 2e-2  # a longer step is shortened while a term is active
 # Steps of at most _ROUNDED that lower the merit by less than a share of _GAIN in _STILL steps are
 # due to rounding, which is amplified by the weights of positions.
 _ROUNDED, _GAIN, _STILL = 1e-5, 1e-10, 20
@@ -97,26 +87,15 @@ class SolverOptions:
 
     tolerance: float = 1e-7  # of a step's length, root mean square, mesh size 1
     max_steps: int = 500
-    acceleration: int = 5  # steps that Anderson acceleration remembers; 0 turns it off
-    exact_hessian: bool = True  # False holds rotations and volumes' gradients fixed, as in (21)
-    exact_volume: bool = True  # False leaves the linearised multiplier of (21), for comparison
     progress: Progress | None = field(default=None, compare=False)  # called before every step
 
     def __post_init__(self) -> None:
         if not (is_number(self.tolerance) and self.tolerance > 0.0):
             raise ArgumentError(f"tolerance must be a positive number; got {shown(self.tolerance)}")
-        for name, least in (("max_steps", 1), ("acceleration", 0)):
-            value = getattr(self, name)
-            if not is_whole(value, least):
-                raise ArgumentError(
-                    f"{name} must be a whole number, {least} or more; got {shown(value)}"
-                )
-        as_flag(self.exact_hessian, "exact_hessian")
-        as_flag(self.exact_volume, "exact_volume")
-
-    def is_same_iteration(self, other: SolverOptions) -> bool:
-        """Tell whether both take the same steps, up to where they stop."""
-        return replace(self, tolerance=other.tolerance, max_steps=other.max_steps) == other
+        if not is_whole(self.max_steps, 1):
+            raise ArgumentError(
+                f"max_steps must be a whole number, 1 or more; got {shown(self.max_steps)}"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,18 +133,15 @@ class _Iterate:
 class _State:
     """The running state of an iteration, from which a later call continues."""
 
-    acceleration: Anderson
     factor: Factor  # of H
     age: int = _OLD  # of the factor, in steps
     step_size: float = math.inf  # of the last step
     has_terms: bool = False  # whether the factor is with those terms that were active
-    _end: tuple[FloatArray, FloatArray, SolverOptions] | None = None
 
     def needs_factor(self, here: _Iterate) -> bool:
         """Tell whether H should be computed again."""
-        if here.is_active and (not self.has_terms or self.age >= _OLD_ACTIVE):
-            return True
-        return self.age >= _OLD or self.step_size > _LONG
+        is_missing = here.is_active and not self.has_terms
+        return is_missing or self.age >= _OLD or self.step_size > _LONG
 
     @property
     def is_near(self) -> bool:
@@ -185,27 +161,6 @@ class _State:
         """Have H computed again before the next step."""
         self.age = _OLD
 
-    def for_other_targets(self, acceleration: int) -> _State:
-        """Return the state with which a solve for other targets begins."""
-        return _State(Anderson(acceleration), self.factor, max(self.age, 1), 0.0, self.has_terms)
-
-    def copy(self) -> _State:
-        """Return a state from which another solver continues."""
-        other = copy.copy(self)
-        other.acceleration = copy.deepcopy(self.acceleration)
-        return other
-
-    def ended_at(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
-        """Remember where the call ended; return itself."""
-        self._end = p, targets, replace(options, progress=None)
-        return self
-
-    def continues(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> bool:
-        """Tell whether a call with these arguments begins where the last one ended."""
-        if self._end is None or not options.is_same_iteration(self._end[2]):
-            return False
-        return np.array_equal(p, self._end[0]) and np.array_equal(targets, self._end[1])
-
 
 @dataclass(eq=False)
 class GaussNewton:
@@ -221,7 +176,6 @@ class GaussNewton:
     _state: _State | None = field(init=False, repr=False, default=None)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
     _way: Way = field(init=False, repr=False, default=Way())
-    _begun: tuple[Term, ...] = field(init=False, repr=False, default=())  # the terms of this call
 
     def __post_init__(self) -> None:
         hessian = self.energy.quadratic + self.positions.quadratic()
@@ -248,7 +202,7 @@ class GaussNewton:
     def copy(self) -> GaussNewton:
         """Return a solver that continues from here independently."""
         other = copy.copy(self)
-        other._state = None if self._state is None else self._state.copy()
+        other._state = copy.copy(self._state)
         return other
 
     def fresh(self) -> GaussNewton:
@@ -262,51 +216,35 @@ class GaussNewton:
 
         Called again with the last p and targets, it continues as if it had never returned.
         """
-        state = self._begin(p, targets, options)
+        state, self._state = self._state or _State(self._factor), None
         term = self.positions.toward(targets)
-        here = self._ahead(self._iterate_at(p, term), targets, term, options)
+        here = self._ahead(self._iterate_at(p, term), targets, term)
         merits = [here.merit]
         multipliers = np.zeros(len(self.volumes.constraints))
         directions: list[FloatArray] = []
         step = np.zeros_like(p)
-        newton = options.exact_hessian and self.energy.has_exact_gradient
         status = Status.STEP_LIMIT
         while len(merits) <= options.max_steps:
             tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
-            is_coupled = newton or here.is_active or state.has_terms
-            if is_coupled and state.needs_factor(here):
-                factor = self._full_factor(here, state, newton) or self._factor
-                state.renew_factor(factor, here)
+            if state.needs_factor(here):
+                state.renew_factor(self._full_factor(here, state) or self._factor, here)
             step, multipliers, directions = self._step(here, state.factor)
             state.step_size = self._length(step)
-            if is_coupled and state.step_is_doubtful:
+            if state.step_is_doubtful:
                 state.drop_factor()
                 continue
-            share = share_of_step(self._begun, step) if here.is_active else 1.0
-            if here.is_active:
-                step *= min(share, _LONGEST_ACTIVE / max(state.step_size, _LONGEST_ACTIVE))
             if state.step_size <= options.tolerance or self._is_still(here, merits, state):
                 status = Status.CONVERGED
                 break
-            ahead = None
-            is_accelerated = options.acceleration > 0 and share == 1.0
-            if is_accelerated:
-                residual = self._factor.triangle.T @ step
-                guess = state.acceleration.extrapolate(here.p, step, residual)
-                ahead = self._retract(guess, directions, term, options)
-                if not self._improves(ahead, here):
-                    ahead = None
-            if ahead is None:
-                state.acceleration.forget()
-            is_renewable = is_coupled and state.age > 0  # H is of an earlier pose
-            if ahead is None and not (is_renewable and is_accelerated):
-                ahead = self._shortened(here, step, directions, term, options)
-            if ahead is None and is_renewable:
+            if here.is_active:
+                step *= share_of_step(self.terms, step)
+            ahead = self._shortened(here, step, directions, term)
+            if ahead is None and state.age > 0:  # H is of an earlier pose
                 state.drop_factor()
                 continue
             if ahead is None and state.factor.coupled:  # H may be almost singular
                 step, multipliers, directions = self._step(here, self._factor)
-                ahead = self._shortened(here, step, directions, term, options)
+                ahead = self._shortened(here, step, directions, term)
                 if ahead is not None and ahead.merit >= here.merit - self._rounding(here):
                     ahead = None
             if ahead is None:
@@ -317,7 +255,7 @@ class GaussNewton:
             state.age += 1
         if directions:  # not those of a factor from another pose: the result would depend on it
             directions = self._factor.solve_all([np.zeros_like(here.p), *here.rows])[1:]
-        self._state, self._last = state.ended_at(here.p, targets, options), here
+        self._state, self._last = state, here
         self._way = self._way.on_to(End(here.p + step, targets, tuple(directions)))
         return SolverResult(
             p=here.p,
@@ -375,11 +313,6 @@ class GaussNewton:
         share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
         return np.reshape(slope - share @ rows, p.shape)
 
-    @property
-    def has_newton_steps(self) -> bool:
-        """Whether the Hessian is known: the energy has an exact gradient."""
-        return self.energy.has_exact_gradient
-
     def remaining(self, p: FloatArray, targets: FloatArray) -> float:
         """Return by how much Newton's step at *p* moves the surface of the volumes, at most.
 
@@ -396,7 +329,7 @@ class GaussNewton:
         """
         factor = None if self._state is None else self._state.factor
         if factor is None or factor.share < _EXACT:
-            of_terms = hessian_of(self._begun, p, self._surface(p)) if self._begun else None
+            of_terms = hessian_of(self.terms, p, self._surface(p)) if self.terms else None
             factor = full_factor(self._hessian, rotation_term(self.energy, p), added=of_terms)
         is_exact, factor = factor is not None and factor.share >= _EXACT, factor or self._factor
         step, _, _ = _constrained_step(factor, slope, rows, np.zeros(len(rows)))
@@ -410,30 +343,21 @@ class GaussNewton:
         return _constrained_step(factor, here.slope, here.rows, g)
 
     def _retract(
-        self,
-        p: FloatArray,
-        directions: Sequence[FloatArray],
-        term: TargetTerm,
-        options: SolverOptions,
+        self, p: FloatArray, directions: Sequence[FloatArray], term: TargetTerm
     ) -> _Iterate:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
         if not np.isfinite(p).all():
             return _Iterate(p, p, math.inf, p, (), math.inf, p)
-        if not directions or not options.exact_volume:
+        if not directions:
             return self._evaluate(p, self._surface(p), term)
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
         t = steps_to_volume(self.volumes.constraints, paths)
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
         return self._evaluate(p, moved_along(paths, t), term)
 
-    def _full_factor(self, here: _Iterate, state: _State, newton: bool) -> Factor | None:
-        """Return the factor of the exact Hessian; None if it is not convex.
-
-        Unless *newton*, it is that of (21) with the further terms; None without them.
-        """
-        of_terms = hessian_of(self._begun, here.p, here.x) if here.is_active else None
-        if not newton:
-            return full_factor(self._hessian, None, added=of_terms) if here.is_active else None
+    def _full_factor(self, here: _Iterate, state: _State) -> Factor | None:
+        """Return the factor of the exact Hessian; None if it is not convex."""
+        of_terms = hessian_of(self.terms, here.p, here.x) if here.is_active else None
         of_volumes = None
         step, multipliers, _ = self._step(here, self._factor)
         if state.is_near and self.volumes.hessian and self._length(step) < _CLOSE:
@@ -441,53 +365,30 @@ class GaussNewton:
         rotations = rotation_term(self.energy, here.p)
         return full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
 
-    def _begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> _State:
-        """Return the state from which a call with these arguments begins."""
-        state, self._state = self._state, None
-        if state is None:
-            return _State(Anderson(options.acceleration), self._factor)
-        if state.continues(p, targets, options):
-            return state
-        return state.for_other_targets(options.acceleration)
-
     def _surface(self, p: FloatArray) -> FloatArray:
-        needed = self.volumes.constraints or self.energy.has_vertex_rotations
-        return self.volumes.surface.map(p) if needed else NO_SURFACE
+        return self.volumes.surface.map(p) if self.volumes.constraints else NO_SURFACE
 
     def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
         """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
-        load = self.energy.rotation_load(p, x)
-        slopes = gradients(self.volumes.constraints, x)
-        if self.energy.has_vertex_rotations:  # the load is on the surface, too: one pass over W~
-            load, *rows = self.volumes.surface.adjoints([load, *slopes])
-        else:
-            rows = self.volumes.surface.adjoints(slopes)
-        energy, slope = self.energy.value_and_slope(p, load)
-        value, slope = with_terms(self._begun, p, x, value=energy, slope=slope)
+        rows = self.volumes.surface.adjoints(gradients(self.volumes.constraints, x))
+        energy, slope = self.energy.value_and_slope(p)
+        value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
         return here.toward(term)
 
     def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
         """Return the iterate at *p*; where the last call ended only the targets have changed."""
         last = self._last
-        if last is not None and last.p is p and self._begun is self.terms:
+        if last is not None and last.p is p:
             return last.toward(term)
-        self._begun = self.terms
-        x = self._surface(p)
-        here = self._evaluate(p, x, term)
-        if here.shape < math.inf:
-            return here
-        self._begun = tuple(each.begun_at(p, x) for each in self.terms)
-        return self._evaluate(p, x, term)
+        return self._evaluate(p, self._surface(p), term)
 
-    def _ahead(
-        self, here: _Iterate, targets: FloatArray, term: TargetTerm, options: SolverOptions
-    ) -> _Iterate:
+    def _ahead(self, here: _Iterate, targets: FloatArray, term: TargetTerm) -> _Iterate:
         """Return the start for *targets*: *here*, or on along the way if it is better there."""
-        found = self._way.ahead(targets) if options.acceleration else None
+        found = self._way.ahead(targets)
         if found is None or len(found[1]) != len(self.volumes.constraints):
             return here
-        ahead = self._retract(found[0], found[1], term, options)
+        ahead = self._retract(*found, term)
         return ahead if ahead.merit < here.merit else here
 
     def _shortened(
@@ -496,14 +397,12 @@ class GaussNewton:
         step: FloatArray,
         directions: Sequence[FloatArray],
         term: TargetTerm,
-        options: SolverOptions,
     ) -> _Iterate | None:
         """Return the first of the steps h, h/2, h/4 ... that lowers the objective, or None."""
-        epsilon, shortest = 1.0, _SHORTEST_ACTIVE if here.is_active else _SHORTEST
-        while epsilon >= shortest:
-            ahead = self._retract(here.p + epsilon * step, directions, term, options)
-            is_merit = self.energy.has_exact_gradient and options.exact_volume
-            if self._improves(ahead, here) or (not is_merit and np.isfinite(ahead.merit)):
+        epsilon = 1.0
+        while epsilon >= _SHORTEST:
+            ahead = self._retract(here.p + epsilon * step, directions, term)
+            if self._improves(ahead, here):
                 return ahead
             epsilon *= 0.5
         return None

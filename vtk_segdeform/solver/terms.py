@@ -1,8 +1,7 @@
-"""Further terms of the objective, such as a barrier against folds or against contact.
+"""Further terms of the objective, such as contact.
 
-A term is smooth where it is finite, and infinite where a pose is not allowed; the line search of
-`gauss_newton` never steps there.  It is inactive, exactly 0, at most poses: then a step costs
-hardly more, and its result is bit for bit that without the term.
+A term is smooth, and inactive, exactly 0, at most poses: then a step costs hardly more, and its
+result is bit for bit that without the term.
 """
 
 from __future__ import annotations
@@ -26,13 +25,8 @@ class Term(Protocol):
         """Return the term for cages at *p* (m, 3), and half its gradient (m, 3).
 
         *x* (n, 3) is the surface of the volumes there, or empty if it is not known.  The value is
-        exactly 0 while the term is inactive, and infinite where *p* is not allowed; the gradient is
-        not used then.
+        exactly 0 while the term is inactive.
         """
-        ...
-
-    def begun_at(self, p: FloatArray, x: FloatArray = NO_SURFACE, /) -> Term:
-        """Return the term of a solve that begins at *p*: itself, or one that is finite there."""
         ...
 
     def hessian(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> FloatArray | None:

@@ -167,7 +167,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 value=options.rotation_groups,
                 maximum=_MOST,
                 step=50,
-                special="One per vertex",
+                minimum=1,
                 act=lambda n: setting(rotation_groups=n),
             ),
             (
