@@ -49,10 +49,10 @@ A step then costs the same for every mesh: a frame of 12,000 vertices takes 12 m
 COARSE_VOLUME_POINTS = 2_000
 """Points of that coarse surface, about."""
 
-VOLUME_HESSIAN_POINTS = 150
+VOLUME_HESSIAN_POINTS = 300
 """Points beyond which the second derivatives of one volume are computed from so many.
 
-The cost is quadratic in the cage vertices at every point: 73 ms instead of 124 for 2,000 points."""
+The cost is quadratic in the cage vertices at every point, and more points save no steps."""
 
 SHARED_PLACES = 1_000
 """Vertices of a fixed patch or handle beyond which neighbours share a place."""

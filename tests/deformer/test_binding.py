@@ -67,9 +67,6 @@ OTHERS = {
         cache=cache,
     ),
     "regions": lambda cache: Deformer(SCENE.mesh, SCENE.regions.grow(1), SCENE.cages, cache=cache),
-    "blend": lambda cache: SCENE.deformer(
-        cache=cache, blend=SCENE.regions.membership / SCENE.regions.membership.sum(axis=0)
-    ),
     "stretch": lambda cache: SCENE.deformer(cache=cache, stretch=9.0),
     "groups": lambda cache: SCENE.deformer(cache=cache, rotation_groups=50),
 }
@@ -269,7 +266,7 @@ def test_shares_of_clusters_follow_the_cage_vertices_of_regions_in_each_componen
     regions = Regions.from_labels(mesh, (mesh.vertices[:, 0] > 0.5).astype(int))
     numbers = zip(regions.membership, (20, 60), strict=True)
     cages = [fit_cage(mesh, members, n) for members, n in numbers]
-    inputs = binding.BindingInputs(mesh, regions, cages, np.empty((80, 3)), None, 1.0, 300)
+    inputs = binding.BindingInputs(mesh, regions, cages, np.empty((80, 3)), 1.0, 300)
     part, label = inputs.parts, regions.labels
     for k in np.unique(part):
         region = label[part == k][0]

@@ -41,7 +41,7 @@ def in_a_live_drag() -> Deformer:
 
 def avoiding() -> Deformer:
     """Return a deformer with further terms."""
-    deformer = SCENE.held(avoid_contact=True, avoid_folds=True)
+    deformer = SCENE.held(avoid_contact=True)
     deformer.solve(SCENE.turned(70), max_steps=20)
     return deformer
 

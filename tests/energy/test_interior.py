@@ -40,8 +40,7 @@ def solid():
         surface,
         quadratic=np.eye(len(CAGES)),
         constant=0.0,
-        covariance_operator=np.zeros((3, len(CAGES))),
-        load_operator=np.zeros((3, len(CAGES))),
+        rotation_operator=np.zeros((3, len(CAGES))),
     )
     interior = interior_of()
     whole = with_interior(nothing, gradients(interior), interior.volumes)
@@ -49,7 +48,7 @@ def solid():
 
 
 def value_and_slope(energy, p):
-    return energy.local_step(p, p)
+    return energy.value_and_slope(p)
 
 
 def test_an_affine_map_of_the_cages_has_its_own_gradient_everywhere():

@@ -44,7 +44,7 @@ def plain(scene: Scene, n_groups: int = 100) -> Energy:
     """Return the energy with clusters of position, without the correction."""
     energy, _, (positions, parts, _) = fine(scene)
     groups = cluster_within_parts(positions, parts, n_groups)
-    rows = np.asarray(energy.covariance_operator).reshape(len(groups), 3, -1)
+    rows = energy.rotation_operator.reshape(len(groups), 3, -1)
     return rotation_clusters._with_rotations(energy, rotation_clusters._sums(rows, groups))
 
 
@@ -57,7 +57,7 @@ def bent() -> np.ndarray:
 
 
 def value(energy: Energy, p: np.ndarray) -> float:
-    return energy.local_step(p, p)[0]
+    return energy.value_and_slope(p)[0]
 
 
 @functools.cache
@@ -97,7 +97,7 @@ def test_a_pose_is_near_that_with_a_rotation_for_each_vertex(monkeypatch):
 def test_the_excess_is_the_spread_of_rotations_within_the_clusters():
     energy, rest, (positions, parts, _) = fine(SCENE)
     move = np.random.default_rng(0).normal(size=rest.shape)
-    rows = np.asarray(energy.covariance_operator).reshape(len(parts), 3, -1)
+    rows = energy.rotation_operator.reshape(len(parts), 3, -1)
     groups = cluster_within_parts(positions, parts, 100)
     one, whole = (
         rotation_clusters._response(k, rest, move[:, None])
@@ -113,7 +113,7 @@ def test_the_rest_shape_moved_rigidly_is_at_rest():
     energy, _ = joined(SCENE)
     scale = np.trace(energy.quadratic)
     for p in (rest, rest @ rotation([1, 2, 3], 1.2).T + [0.3, 0.2, -0.5]):
-        cost, slope = energy.local_step(p, p)
+        cost, slope = energy.value_and_slope(p)
         assert abs(cost) < 1e-12 * scale
         assert np.abs(slope).max() < 1e-12 * scale
 

@@ -35,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("bound_once")
 
 def posed() -> Session:
     """Return a session with regions, cages, fixed vertices, handles and a pose."""
-    options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=None)
+    options = Options(n_cage_vertices=77, offset=0.25, stretch=2.5, rotation_groups=250)
     session = Session(SCENE.mesh, state=State(options=options))
     session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
     session.set_cages(SCENE.cages)

@@ -15,7 +15,6 @@ from vtk_segdeform.solver.solution import Status
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(2, is_coarse=True)  # 258 vertices in two overlapping cages
-PAPER = {"acceleration": 0, "exact_hessian": False}
 
 
 def distance(a, b):
@@ -23,7 +22,7 @@ def distance(a, b):
     return np.linalg.norm(a.vertices - b.vertices, axis=1).max() / SCENE.mesh.diagonal
 
 
-@pytest.mark.parametrize("options", [{}, {**PAPER, "max_steps": 1000}, {"rotation_groups": None}])
+@pytest.mark.parametrize("options", [{}, {"rotation_groups": SCENE.mesh.n_vertices}])
 def test_volume_is_exact_and_the_merit_never_rises(options):
     deformer = SCENE.deformer(**options)
     solution = deformer.solve(SCENE.turned(60))
@@ -45,14 +44,6 @@ def test_without_the_constraint_the_volume_does_change():
     assert abs(solution.volume_change) > 1e-3
 
 
-def test_the_papers_linearised_multiplier_leaves_a_small_error():
-    exact = SCENE.deformer(max_steps=3)
-    linear = SCENE.deformer(exact_volume=False, max_steps=3)
-    targets = SCENE.turned(25)
-    assert abs(exact.solve(targets).volume_change) < 1e-13
-    assert 1e-9 < abs(linear.solve(targets).volume_change) < 1e-1
-
-
 def test_every_region_volume_is_preserved():
     scene = sausage(3, is_coarse=True)
     solution = scene.held(preserve_region_volumes=True).solve(scene.turned(60))
@@ -60,34 +51,6 @@ def test_every_region_volume_is_preserved():
     assert abs(solution.volume_change) < 1e-12
     free = scene.held().solve(scene.turned(60))
     assert np.abs(free.region_volume_change).max() > 1e-4
-
-
-def test_acceleration_and_the_exact_hessian_each_save_steps_and_find_the_same_pose():
-    fine = sausage(2)
-    solutions = {
-        (acceleration, exact): fine.deformer(
-            acceleration=acceleration, exact_hessian=exact, tolerance=1e-8, max_steps=5000
-        ).solve(fine.turned(30))
-        for acceleration in (0, 5)
-        for exact in (False, True)
-    }
-    plain = solutions.pop((0, False))
-    assert plain.status is Status.CONVERGED
-    for solution in solutions.values():
-        assert solution.status is Status.CONVERGED
-        assert distance(plain, solution) < 1e-4
-        assert solution.steps < 0.5 * plain.steps
-
-
-@pytest.mark.campaign
-def test_acceleration_finds_the_plain_iterations_answer_in_fewer_steps():
-    options = {"rotation_groups": None, "tolerance": 1e-8, "max_steps": 5000}
-    targets = SCENE.turned(30)
-    plain = SCENE.deformer(**PAPER, **options).solve(targets)
-    fast = SCENE.deformer(**options).solve(targets)
-    assert plain.status is fast.status is Status.CONVERGED
-    assert distance(plain, fast) < 1e-4
-    assert fast.steps < 0.5 * plain.steps
 
 
 def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
@@ -117,7 +80,7 @@ def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
 
 def test_rotation_clusters_stay_close_to_a_rotation_for_each_vertex():
     targets = SCENE.turned(30)
-    fine = SCENE.deformer(rotation_groups=None).solve(targets)
+    fine = SCENE.deformer(rotation_groups=SCENE.mesh.n_vertices).solve(targets)
     assert distance(SCENE.held().solve(targets), fine) < 0.01
 
 
@@ -127,7 +90,7 @@ def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():
     deformer.solve(SCENE.turned(40))
     solver, targets = deformer._path.solver, deformer._constraints.places(deformer._path.targets)
     x = solver.energy.subspace.map(deformer._path.p)
-    _, slope = solver.energy.local_step(deformer._path.p, x)
+    _, slope = solver.energy.value_and_slope(deformer._path.p)
     slope = slope + solver.positions.value_and_slope(deformer._path.p, targets)[1]
     gradient = solver.energy.subspace.adjoint(solver.volumes.constraints[0].gradient(x))
     factor = np.vdot(slope, gradient) / np.vdot(gradient, gradient)

@@ -350,7 +350,6 @@ def _file(name: str) -> Path:
 ARGUMENTS: dict[str, Callable[[], Any]] = {
     "arrays": lambda: (),
     "avoid_contact": lambda: True,
-    "avoid_folds": lambda: True,
     "blend": lambda: regions().weights,
     "cage_faces": lambda: cages()[0].faces,
     "cage_vertices": lambda: [cage.vertices for cage in cages()],
@@ -470,8 +469,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "when": lambda: lambda: True,
     "while_busy": lambda: False,
     "within": lambda: 0.05,
-    "acceleration": lambda: 3,
-    "exact_hessian": lambda: False,
 }
 
 SPECIAL: dict[str, Callable[[], Any]] = {

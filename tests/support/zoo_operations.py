@@ -548,7 +548,7 @@ OTHERS = {
         number_of_regions, number_of_cage_vertices, offset_of_cages, smoothness_of_regions,
         distance_of_welding, largest_hole, steps_of_a_drag,
         *(named(option_of_a_deformer, name) for name in (
-            "stretch", "tolerance", "max_steps", "acceleration", "rotation_groups",
+            "stretch", "tolerance", "max_steps", "rotation_groups",
         )),
         *(named(option_of_a_session, name) for name in (
             "n_cage_vertices", "offset", "stretch", "rotation_groups",

@@ -51,7 +51,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, is_number
@@ -85,8 +84,8 @@ class Energy:
         return self._blocks.map(p).reshape(-1, 3, 3)
 
     @cached_property
-    def nonzero_rows(self) -> list[tuple[IntArray, list[slice], NDArray[np.float32]]]:
-        """K without its zeros, in single precision: clusters that the same cages move, together.
+    def nonzero_rows(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
+        """K without its zeros: clusters that the same cages move, together.
 
         As (clusters, columns, rows): the clusters (g,), the cages whose vertices move them, c
         vertices in all, and the rows (g, 3, c).
@@ -96,7 +95,7 @@ class Energy:
             columns, rows = self._blocks.nonzeros(ids)
             cages = [own for own in self.subspace.columns if own.start in columns]
             if cages:
-                rows = rows.reshape(-1, 3, len(columns)).astype(np.float32)
+                rows = rows.reshape(-1, 3, len(columns))
                 blocks.append((ids[::3] // 3, cages, rows))
         return blocks
 
@@ -260,9 +259,7 @@ def with_rotating_rows(
         energy,
         quadratic=energy.quadratic + (rows.T * weights) @ rows,
         constant=energy.constant + float(weights @ (offsets**2).sum(axis=1)),
-        rotation_operator=np.concatenate(
-            [energy.rotation_operator, (offsets.T * weights) @ rows]
-        ),
+        rotation_operator=np.concatenate([energy.rotation_operator, (offsets.T * weights) @ rows]),
     )
 
 

@@ -99,7 +99,7 @@ def full_factor(
         rotations is None or added is not None
     )
     for share in shares:
-        full = np.multiply(term, -share, dtype=np.float64)
+        full = -share * term
         for axis in range(3):
             block = slice(axis * m, (axis + 1) * m)
             full[block, block] += hessian
@@ -121,16 +121,13 @@ def full_factor(
 
 
 def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
-    """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis.
-
-    In single precision, which changes a Newton step by much less than the share left out.
-    """
+    """Return the lower half of sum_g T_g M_g^-1 T_g^T, (3m, 3m), stacked axis by axis."""
     m = len(p)
-    total = np.zeros((3 * m, 3 * m), dtype=np.float32)  # its upper half, in BLAS's order
-    twists = _twists(energy.covariances(p)).astype(np.float32)
+    total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
+    twists = _twists(energy.covariances(p))
     for clusters, columns, reduced in energy.nonzero_rows:
-        rows = (twists[clusters] @ reduced).reshape(-1, 3 * reduced.shape[2])  # M^-1/2 T^T
-        part = blas.ssyrk(1.0, rows.T, lower=1).T
+        rows = (twists[clusters] @ reduced).reshape(-1, 3 * reduced.shape[2])  # T^T in M's own axes
+        part = blas.dsyrk(1.0, rows.T, lower=1).T
         places = [slice(a * m + own.start, a * m + own.stop) for a in range(3) for own in columns]
         ends = np.cumsum([place.stop - place.start for place in places])
         both = [
@@ -143,16 +140,13 @@ def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
 
 
 def _twists(covariances: FloatArray) -> FloatArray:
-    """Return (G, 9, 3), which takes K_g to M^-1/2 T^T, for each axis of rotation and of dp.
-
-    M^-1/2 is the inverse of the Cholesky factor.
-    """
+    """Return (G, 9, 3), which takes K_g to M^-1/2 T^T, for each axis of rotation and of dp."""
     rotations = closest_rotations(covariances)
     stretched = rotations @ covariances
     symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
-    trace = np.trace(symmetric, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-    # M is positive semi-definite, since R is the closest rotation.
-    stiffness = trace - symmetric + _SOFTEST * trace + np.finfo(float).tiny * np.eye(3)
-    root = np.linalg.inv(np.linalg.cholesky(stiffness))
+    trace = np.trace(symmetric, axis1=1, axis2=2)
+    stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
+    stiffness = np.maximum(stiffness, _SOFTEST * np.abs(stiffness).max(axis=1, keepdims=True))
+    root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
     turned = (_EPSILON @ rotations).reshape(-1, 3, 9)  # T^T for each axis c of dp: eps_kic R_i.
-    return np.asarray((root @ turned).reshape(-1, 9, 3))
+    return np.asarray((np.swapaxes(root, 1, 2) @ turned).reshape(-1, 9, 3))

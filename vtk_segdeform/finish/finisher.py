@@ -42,8 +42,7 @@ from ..arrays import BoolArray, FloatArray
 from ..kernels import one_blas_thread
 from ..mesh import Crossings, Mesh
 from ..progress import Progress, tell
-from ..solver import CONVERGED, VolumeConstraint, moved_along, steps_to_volume
-from .anderson import Anderson
+from ..solver import CONVERGED, Anderson, VolumeConstraint, moved_along, steps_to_volume
 from .cell_energy import CellEnergy
 from .factor import factored
 from .untangling import around, untangled

@@ -6,6 +6,7 @@ The files, in reading order:
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
+    anderson                Anderson acceleration
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
@@ -14,6 +15,7 @@ The files, in reading order:
     solution                `Solution` and `Status`
 """
 
+from .anderson import Anderson
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
 from .exact_volume import (
@@ -40,6 +42,7 @@ __all__ = [
     "CONVERGED",
     "LONGEST_MOVE",
     "Anchors",
+    "Anderson",
     "Bodies",
     "CoarseVolume",
     "Contact",

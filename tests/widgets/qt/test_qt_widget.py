@@ -440,15 +440,15 @@ def test_options_are_steps_and_are_shown_when_they_are_undone(make):
     seen.mode(Mode.DEFORM)
     part, options = seen.panel.controls, lambda: seen.session.options
     seen.type_number(part["deform.stretch"], 3.0)
-    seen.type_number(part["deform.clusters"], 0)
+    seen.type_number(part["deform.clusters"], 250)
     seen.click(part["deform.preserve"])
     seen.click(part["deform.per_region"])
     assert (options().n_cage_vertices, options().offset) == (90, 0.5)
-    assert (options().stretch, options().rotation_groups) == (3.0, None)
+    assert (options().stretch, options().rotation_groups) == (3.0, 250)
     assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
     for _ in range(6):
         seen.click(seen.panel.toolbar.buttons["undo"])
-    assert seen.panel.controls["deform.stretch"].value() == 10.0
+    assert seen.panel.controls["deform.stretch"].value() == 1.0
     assert seen.panel.controls["deform.clusters"].value() == 300
     assert seen.panel.controls["deform.preserve"].isChecked()
     assert not seen.panel.controls["deform.per_region"].isChecked()
