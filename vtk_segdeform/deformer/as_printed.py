@@ -188,7 +188,9 @@ class PaperDeformer:
             If an option is out of its range.
         """
         if not is_whole(max_steps, 1):
-            raise ArgumentError(f"max_steps must be a whole number, 1 or more; got {max_steps!r}")
+            raise ArgumentError(
+                f"max_steps must be a whole number, 1 or more; got {shown(max_steps)}"
+            )
         for name, value in {"tolerance": tolerance, "epsilon": epsilon}.items():
             if not (is_number(value) and value > 0.0):
                 raise ArgumentError(f"{name} must be a positive number; got {shown(value)}")
