@@ -184,18 +184,18 @@ def _distances_to_octahedron(points, cage) -> np.ndarray:
 def test_arguments_that_cannot_be_solved_are_refused():
     scene = COARSE
     with pytest.raises(ConstraintError, match="at least one"):
-        Deformer.as_printed(scene.mesh, scene.regions, scene.cages)
+        Deformer.as_printed(scene.mesh, scene.regions, scene.cages, fixed=(), handle=())
     with pytest.raises(RegionError, match="one cage for each"):
-        Deformer.as_printed(scene.mesh, scene.regions, scene.cages[:1], fixed=[0])
+        Deformer.as_printed(scene.mesh, scene.regions, scene.cages[:1], fixed=[0], handle=())
     with pytest.raises(ArgumentError, match=r"cages\[1\]"):
-        Deformer.as_printed(scene.mesh, scene.regions, [scene.cages[0], None], fixed=[0])
+        Deformer.as_printed(scene.mesh, scene.regions, [scene.cages[0], None], fixed=[0], handle=())
     sheet = Mesh(scene.mesh.vertices, scene.mesh.faces[1:])
     with pytest.raises(MeshError, match="closed"):
-        Deformer.as_printed(sheet, Regions.single(sheet), scene.cages[:1], fixed=[0])
+        Deformer.as_printed(sheet, Regions.single(sheet), scene.cages[:1], fixed=[0], handle=())
     ball = Mesh(*OCTAHEDRON)
     cage = Mesh(*icosphere(2, 3.0))  # 66 cage vertices move 6
     with pytest.raises(CageError, match="influence"):
-        Deformer.as_printed(ball, Regions.single(ball), [cage], fixed=[0])
+        Deformer.as_printed(ball, Regions.single(ball), [cage], fixed=[0], handle=())
     for option in ({"max_steps": 0}, {"tolerance": 0.0}, {"epsilon": -1.0}):
         with pytest.raises(ArgumentError, match=next(iter(option))):
             printed().solve(scene.turned(10), **option)

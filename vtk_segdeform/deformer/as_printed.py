@@ -117,8 +117,8 @@ class PaperDeformer:
         regions: Regions,
         cages: Sequence[Cage | Mesh],
         *,
-        fixed: ArrayLike = (),
-        handle: ArrayLike = (),
+        fixed: ArrayLike,
+        handle: ArrayLike,
     ) -> None:
         require_mesh(mesh)
         require_regions(regions, mesh)

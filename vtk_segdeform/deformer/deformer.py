@@ -272,8 +272,8 @@ class Deformer:
         regions: Regions,
         cages: Sequence[Cage | Mesh],
         *,
-        fixed: ArrayLike = (),
-        handle: ArrayLike = (),
+        fixed: ArrayLike,
+        handle: ArrayLike,
     ) -> PaperDeformer:
         """Return the paper's method as printed, for comparison; see `deformer.as_printed`."""
         return PaperDeformer(mesh, regions, cages, fixed=fixed, handle=handle)
