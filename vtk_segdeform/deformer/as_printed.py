@@ -1,4 +1,4 @@
-r"""The paper as printed, line by line, for comparison with what `Deformer` makes of it.
+"""The paper as printed, line by line, for comparison with what `Deformer` makes of it.
 
     min |A W~ p - b|^2   subject to   g(W~ p) = 0                                       (20)
 
