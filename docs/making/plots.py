@@ -7,13 +7,16 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+import vtk_segdeform as sd
 from making.made import FIGURES as FOLDER
 from making.scene import bar, cactus, deformer_of, rotated
+from vtk_segdeform.deformer import PaperDeformer
 from vtk_segdeform.geometry import signed_volume, volume_along
 from vtk_segdeform.io import polydata_of
 from vtk_segdeform.pictures import COLOURS, INK
 
 OURS, THEIRS = COLOURS[5], COLOURS[6]
+_MOST = 300  # steps after which both have converged
 BESIDE = {"textcoords": "offset points", "color": INK}
 
 
@@ -49,33 +52,46 @@ def volume_along_a_step() -> None:
 
 
 def convergence() -> None:
-    """Draw the convergence of the paper's iteration and of ours to the same pose."""
+    """Draw how the paper's iteration and ours approach their converged poses."""
     parts = cactus(1500)
+    ours, printed = deformer_of(parts), _printed(parts, diagonal=100.0)
     targets = rotated(parts["mesh"], parts["handle"], 30)
-    ours = deformer_of(parts).solve(targets)
-    paper = {"acceleration": 0, "exact_hessian": False}
-    printed = deformer_of(parts, **paper).solve(targets)
-    linear = deformer_of(parts, exact_volume=False, **paper)
-    linearised = [abs(linear.solve(targets, max_steps=1).volume_change) for _ in range(60)]
-    exact = deformer_of(parts)
-    errors = [abs(exact.solve(targets, max_steps=1).volume_change) for _ in range(ours.steps)]
-    least = min(ours.merits[-1], printed.merits[-1])
+    scaled = targets * (printed.mesh.diagonal / parts["mesh"].diagonal)
+    runs = {
+        "the paper, eq. (21)": (THEIRS, *_approach(printed, scaled, steps=60)),
+        "vtk_segdeform": (OURS, *_approach(ours, targets, steps=12)),
+    }
 
     figure, (left, right) = new_figure(2)
-    for name, merits, colour in (
-        ("eq. (21) as printed", printed.merits, THEIRS),
-        ("with exact Hessian and acceleration", ours.merits, OURS),
-    ):
-        left.semilogy(np.array(merits) / least - 1.0 + 1e-12, color=colour, label=name)
-    left.set(xlabel="steps", ylabel="objective / its minimum $-$ 1", ylim=(1e-10, None))
-    left.set_xlim(0, min(len(printed.merits), 400))
-    right.semilogy(range(1, 61), linearised, color=THEIRS, label="linearised, eq. (21)")
-    dots = {"ls": "none", "marker": "o", "ms": 4, "color": OURS}
-    right.semilogy(range(1, len(errors) + 1), np.maximum(errors, 1e-17), **dots, label="exact")
+    for name, (colour, distances, changes) in runs.items():
+        style = {"color": colour, "label": name, "marker": "o", "ms": 3}
+        left.semilogy(range(1, len(distances) + 1), np.maximum(distances, 1e-10), **style)
+        right.semilogy(range(1, len(changes) + 1), np.maximum(changes, 1e-17), **style)
+    left.set(xlabel="steps", ylabel="distance from the end / diagonal")
     right.set(xlabel="steps", ylabel=r"$|V - V_0|\,/\,V_0$", ylim=(3e-18, 1))
     for axes in (left, right):
         axes.legend(frameon=False)
     figure.savefig(FOLDER / "convergence.png", dpi=150)
+
+
+def _printed(parts: dict[str, Any], diagonal: float) -> PaperDeformer:
+    """Return the paper as printed on the same parts, in another unit of length."""
+    factor = diagonal / parts["mesh"].diagonal
+    mesh, *cages = (sd.Mesh(factor * s.vertices, s.faces) for s in (parts["mesh"], *parts["cages"]))
+    regions = sd.Regions(mesh, parts["regions"].membership)
+    ends = {name: parts[name] for name in ("fixed", "handle")}
+    return sd.Deformer.as_printed(mesh, regions, cages, **ends)
+
+
+def _approach(
+    deformer: sd.Deformer | PaperDeformer, targets: Any, steps: int
+) -> tuple[list[float], list[float]]:
+    """Return the distance to the converged pose, in diagonals, and |dV| / V, after each step."""
+    poses = [deformer.solve(targets, max_steps=1) for _ in range(steps)]
+    for _ in range(_MOST):
+        end = deformer.solve(targets, max_steps=1).vertices
+    away = [np.linalg.norm(pose.vertices - end, axis=1).max() for pose in poses]
+    return [each / deformer.mesh.diagonal for each in away], [abs(p.volume_change) for p in poses]
 
 
 def new_figure(columns: int = 1) -> Any:

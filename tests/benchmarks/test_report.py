@@ -20,11 +20,11 @@ from vtk_segdeform.benchmarks import (
     experiments,
     frame_profile,
     history,
+    paper,
     peers,
     programs,
     report,
     segmentation_study,
-    table_one,
 )
 from vtk_segdeform.benchmarks.drags import drag_path, frames, seconds_per_step, steps_to_convergence
 from vtk_segdeform.benchmarks.full_space import full_space
@@ -66,7 +66,7 @@ def without_peers(monkeypatch):
 @pytest.fixture
 def steady(monkeypatch):
     """Replace the measured time of a step, which is NaN on a busy machine, by a constant."""
-    for module in (segmentation_study, table_one, frame_profile):
+    for module in (segmentation_study, frame_profile):
         monkeypatch.setattr(module, "seconds_per_step", lambda cases, *_, **__: [1e-3] * len(cases))
 
 
@@ -125,19 +125,37 @@ def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
 
 
 @pytest.mark.campaign
-def test_table_one_splits_a_step_in_both_formulations():
-    section = table_one.run(TINY)
-    *tables, changes = section.tables
-    assert [table.title for table in tables] == ["formulation: paper", "formulation: ours"]
-    for table in tables:
-        one, three = (dict(zip(table.column("quantity"), table.column(name), strict=True))
-                      for name in ("one cage", "three regions"))  # fmt: skip
-        assert one["non-zeros of W"] == 500 * 60 > three["non-zeros of W"]
-        assert min(one["- products with W, ms"], one["- rotations, ms"]) > 0.0
-    assert changes.column("formulation") == ["paper", "ours"]
-    paper, ours = map(abs, changes.column("three regions"))
-    assert ours <= 1e-12 < paper  # exact here, linearised in the paper
-    assert len(section.ratios) == 2
+def test_the_tables_of_the_paper_have_its_numbers_beside_ours():
+    section = paper.run(replace(TINY, regions=(1, 3)))
+    first, second, units, ours = section.tables
+    assert first.columns[1:] == (
+        "one cage", "three regions", "paper: one cage", "paper: three regions",
+    )  # fmt: skip
+    rows = {row[0]: row[1:] for row in first.rows}
+    assert rows["cage vertices"] == (60, 60, 155, 155)
+    assert rows["step, s"][2:] == (0.55, 0.2)
+    assert rows["non-zeros of W"][:2] == tuple(second.column("non-zeros of W"))
+    assert rows["steps of the bend"][:2] == tuple(second.column("steps of the bend"))
+    assert rows["non-zeros of W"][0] > rows["non-zeros of W"][1]
+    assert units.column("diagonal, units") == [1.0, 10.0, 100.0, 1000.0]
+    errors = units.column("handle error, diagonals")
+    assert errors[0] > 100 * errors[2]  # rows (5) outweigh (7) in small units
+    printed, exact = rows["its volume change, %"], ours.rows[-1]
+    assert exact[0] == "its volume change, %"
+    assert max(map(abs, exact[1:])) <= 1e-10 < abs(printed[1])
+    assert len(section.ratios) == 5
+
+
+def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
+    scaled = paper.in_units(task, 100.0)
+    assert scaled.mesh.diagonal == pytest.approx(100.0)
+    factor = 100.0 / task.mesh.diagonal
+    np.testing.assert_allclose(scaled.targets, factor * task.targets)
+    at_rest = replace(scaled, targets=scaled.mesh.vertices[scaled.handle])
+    still = paper.bend(paper.printed(scaled, 1, 60), at_rest)
+    assert (still.steps, still.early) == (1, still.volume_change)
+    assert still.handle_error < 1e-9
+    assert still.distortion < 1e-6
 
 
 @pytest.mark.campaign
@@ -293,7 +311,7 @@ def test_numbers_of_a_column_have_one_notation_unless_the_table_is_mixed():
 
 def test_a_plot_is_written_for_every_figure_of_the_study(tmp_path):
     pytest.importorskip("matplotlib")
-    row = (1, 60, 4200, 1.0, 2.0, 3, 4.0, 0.1, 1e-4)
+    row = (1, 60, 4200, 1.0, 3, 4.0, 0.1, 1e-4)
     table = Table(segmentation_study.COLUMNS, [row, (2, *row[1:])], "60 in all")
     figure = segmentation_study._figure(table, 0)
     figure.draw(tmp_path / figure.name)

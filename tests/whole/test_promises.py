@@ -248,6 +248,25 @@ def test_a_scene_rotated_scaled_and_moved_has_the_same_solution(name):
 
 
 @pytest.mark.campaign
+def test_rotation_clusters_hardly_change_the_solution():
+    mesh = mesh_of("cactus")
+    fixed, handle, axis = ends(mesh)
+    targets = bent(mesh, handle, 30.0, axis)
+    regions = sd.segment(mesh, 3)
+    cages = sd.fit_cages(mesh, regions, 155)
+
+    def solve(**options):
+        deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle, **options)
+        return deformer.solve(targets)
+
+    each, clusters = solve(rotation_groups=mesh.n_vertices), solve()
+    gap = np.linalg.norm(each.vertices - clusters.vertices, axis=1).max() / mesh.diagonal
+    print(f"rotations of vertices {each.steps} steps, of clusters {clusters.steps}: {gap:.1e}")
+    assert each.status is clusters.status is sd.Status.CONVERGED
+    assert gap <= 1e-2
+
+
+@pytest.mark.campaign
 def test_a_handle_too_close_to_fixed_vertices_is_missed_by_little_and_reported():
     # No pose of these cages meets both.  Ever higher position weights would reduce the error by
     # 5 % and move the top of the cactus by 0.8 diagonals.

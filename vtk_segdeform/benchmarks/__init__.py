@@ -12,7 +12,7 @@ The files, in reading order:
     drag_profile          drags of 5 thousand to a million vertices
     frame_profile         the parts of one drag
     drawing               rendering time of a frame
-    table_one             table 1 of the paper
+    paper                 tables 1 and 2 of the paper
     experiments           figures 7, 8 and 9 of the paper
     segmentation_study    1 to 24 regions
     full_space            the same energy without cages

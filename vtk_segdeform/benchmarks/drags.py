@@ -24,7 +24,6 @@ from .tasks import CONVERGED, Task
 
 _MOST_STEPS = 300
 _FEW, _MANY = 1, 4  # the cost of a step is the slope between frames of few and of many steps
-MANY_PAPER_STEPS = 16  # many steps for the paper's iteration, whose frames take 20 and more
 _WARM_UP, _TURNS = 2, 2  # frames that are not measured; measurements of each frame
 
 
@@ -84,12 +83,10 @@ def drag_path(task: Task, moves: int) -> list[FloatArray]:
     return [rest + (k + 1) * aside for k in range(moves)]
 
 
-def seconds_per_step(
-    cases: Sequence[tuple[Deformer, Task]], repeats: int, many: int = _MANY
-) -> list[float]:
+def seconds_per_step(cases: Sequence[tuple[Deformer, Task]], repeats: int) -> list[float]:
     """Return the time of one step of the solver in each of *cases*.
 
-    This is the slope between the times of frames of one step and of *many*.  The cases alternate,
+    This is the slope between the times of frames of one step and of four.  The cases alternate,
     so that the load of the machine and the state of processor caches are the same for all of them.
     NaN if no frame takes that many steps, or if the machine is too busy.
     """
@@ -101,8 +98,8 @@ def seconds_per_step(
         paths.append([*path, *path[-2::-1]])  # there and back
     with clocked(GaussNewton, "minimise") as spent:
         for goals in zip(*paths, strict=True):
-            times = [{_FEW: math.inf, many: math.inf} for _ in cases]
-            for steps in _TURNS * [_FEW, many]:
+            times = [{_FEW: math.inf, _MANY: math.inf} for _ in cases]
+            for steps in _TURNS * [_FEW, _MANY]:
                 for (deformer, _), goal, quickest in zip(cases, goals, times, strict=True):
                     spent.clear()
                     pose = deformer.copy().solve(goal, max_steps=steps)
@@ -110,9 +107,9 @@ def seconds_per_step(
                     once = sum(spent) if is_whole else math.nan
                     quickest[steps] = min(quickest[steps], once)
             for (deformer, _), goal, quickest, own in zip(cases, goals, times, slopes, strict=True):
-                slope = (quickest[many] - quickest[_FEW]) / (many - _FEW)
+                slope = (quickest[_MANY] - quickest[_FEW]) / (_MANY - _FEW)
                 if math.isfinite(slope):
                     own.append(slope)
-                deformer.solve(goal, max_steps=many)
+                deformer.solve(goal, max_steps=_MANY)
     found = [median(own[_WARM_UP:] or [math.nan]) for own in slopes]
     return [slope if slope > 0.0 else math.nan for slope in found]

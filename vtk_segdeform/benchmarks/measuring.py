@@ -66,10 +66,8 @@ def median_seconds(work: Callable[[], object], repeats: int) -> float:
 
 
 def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
-    """Return the median seconds of each of *works*, run alternately under the same load."""
-    for work in works:
-        work()
-    rounds = [[timed(work)[1] for work in works] for _ in range(repeats)]
+    """Return the median processor time of each of *works*, in seconds, run alternately."""
+    rounds = [[processor_seconds(work, 1) for work in works] for _ in range(repeats)]
     return [statistics.median(times) for times in zip(*rounds, strict=True)]
 
 

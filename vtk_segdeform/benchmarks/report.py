@@ -15,7 +15,7 @@ from pathlib import Path
 from ..errors import Cancelled, MissingDependencyError, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import browser, cage_making, drag_profile, experiments, peers, segmentation_study, table_one
+from . import browser, cage_making, drag_profile, experiments, paper, peers, segmentation_study
 from .measuring import conditions, timed
 from .scale import Scale
 from .sections import Figure, Section, Table
@@ -23,7 +23,7 @@ from .tasks import warm_up
 
 EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "drag": drag_profile.run,
-    "table1": table_one.run,
+    "paper": paper.run,
     "segmentation": segmentation_study.run,
     "figures": experiments.run,
     "peers": peers.run,

@@ -1,7 +1,7 @@
 """The number of regions: time and distortion with 1 to 24 regions, an open question of the paper.
 
-The study is made twice: with a constant total of cage vertices (the paper's table 2 and figure
-10), and with a constant number per cage.  Distortion is that of the converged 60 degree bend.
+The study is made twice: with a constant total of cage vertices, as in the paper's figure 10, and
+with a constant number per cage.  Distortion is that of the converged 60 degree bend.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from ..errors import CageError
 from ..geometry import distortion
 from ..progress import Progress
 from . import charts
-from .drags import MANY_PAPER_STEPS, drag_path, frames, seconds_per_step
+from .drags import drag_path, frames, seconds_per_step
 from .scale import Scale
 from .sections import Cell, Figure, Section, Table
-from .tasks import PAPER, Task, bent_cactus, make_deformer, make_regions, prepare
+from .tasks import Task, bent_cactus, make_regions, prepare
 
 COLUMNS = (
-    "regions", "cage vertices", "non-zeros of W", "step, ms", "paper's step, ms",
-    "steps per frame", "frame, ms", "distortion", "handle error",
+    "regions", "cage vertices", "non-zeros of W", "step, ms", "steps per frame",
+    "frame, ms", "distortion", "handle error",
 )  # fmt: skip
 _MIN_CAGE = 8  # vertices of a cage
 
@@ -29,7 +29,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
     task = bent_cactus(scale.paper_size)
     total, each = scale.study_vertices, scale.study_each
     chosen = make_regions(task.mesh, None).n_regions
-    section = Section("Table 2 and figure 10: the number of regions")
+    section = Section("Figure 10: the number of regions")
     studies = {
         f"{total} cage vertices in total": [
             (r, total) for r in scale.regions if r * _MIN_CAGE <= total
@@ -55,10 +55,8 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
 def row_of(task: Task, n_regions: int, n_vertices: int, scale: Scale) -> tuple[Cell, ...]:
     """Return a row of `COLUMNS`."""
     deformer = prepare(task, n_regions, n_vertices).deformer
-    printed = make_deformer(task, deformer.regions, deformer.cages, **PAPER)
     drag = list(frames(deformer, drag_path(task, scale.frames)))[1:]
     (step,) = seconds_per_step([(deformer, task)], scale.repeats)
-    (as_printed,) = seconds_per_step([(printed, task)], min(scale.repeats, 3), MANY_PAPER_STEPS)
     deformer.reset()
     solution = deformer.solve(task.targets)
     return (
@@ -66,7 +64,6 @@ def row_of(task: Task, n_regions: int, n_vertices: int, scale: Scale) -> tuple[C
         sum(cage.n_vertices for cage in deformer.cages),
         sum(block.size for block in deformer.subspace.blocks),
         1e3 * step,
-        1e3 * as_printed,
         int(median(frame.steps for frame in drag)),
         1e3 * median(frame.seconds for frame in drag),
         distortion(task.mesh, solution.vertices),
@@ -82,11 +79,11 @@ def _summary(table: Table, name: str, chosen: int) -> str:
         best = min(range(len(values)), key=values.__getitem__)
         return numbers[best], values[best]
 
-    smooth, step, frame = least("distortion"), least("paper's step, ms"), least("frame, ms")
+    smooth, step, frame = least("distortion"), least("step, ms"), least("frame, ms")
     text = (
         f"With {name}: lowest distortion with {smooth[0]} regions ({smooth[1]:.3f}), fastest frame "
-        f"with {frame[0]} ({frame[1]:.1f} ms), fastest step of the paper's formulation with "
-        f"{step[0]} ({step[1]:.1f} ms). `n_regions=None` chooses {chosen}"
+        f"with {frame[0]} ({frame[1]:.1f} ms), fastest step with {step[0]} "
+        f"({step[1]:.1f} ms). `n_regions=None` chooses {chosen}"
     )
     if chosen not in numbers:
         return text + "."
@@ -99,7 +96,7 @@ def _figure(table: Table, k: int) -> Figure:
         return [float("nan") if v is None else float(v) for v in table.column(column)]
 
     panels = {
-        "ms per step": {"ours": values("step, ms"), "paper's": values("paper's step, ms")},
+        "ms per step": {"ours": values("step, ms")},
         "ms per frame": {"ours": values("frame, ms")},
         "distortion": {"ours": values("distortion")},
     }

@@ -21,14 +21,9 @@ from ..deformer import Deformer
 from ..io import read_mesh
 from ..mesh import Mesh
 from ..models import cactus, dinosaur
-from ..regions import Regions, cage_distance_weights, segment
+from ..regions import Regions, segment
 from .measuring import timed
 
-# The paper's formulation: one rotation per vertex, detail only, linearised volume, plain steps.
-PAPER: dict[str, Any] = {
-    "rotation_groups": None, "stretch": 0.0, "exact_volume": False,
-    "acceleration": 0, "exact_hessian": False,
-}  # fmt: skip
 CONVERGED = 1e-4  # mesh diagonals: largest movement of a step that counts as converged
 
 
@@ -66,14 +61,11 @@ class Prepared:
 def prepare(task: Task, n_regions: int | None, n_vertices: int, **options: Any) -> Prepared:
     """Return a deformer for *task* with given numbers of regions and cage vertices.
 
-    *options* are those of `Deformer`; ``as_printed=True`` also selects the paper's blend weights,
-    eq. (4).
+    *options* are those of `Deformer`.
     """
-    mesh, as_printed = task.mesh, options.pop("as_printed", False)
+    mesh = task.mesh
     regions, t_segment = timed(lambda: make_regions(mesh, n_regions))
     cages, t_cages = timed(lambda: fit_cages(mesh, regions, n_vertices))
-    if as_printed:
-        options["blend"] = cage_distance_weights(regions, cages)
     deformer, t_bind = timed(lambda: make_deformer(task, regions, cages, **options))
     return Prepared(deformer, t_segment, t_cages, t_bind)
 

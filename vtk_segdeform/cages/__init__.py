@@ -8,12 +8,14 @@ The files, in reading order:
     region_solid    the distance field of a region as a solid
     contour         level set of a field on a grid
     simplify        simplification by edge collapses
+    scaling         `scaled_cages`: those of the paper, for comparison
     mean_value      mean value coordinates, eqs. (15) to (19)
 """
 
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
 from .fit import fit_cages, require_cage_vertices, suggested_size
 from .mean_value import mean_value_coordinates
+from .scaling import scaled_cages
 
 __all__ = [
     "MOST_CAGE_VERTICES",
@@ -23,5 +25,6 @@ __all__ = [
     "fit_cages",
     "mean_value_coordinates",
     "require_cage_vertices",
+    "scaled_cages",
     "suggested_size",
 ]

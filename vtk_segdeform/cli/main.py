@@ -53,7 +53,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "table1", "segmentation", "figures", "peers", "cages", "browser")
+EXPERIMENTS = ("drag", "paper", "segmentation", "figures", "peers", "cages", "browser")
 
 _SELECTION = """\
 selections (SEL):

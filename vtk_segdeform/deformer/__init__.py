@@ -11,6 +11,7 @@ The files, in reading order:
     binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
     clamping         regions of their own for fixed parts and rigid handles
+    as_printed       the paper as printed, for comparison
     deform           `deform`: the whole method in one call
     pull             `pull`: one point pulled, in one call
 """
@@ -31,6 +32,7 @@ from .arguments import (
     place_text,
     reach_and_follows,
 )
+from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
@@ -41,6 +43,8 @@ __all__ = [
     "LOCALITY",
     "SPREAD",
     "Deformer",
+    "PaperDeformer",
+    "PaperSolution",
     "automatic_locality",
     "checked_constraints",
     "checked_locality",

@@ -88,6 +88,7 @@ from .arguments import (
     require_together,
     stacked_cages,
 )
+from .as_printed import PaperDeformer
 from .binding import BindingInputs
 from .binding_cache import cached_binding
 from .constraints import Constraints, HandlePoint, Preserved, PulledPoints
@@ -241,6 +242,18 @@ class Deformer:
             tell(progress, _BOUND, "taking a trial step")
             self._take_trial_step()
         tell(progress, 1.0, "ready")
+
+    @staticmethod
+    def as_printed(
+        mesh: Mesh,
+        regions: Regions,
+        cages: Sequence[Cage | Mesh],
+        *,
+        fixed: ArrayLike,
+        handle: ArrayLike,
+    ) -> PaperDeformer:
+        """Return the paper's method as printed, for comparison; see `deformer.as_printed`."""
+        return PaperDeformer(mesh, regions, cages, fixed=fixed, handle=handle)
 
     @one_blas_thread()
     def hold(
