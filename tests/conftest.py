@@ -93,7 +93,7 @@ def _quick_rendering() -> None:
     import pyvista as pv
 
     pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
-    pv.global_theme.window_size = [400, 300]
+    pv.global_theme.window_size = [400, 300]  # of whoever asks for no size
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -385,10 +385,9 @@ def test_who_sends_no_whole_request_in_time_is_left(server, guest, do):
 async def end_of(reader):
     """Return the code and the sentence with which the server closes a WebSocket."""
     assert b" 101 " in await reader.readuntil(b"\r\n\r\n")
-    reading = asyncio.create_task(reader.read())
-    while not reading.done():
-        await pass_by(1.0)  # which the server grants for an answer to its closing
-    data = await reading
+    data = await asyncio.wait_for(reader.readuntil(b"\x88"), 300)
+    await pass_by(1.1)  # more than the server waits for an answer to its closing
+    data += await asyncio.wait_for(reader.read(), 300)
     _, found, frame = data.partition(b"\x88")
     assert found, data
     return int.from_bytes(frame[1:3], "big"), frame[3:].decode()
