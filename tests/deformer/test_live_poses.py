@@ -32,7 +32,9 @@ def bar() -> sd.Mesh:
     return models.bar(divisions=(4, 4, 16))
 
 
-@pytest.mark.parametrize("body", [bar, functools.partial(models.cactus, 1000)], ids=["bar", "cactus"])
+@pytest.mark.parametrize(
+    "body", [bar, functools.partial(models.cactus, 1000)], ids=["bar", "cactus"]
+)
 def test_every_frame_of_a_drag_is_near_the_pose_it_converges_to(body):
     mesh = body()
     deformer, worst = held_at_its_ends(mesh), 0.0
