@@ -93,6 +93,15 @@ def _quick_rendering() -> None:
     import pyvista as pv
 
     pv.global_theme.multi_samples = 1  # multisampling makes software rendering five times slower
+    pv.global_theme.window_size = [400, 300]  # of whoever asks for no size
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_flushing() -> Iterator[None]:
+    """Leave it to the system when files reach the disk: no test survives a power failure."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.fsync", lambda _: None)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 import pytest
-from bars import BAR, HEIGHT, twist
+from bars import BAR, HEIGHT, RINGS, twist
 
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
@@ -27,6 +28,7 @@ def turned(tmp_path_factory):
     path, out = folder / "bar.ply", folder / "turned.ply"
     write_mesh(path, BAR)
 
+    @functools.cache
     def run(*rotate: str, fixed: str = "z<5%", handle: str = "z>95%"):
         words = ["--fixed", fixed, "--handle", handle, *QUICK]
         code = main(["deform", str(path), "-o", str(out), *words, *rotate])
@@ -61,7 +63,7 @@ def test_turns_that_the_body_loses_are_an_error(turned, capsys):
     )
 
 
-@pytest.mark.parametrize("divisions", [(2, 2, 2), (2, 2, 6), (3, 3, 12)])
+@pytest.mark.parametrize("divisions", [(2, 2, 2), (2, 2, 6)])
 @pytest.mark.parametrize("axis", "xz")
 def test_a_coarse_bar_bends_by_half_a_turn_either_way_and_it_is_told_whether_by_more(
     tmp_path, capsys, divisions, axis
@@ -105,13 +107,13 @@ def test_deform_goes_through_the_targets_on_the_way():
 
 def test_the_turn_of_a_handle_is_measured_along_the_surface():
     z = BAR.vertices[:, 2]
-    fixed, handle = np.flatnonzero(z < 0.1), np.flatnonzero(z > HEIGHT - 0.1)
+    fixed, handle = np.flatnonzero(z < 0.1), np.flatnonzero(z > HEIGHT - 0.1)[::4]
     axis = np.array([0.0, 0.0, 1.0])
     for angle in (0.0, 2.0, -3.5, 12.0):
         x = np.concatenate(
             [
-                transform(each[None], rotation(axis, angle * each[2] / HEIGHT))
-                for each in BAR.vertices
+                transform(ring, rotation(axis, angle * ring[0, 2] / HEIGHT))
+                for ring in BAR.vertices.reshape(RINGS, -1, 3)
             ]
         )
         for more in (0.0, 2.5, -2.5, 6.5, -12.6):

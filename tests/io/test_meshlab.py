@@ -273,9 +273,9 @@ def test_an_unreadable_file_is_an_error_that_names_it(tmp_path):
 
 def test_python_ends_well_after_a_file_was_written_by_pymeshlab(tmp_path):
     """Where PyMeshLab was imported in another thread, its Qt frees memory twice at the end."""
-    write_mesh(tmp_path / "ball.ply", Mesh(*icosphere(3)))
+    write_mesh(tmp_path / "ball.ply", Mesh(*icosphere(1)))
     arguments = ["deform", "ball.ply", "-o", "bent.x3d", "--fixed", "z<-0.5", "--handle", "z>0.9",
-                 "--translate", "0.1,0,0"]  # fmt: skip
+                 "--translate", "0.1,0,0", "--regions", "1", "--cage-vertices", "12"]  # fmt: skip
     code = f"import sys; from vtk_segdeform.cli import main; sys.exit(main({arguments}))"
     done = subprocess.run(
         python_command(code), cwd=tmp_path, env=python_environment(), capture_output=True,
