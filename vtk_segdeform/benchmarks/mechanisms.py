@@ -256,7 +256,10 @@ def compared(
     mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
 ) -> Values:
     """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
-    ways = [contextlib.nullcontext, mechanism.off]
+    ways: list[Callable[[], contextlib.AbstractContextManager[None]]] = [
+        contextlib.nullcontext,
+        mechanism.off,
+    ]
     if case == "bend":
         bends: list[list[dict[str, float]]] = [[], []]
         for _ in range(_REPEATS):
