@@ -75,7 +75,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
                 "by the time of the last ones), or while the hand hesitates of `Session.refine`, "
                 "until the pose has settled. All times are of the processor, summed over its "
                 "cores. *ARAP* is one iteration of libigl's as-rigid-as-possible deformation of "
-                "the same mesh, in the same process; it takes dozens to converge. *Away* is the "
+                "the same mesh, in the same process. *Away* is the "
                 "largest distance of a shown pose from the converged one, in diagonals, of every "
                 "ninth frame: median and largest. *Jump* is the farthest that a vertex moves "
                 "between two frames, over how far the hand does."
