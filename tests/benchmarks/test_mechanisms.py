@@ -36,13 +36,18 @@ class Body:
             session = ready(preparation, self.own, handle=True)
             mechanisms.turn_and_finish(session, self.own)
             return np.array([session.vertices])
+        if case == "beside":  # a fixed vertex
+            session = ready(preparation, self.own, handle=False)
+            mesh = self.own.mesh
+            session.set_fixed(mesh.adjacency[[self.own.tip]].indices[:1])
+            return np.array([session.pull(self.own.tip, self.own.pulled_to(0.3)).vertices])
         session, goals, pulled = mechanisms.begun(case, self.own, preparation)
         drag = frames(session, goals[::9][:FEW], pulled, 8)
         return np.array([frame.solution.vertices for frame in drag])
 
     def differs(self, mechanism):
         """Tell whether *mechanism* makes a difference to any of its cases."""
-        for case in mechanism.cases:
+        for case in (*mechanism.cases, *["beside"] * ("pull" in mechanism.cases)):
             given = self.given(case)
             with mechanism.off():
                 without = self.poses(case, mechanism)
