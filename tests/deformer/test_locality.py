@@ -123,7 +123,7 @@ def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_on
     def slope(k, q):
         anchors = Anchors(k * solver.energy.mass, squeezed, np.zeros_like(p))
         position = solver.positions.local(solver.positions.rows, anchors)
-        return replace(solver, positions=position)._iterate_at(q, position.toward(places)).slope
+        return replace(solver, positions=position)._at(q, places).slope
 
     def least_curvature(k):
         steps = 1e-6 * np.eye(p.size).reshape(-1, *p.shape)

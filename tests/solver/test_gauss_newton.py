@@ -107,8 +107,8 @@ def test_a_strong_pull_against_the_volume_neither_diverges_nor_breaks():
 
 
 def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
-    """Its steps are too long at any of their shares, so the paper's steps replace them."""
-    of_h, asked = GaussNewton._full_factor, []
+    """Its steps are too long at any of their shares, so those of the paper replace them."""
+    of_h, asked = GaussNewton._factor_at, []
 
     def almost_singular(self, *args):
         factor = of_h(self, *args)
@@ -118,7 +118,7 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
     deformer = SCENE.held()
     expected = deformer.solve(SCENE.turned(10))
     with monkeypatch.context() as wrong:
-        wrong.setattr(GaussNewton, "_full_factor", almost_singular)
+        wrong.setattr(GaussNewton, "_factor_at", almost_singular)
         found = SCENE.held().solve(SCENE.turned(10), max_steps=20)
     assert asked
     assert found.status is Status.STEP_LIMIT
