@@ -39,6 +39,8 @@ This is added to the paper's iteration, which `deformer.as_printed` has:
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
 6. *Further terms* (`terms`), such as contact.  While one of them is active, its Hessian is in H.
 
+Long because the formulas of the iteration are explained here, and its problem is one class.
+
 Source
 ------
 Section 3.3 of the paper.
@@ -72,7 +74,7 @@ _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
 # Step lengths, root mean square over the surface of a mesh of size 1:
 _LONG = 1e-2  # a longer step is computed again with H at the present pose
-_CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
+_CLOSE = 3e-3  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _OLD = 6  # steps after which H is computed again
