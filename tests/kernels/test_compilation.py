@@ -98,7 +98,9 @@ def test_whoever_waits_has_them(folder):
 
 def test_without_numba_nothing_is_compiled(folder, monkeypatch):
     monkeypatch.setenv("SEGDEFORM_NUMBA", "0")
-    wait_until_compiled()
+    with monkeypatch.context() as nowhere:
+        nowhere.setattr(compilation, "wait", None)
+        wait_until_compiled()
     assert compiled_kernels() is None
     assert not dispatch.is_compiling()
     monkeypatch.delenv("SEGDEFORM_NUMBA")
@@ -172,6 +174,20 @@ def test_one_process_compiles_at_a_time_and_another_after_one_that_was_killed(fo
     assert len(compilation._started) == 1
 
 
+def test_a_process_that_found_another_at_work_is_followed_by_one_that_compiles(folder, monkeypatch):
+    with monkeypatch.context() as before:
+        before.setattr(compilation, "_CODE", "# {}")
+        begin()
+        assert compilation._started.pop().result() == 0
+        begin()
+        (first,) = compilation._started
+        first.result()
+    assert is_pending()
+    begin()
+    until(lambda: compilation._is_locked(_stamp()))
+    assert compilation._started != [first]
+
+
 @pytest.fixture
 def compiled(folder, monkeypatch):
     """Return a list of the files that this process compiles as if it had been started for that."""
@@ -179,6 +195,7 @@ def compiled(folder, monkeypatch):
     monkeypatch.setattr(compilation, "_compile", lambda sources: found.extend(sources))
     monkeypatch.setattr(compilation, "_let_others_go_first", lambda: None)
     monkeypatch.setattr(compilation, "_n_processes", lambda: 3)
+    monkeypatch.setattr(compilation, "_start", None)
     return found
 
 
