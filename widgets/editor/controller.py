@@ -353,6 +353,8 @@ class Controller:
         self.settling.flush()
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
+        if is_compiling():
+            self.messages.note(_FIRST_RUN)  # again, as frames take longer
         if self._mode is Mode.PULL:
             self._prepare_pulls(again=True)
         self.refresh()

@@ -318,6 +318,16 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     assert hand.failures == []
 
 
+def test_drags_during_the_first_compilation_say_so(bench, monkeypatch):
+    bench.finish()
+    for is_compiling in (True, False):
+        monkeypatch.setattr(controller, "is_compiling", lambda seen=is_compiling: seen)
+        bench.hand.press(bench.place)
+        bench.hand.move(bench.place + [30.0, 0.0])
+        assert ("First run" in bench.editor.status) == is_compiling
+        bench.hand.release()
+
+
 def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):
     asked = []
     monkeypatch.setattr(controller, "load_for", asked.append)
