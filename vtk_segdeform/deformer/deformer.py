@@ -48,7 +48,7 @@ from ..errors import ArgumentError, ConstraintError
 from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
 from ..geometry import Lids, lids_of, turned_over
-from ..kernels import compiled_kernels, one_blas_thread
+from ..kernels import compiled_kernels, load_for, one_blas_thread
 from ..mesh import Mesh, SurfacePoint, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
@@ -214,6 +214,7 @@ class Deformer:
         require_regions(regions, mesh)
         cages = all_of(cages, Cage, "cages")
         check_options(stretch, rotation_groups)
+        load_for(mesh.n_vertices)
         self._options = SolverOptions(tolerance, max_steps)
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
