@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 import subprocess
@@ -14,32 +13,27 @@ import pytest
 
 from vtk_segdeform.benchmarks import (
     browser,
-    cage_making,
     charts,
-    drag_profile,
+    drags,
     experiments,
-    frame_profile,
+    felt,
     history,
+    mechanisms,
     paper,
     peers,
     programs,
     report,
-    segmentation_study,
 )
-from vtk_segdeform.benchmarks.drags import drag_path, frames, seconds_per_step, steps_to_convergence
-from vtk_segdeform.benchmarks.full_space import full_space
-from vtk_segdeform.benchmarks.measuring import clocked
+from vtk_segdeform.benchmarks.bodies import Hand, random_body
 from vtk_segdeform.benchmarks.scale import Scale
 from vtk_segdeform.benchmarks.sections import Figure, Ratio, Section, Table
-from vtk_segdeform.benchmarks.tasks import CONVERGED, bent_cactus, prepare
+from vtk_segdeform.benchmarks.tasks import bent_cactus
 from vtk_segdeform.errors import ArgumentError, MissingDependencyError
-from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.solver.gauss_newton import GaussNewton
+from vtk_segdeform.session import Session
 
 TINY = Scale(
-    "tiny", paper_size=500, n_cage_vertices=60, drag_sizes=(500,), frames=2, repeats=1,
-    regions=(2,), study_vertices=60, study_each=30, peer_sizes=(500,), most_iterations=3,
-    cage_sizes=(500,), own_process=False,
+    "tiny", paper_size=500, n_cage_vertices=60, drag_sizes=(600,), repeats=1, regions=(2,),
+    peer_sizes=(500,), most_iterations=100, own_process=False,
 )  # fmt: skip
 
 
@@ -48,80 +42,138 @@ def task():
     return bent_cactus(500)
 
 
-@pytest.fixture(scope="module")
-def deformer(task):
-    return prepare(task, 3, 60).deformer
-
-
 @pytest.fixture(autouse=True)
 def without_peers(monkeypatch):
     """Hide optional programs and the benchmark poses."""
-    for name in ("igl", "open3d", "bpy", "gpytoolbox", "gpytoolbox.copyleft", "igl.copyleft"):
+    for name in ("igl", "open3d", "bpy"):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.delenv("SEGDEFORM_DATA", raising=False)
-    for module in (frame_profile, peers, report):
+    for module in (felt, peers, report):
         monkeypatch.setattr(module, "warm_up", lambda: None)
 
 
-@pytest.fixture
-def steady(monkeypatch):
-    """Replace the measured time of a step, which is NaN on a busy machine, by a constant."""
-    for module in (segmentation_study, frame_profile):
-        monkeypatch.setattr(module, "seconds_per_step", lambda cases, *_, **__: [1e-3] * len(cases))
+@pytest.fixture(scope="module")
+def body():
+    """Return a hand on a small body, and a preparation of the body."""
+    mesh = random_body(600, 1)
+    return Hand.on(mesh), Session(mesh).preparation()
 
 
-def numbers(table):
-    return [x for row in table.rows for x in row if isinstance(x, int | float)]
+def test_the_hand_turns_back_flicks_and_hesitates():
+    for is_short in (False, True):
+        turns, aside = zip(*drags.hand(is_short=is_short), strict=True)
+        ways = np.diff([0.0, *turns])
+        assert len(set(np.sign(ways))) == 3
+        assert np.abs(ways).max() > 3 * np.median(np.abs(ways))
+        rests = np.flatnonzero((ways == 0.0) & (np.arange(len(ways)) > 0))
+        assert len(rests) == 13  # ten of the hesitation, and one at each turn
+        assert all((aside[k] == aside[k - 1]).all() for k in rests)
 
 
-def test_a_frame_ends_where_the_next_step_moves_hardly_anything(task, deformer):
-    (goal,) = drag_path(task, 1)
-    deformer.reset()
-    steps, here = steps_to_convergence(deformer, goal)
-    ahead = deformer.solve(goal, max_steps=1)
-    assert (
-        np.linalg.norm(ahead.vertices - here.vertices, axis=1).max()
-        <= CONVERGED * task.mesh.diagonal
+@pytest.mark.parametrize("pulls", [False, True])
+def test_a_drag_calls_the_session_as_the_widgets_do(monkeypatch, body, pulls):
+    own, preparation = body
+    calls = []
+    for name in ("drag", "pull", "refine"):
+        known = getattr(Session, name)
+
+        def call(self, *given, known=known, name=name, **options):
+            calls.append((name, options["max_steps"]))
+            return known(self, *given, **options)
+
+        monkeypatch.setattr(Session, name, call)
+    session = drags.ready(preparation, own, handle=not pulls)
+    goals = drags.way_of_tip(session, own) if pulls else drags.way_of_handle(own)
+    pulled = own.tip if pulls else None
+    frames = list(drags.frames(session, [*goals[:6], *6 * [goals[6]]], pulled))
+    names = [name for name, _ in calls]
+    assert names[:7] == 7 * ["pull" if pulls else "drag"]
+    assert set(names[7:]) == {"refine"}  # until it has settled
+    assert len(names) == len(frames) < 12
+    assert not session.is_unsettled
+    assert calls[0][1] == 3
+    assert all(3 <= most <= 8 for _, most in calls)
+    if pulls:
+        np.testing.assert_allclose(session.vertices[own.tip], goals[6], atol=1e-4)
+
+
+def test_what_a_drag_feels_like_is_measured(monkeypatch, body):
+    own, preparation = body
+    path = drags.hand(is_short=True)[::4]
+    monkeypatch.setattr(drags, "hand", lambda **_: path)
+    monkeypatch.setattr(drags, "_CHECKED", 4)
+    session = drags.ready(preparation, own, handle=True)
+    record = drags.Record(session, preparation, 4)
+    for k, frame in enumerate(drags.frames(session, drags.way_of_handle(own), None)):
+        record.add(replace(frame, jump=7.0) if k == 5 else frame)
+    drag = record.drag
+    assert drag.first > 0.0
+    assert 0.0 < drag.felt[0] <= drag.felt[1] <= drag.felt[2] == drag.times.max()
+    assert 0.0 <= drag.away.max() < 1e-2
+    assert (drag.jump, drag.folds) == (7.0, 0)
+    assert drag.volume < 1e-12
+
+
+def test_how_far_a_pose_is_from_the_converged_one_is_seen(body):
+    """One step of the paper's method leaves it far away."""
+    own, preparation = body
+    session = drags.ready(preparation, own, handle=True)
+    session.drag(own.targets(0.3), max_steps=1)
+    away = np.linalg.norm(drags.converged(session, preparation) - session.vertices, axis=1).max()
+    drags_on = session.refine(max_steps=200)
+    there = np.linalg.norm(drags.converged(session, preparation) - drags_on.vertices, axis=1).max()
+    assert away > 1e-3 * own.mesh.diagonal
+    assert there < 1e-5 * own.mesh.diagonal
+
+
+def test_the_measures_of_a_pose_find_its_faults(body):
+    own, preparation = body
+    session = drags.ready(preparation, own, handle=True)
+    solution = session.drag(own.targets(0.0))
+    rest = drags.Shape.of(own.mesh, solution)
+    assert max(rest.error, rest.distortion, rest.worst, rest.detail) < 1e-6
+    x = np.array(solution.vertices)
+    face = own.mesh.faces[0]
+    x[face[0]] += 0.05 * own.mesh.diagonal * np.array([0.0, 0.0, 1.0])
+    spike = drags.Shape.of(own.mesh, replace(solution, vertices=x))
+    assert spike.worst > 0.3
+    assert spike.worst > 3 * spike.distortion
+    assert spike.detail > 1.0
+
+
+@pytest.mark.campaign
+def test_the_report_of_drags_has_limits_and_names_arap_when_it_is_absent():
+    section = felt.run(TINY)
+    set_up, frames = section.tables
+    assert set_up.column("vertices") == [600, 600]
+    assert min(set_up.column("total")) > 0.0
+    assert frames.column("drag") == 2 * ["handle", "handle, avoiding contact", "pull"]
+    for name in ("first, ms", "median", "longest", "away", "jump"):
+        assert all(math.isfinite(each) and each >= 0.0 for each in frames.column(name))
+    assert all(math.isnan(each) for each in frames.column("median / ARAP"))
+    assert len(section.skipped) == 2
+    verdicts = {r.what.rpartition(": ")[2]: r.verdict for r in section.ratios}
+    assert verdicts["volume change"] == verdicts["away"] == "met"
+
+
+def test_frames_are_limited_in_iterations_of_arap():
+    drag = drags.Drag(
+        1.0, np.array([0.5, 0.5, 3.0]), np.ones(4), np.zeros(1), 1.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0
     )
-    (frame,) = frames(deformer, [goal])
-    assert frame.steps == steps
-    assert frame.solution.steps == steps
-    assert np.abs(frame.solution.vertices - here.vertices).max() < 1e-9
-    deformer.reset()
-    poses = [deformer.solve(goal, max_steps=1).vertices for _ in range(steps + 1)]
-    moves = [np.linalg.norm(b - a, axis=1).max() for a, b in itertools.pairwise(poses)]
-    assert [move > CONVERGED * task.mesh.diagonal for move in moves] == [True] * (steps - 1) + [
-        False
-    ]
+    found = felt.Felt("cactus", 5430, 1.0, 1.0, 1.0, {"handle": drag}, 1.0, "")
+    verdicts = {r.what.rpartition(": ")[2]: r.verdict for r in felt._ratios([found])}
+    assert verdicts["median frame / ARAP"] == "met"
+    assert verdicts["95 % frame / ARAP"] == "**not met**"
+    assert verdicts["longest frame / ARAP"] == "met"
 
 
-@pytest.mark.campaign
-@pytest.mark.usefixtures("steady")
-def test_the_clock_of_a_step_leaves_the_solver_and_the_drag_as_they_were(task, deformer):
-    before = GaussNewton.minimise
-    costs = seconds_per_step([(deformer, task), (deformer.copy(), task)], 1)
-    assert len(costs) == 2
-    assert all(math.isnan(cost) or 0.0 < cost < 60.0 for cost in costs)
-    assert GaussNewton.minimise is before
-    with pytest.raises(RuntimeError), clocked(GaussNewton, "minimise"):
-        raise RuntimeError
-    assert GaussNewton.minimise is before
-    deformer.reset()
-
-
-@pytest.mark.campaign
-@pytest.mark.usefixtures("steady")
-def test_the_drag_profile_has_finite_times_and_names_arap_when_it_is_absent():
-    section = drag_profile.run(TINY)
-    frame, options, set_up = section.tables
-    assert frame.column("vertices") == set_up.column("vertices") == [500]
-    assert all(0.3 < options.column(name)[0] < 30.0 for name in ("avoid folds", "avoid contact"))
-    for name in ("frame", "other", "map", "volume", "read W"):
-        assert math.isfinite(frame.column(name)[0])
-    assert frame.column("volume change")[0] <= 1e-12
-    assert math.isnan(frame.column("ARAP iteration")[0])
-    assert any("libigl" in line for line in section.skipped)
-    assert section.ratios[-1].verdict == "met"
+def test_what_a_mechanism_improves_is_told_from_noise():
+    equal = dict.fromkeys(mechanisms.QUANTITIES, (1.0, 1.0))
+    assert not mechanisms.improves(equal)
+    assert not mechanisms.improves({**equal, "time": (1.0, 1.04), "away": (1e-5, 9e-5)})
+    for better in ({"time": (1.0, 1.06)}, {"folds": (0.0, 1.0)}, {"away": (1e-5, 2e-4)}):
+        assert mechanisms.improves({**equal, **better})
+    assert not mechanisms.improves({**equal, "steps": (1.0, 9.0)})
 
 
 @pytest.mark.campaign
@@ -159,19 +211,6 @@ def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
 
 
 @pytest.mark.campaign
-@pytest.mark.usefixtures("steady")
-def test_the_segmentation_study_has_a_row_for_each_number_of_regions():
-    section = segmentation_study.run(TINY)
-    total, each = section.tables
-    assert total.columns == segmentation_study.COLUMNS
-    assert total.column("regions") == each.column("regions") == [2]
-    assert total.column("cage vertices") == [60]
-    assert each.column("cage vertices") == [60]
-    assert np.isfinite(numbers(total)).all()
-    assert all("n_regions=None" in words for words in section.text)
-
-
-@pytest.mark.campaign
 def test_only_the_case_that_lets_the_volume_go_changes_it(monkeypatch, task):
     cases = {"preserved": (3, {}), "not preserved": (3, {"preserve_volume": False})}
     monkeypatch.setattr(experiments, "figures_of", lambda _: {"figure 7": (task, cases)})
@@ -191,7 +230,6 @@ def test_peers_that_are_absent_are_named_with_a_reason():
     assert table.column("method") == [
         "vtk_segdeform, three regions",
         "vtk_segdeform, one cage",
-        "full space",
     ]
     assert all(abs(change) < 1e-10 for change in table.column("volume change"))
     told = "\n".join(section.skipped)
@@ -199,41 +237,28 @@ def test_peers_that_are_absent_are_named_with_a_reason():
         assert name in told
 
 
-def test_without_cages_the_energy_settles_on_the_exact_volume(task, deformer):
-    answer = full_space(task, deformer.subspace, 200)
-    mesh = task.mesh
-    change = signed_volume(answer.vertices, mesh.faces) / signed_volume(mesh.vertices, mesh.faces)
-    assert abs(change - 1.0) < 1e-12
-    away = np.linalg.norm(answer.vertices[task.handle] - task.targets, axis=1).max()
-    assert away < 1e-3 * mesh.diagonal
-    at_rest = replace(task, targets=mesh.vertices[task.handle])
-    still = full_space(at_rest, deformer.subspace, 5)
-    assert np.abs(still.vertices - mesh.vertices).max() < 1e-9
-    assert still.iterations == 1
+def test_iterations_end_near_their_limit_and_not_where_they_are_slow():
+    goal, near = np.ones((1, 3)), 1e-4
+    for rate in (0.5, 0.99):
+        pose, count = programs.iterate_to_convergence(
+            np.zeros((1, 3)), near, 5000, lambda x, rate=rate: goal + rate * (x - goal)
+        )
+        assert np.linalg.norm(pose - goal) <= 1.01 * near
+        assert count == pytest.approx(np.log(near / np.sqrt(3.0)) / np.log(rate), abs=1.0)
+        pose, _, doubled = programs.double_to_convergence(
+            near, 5000, lambda count, rate=rate: (goal * (1.0 - rate**count), 0.0)
+        )
+        assert np.linalg.norm(pose - goal) <= near
+        assert doubled >= count
 
 
-def test_libigl_is_asked_until_it_rests(monkeypatch, task):
+def test_libigl_runs_until_it_has_converged(monkeypatch, task):
     monkeypatch.undo()
     pytest.importorskip("igl")
-    answer = programs.libigl_arap(task, 100)
-    assert 1 < answer.iterations <= 100
+    answer, further = (programs.libigl_arap(task, most) for most in (5000, 20_000))
+    assert answer.iterations < 5000
     assert np.abs(answer.vertices[task.handle] - task.targets).max() < 1e-12
-
-
-@pytest.mark.campaign
-def test_cages_are_judged_and_vtk_agrees_on_the_coordinates():
-    section = cage_making.run(TINY)
-    cages, coordinates = section.tables
-    assert cages.column("program") == ["fit_cages"]
-    assert cages.column("valid") == ["yes"]
-    assert cages.column("volume / mesh")[0] > 1.0
-    assert max(coordinates.column("largest difference")) < 1e-9
-    assert {line.partition(",")[0] for line in section.skipped} == {
-        "libigl progressive hulls", "gpytoolbox lazy_cage",
-    }  # fmt: skip
-    mesh = bent_cactus(500).mesh
-    shrunk = (0.5 * mesh.vertices, mesh.faces)
-    assert "does not enclose" in cage_making.cage_row("shrunk", mesh, shrunk, 1.0)[4]
+    np.testing.assert_array_equal(answer.vertices, further.vertices)
 
 
 def test_the_report_says_what_breaks_a_limit_and_what_could_not_be_drawn(tmp_path, monkeypatch):
@@ -307,15 +332,6 @@ def test_numbers_of_a_column_have_one_notation_unless_the_table_is_mixed():
     mixed = replace(table, mixed=True).markdown().splitlines()[2:4]
     assert mixed == ["| free | 0.02 | 3 |", "| exact | -3.0e-16 | 4 |"]
     assert Table(("a", "b"), []).markdown().count("---:") == 2
-
-
-def test_a_plot_is_written_for_every_figure_of_the_study(tmp_path):
-    pytest.importorskip("matplotlib")
-    row = (1, 60, 4200, 1.0, 3, 4.0, 0.1, 1e-4)
-    table = Table(segmentation_study.COLUMNS, [row, (2, *row[1:])], "60 in all")
-    figure = segmentation_study._figure(table, 0)
-    figure.draw(tmp_path / figure.name)
-    assert (tmp_path / figure.name).stat().st_size > 5000
 
 
 def test_a_run_is_appended_to_the_history_as_one_line(tmp_path, monkeypatch):

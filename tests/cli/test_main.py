@@ -229,18 +229,6 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
 
 
 @pytest.mark.campaign
-def test_the_bench_of_pulls_reports_their_frames_and_errors():
-    from vtk_segdeform.cli.live_pulls import pull_table
-
-    head, _, *rows = pull_table(sizes=(500,), pulls=("fast",)).splitlines()
-    (row,) = (dict(zip(head.split(" | "), row.split(" | "), strict=True)) for row in rows)
-    assert row["pull"] == "fast"
-    assert 1 <= int(row["steps"]) <= 4
-    assert 0.0 < float(row["error %"]) < 1.0
-    assert 0.0 <= float(row["lag %"]) < 0.5
-
-
-@pytest.mark.campaign
 def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event():
     pytest.importorskip("pyvista")
     from vtk_segdeform.cli.interactive import interactive_table

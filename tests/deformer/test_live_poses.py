@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
+from vtk_segdeform.benchmarks.drags import converged
 from vtk_segdeform.cages import suggested_size
-from vtk_segdeform.cli.live_pulls import converged
 from vtk_segdeform.session import Session
 
 

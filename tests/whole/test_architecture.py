@@ -77,9 +77,7 @@ GRANTED = {
     "widgets.web.notebook": {"IPython", "pyvista"},
     "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server", "wslink"},
     "widgets.web.serving": {"aiohttp", "yarl"},
-    "benchmarks.cage_making": VTK | {"igl", "gpytoolbox"},
     "benchmarks.charts": {"matplotlib"},
-    "benchmarks.drawing": VTK,
     "benchmarks.experiments": {"pyvista"},
     "benchmarks.programs": {"igl", "open3d", "bpy"},
     "cli.application": {"qtpy"},
@@ -433,12 +431,11 @@ def test_python_processes_are_started_in_one_way():
     )
 
 
-# They write to a draft from their caller, to the growing log of a recording, or to /proc.
+# They write to a draft from their caller, or to the growing log of a recording.
 WRITE_DIRECTLY = {
     "io.gltf.writing", "io.off", "io.ply", "io.stl", "io.wavefront", "io.vtk_formats",
     "io.reading_child",
     "widgets.recording.film_files", "widgets.recording.recording",
-    "benchmarks.measuring",
 }  # fmt: skip
 REPLACING = {
     "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",

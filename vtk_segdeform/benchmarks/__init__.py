@@ -7,16 +7,13 @@ The files, in reading order:
     scale                 problem sizes: quick, usual and full
     history               record and plot the ratios of many runs
     tasks                 meshes, handles and targets
-    drags                 drags, frame by frame
+    bodies                bodies that are no sample meshes, and a hand on one of their limbs
+    drags                 drags as a hand makes them, frame by frame
     measuring             time, memory and child processes
-    drag_profile          drags of 5 thousand to a million vertices
-    frame_profile         the parts of one drag
-    drawing               rendering time of a frame
+    felt                  what drags feel like, for 5 to 500 thousand vertices
+    mechanisms            what each mechanism of the solver buys
     paper                 tables 1 and 2 of the paper
     experiments           figures 7, 8 and 9 of the paper
-    segmentation_study    1 to 24 regions
-    full_space            the same energy without cages
-    cage_making           cages and coordinates of other programs
     peers programs        deformation by other programs
     browser               drags in the browser and in process
     chromium              the browser

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import MissingDependencyError
 from ..files import replacing
-from ..pictures import COLOURS, INK
+from ..pictures import COLOURS
 
 _MARKERS = "osD^vP*"
 _ORDER = (5, 0, 2, 3, 1, 6, 4)  # indices of colours, dark ones first
@@ -70,34 +70,6 @@ def _short(size: float) -> str:
     """Return *size* abbreviated, so that tick labels do not overlap."""
     unit, letter = (1e6, "M") if size >= 1e6 else (1e3, "k") if size >= 1e3 else (1.0, "")
     return f"{size / unit:.3g}{letter}"
-
-
-def stack_plot(
-    path: Path, names: Sequence[str], parts: Mapping[str, Sequence[float]], *, across: str
-) -> None:
-    """Plot a bar for each of *names*, divided into shares; *parts* has the values by part."""
-    figure, (axis,) = _figure(1)
-    axis.grid(visible=False)
-    wholes = [sum(values) for values in zip(*parts.values(), strict=True)]
-    start = [0.0] * len(names)
-    for k, (part, values) in enumerate(parts.items()):
-        share = [100.0 * v / whole for v, whole in zip(values, wholes, strict=True)]
-        colour = COLOURS[_ORDER[k % len(_ORDER)]]
-        axis.barh(names, share, left=start, height=0.6, color=colour, label=part)
-        for row, (left, width, value) in enumerate(zip(start, share, values, strict=True)):
-            if width > 7.0:
-                dark = k in (0, 2, 5)
-                axis.text(
-                    left + 0.5 * width, row, f"{value:.3g}", ha="center", va="center",
-                    color="white" if dark else INK,
-                )  # fmt: skip
-        start = [a + b for a, b in zip(start, share, strict=True)]
-    axis.set_xlabel(across)
-    axis.set_xlim(0.0, 100.0)
-    axis.invert_yaxis()
-    figure.legend(loc="outside lower center", ncols=len(parts), frameon=False)
-    with replacing(path) as draft:
-        figure.savefig(draft)
 
 
 def small_multiples(

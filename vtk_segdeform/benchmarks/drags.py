@@ -1,115 +1,237 @@
-"""Drags, frame by frame, each solved to visual convergence.
+"""Drags as a hand makes them: it turns back, hesitates and flicks.
 
-A frame has *converged* when the next step moves no vertex by more than 1e-4 of the mesh diagonal.
-The number of steps is found with a copy of the deformer; the frame itself is one call with this
-number of steps, which is timed.
+A drag calls `Session.drag` or `Session.pull` as the widgets do, without a window: at each move with
+as many steps as fit between two events, and while the hand rests `Session.refine` until the pose
+has settled.  How far a shown pose is from the converged one is measured on another session, which
+is solved to the end from there.
 """
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from statistics import median
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..deformer import Deformer
-from ..solver import GaussNewton, Solution, Status
-from .measuring import clocked, timed
-from .tasks import CONVERGED, Task
+from ..arrays import FloatArray, IntArray
+from ..geometry import distortion, triangle_distortion
+from ..mesh import Mesh
+from ..session import Preparation, Session
+from ..solver import Solution
+from ..widgets.handle_dragger import Pace
+from .bodies import Hand
 
-_MOST_STEPS = 300
-_FEW, _MANY = 1, 4  # the cost of a step is the slope between frames of few and of many steps
-_WARM_UP, _TURNS = 2, 2  # frames that are not measured; measurements of each frame
+_WORST = 10
+_CHECKED = 9  # every ninth pose is compared with the converged one
+_LEAST_MOTION = 1e-3  # diagonals: of shorter motions no jump is computed
+_MOST_STEPS = 200  # to the converged pose: far more than it takes
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One frame of a drag."""
+    """A frame of a drag."""
 
-    solution: Solution
+    seconds: float  # of the processor
     steps: int
-    seconds: float
-    processors: float  # processor time, seconds
+    jump: float  # farthest that a vertex moves, over how far the hand does; NaN if it rests
+    volume: float  # relative change
+    solution: Solution
 
 
-def steps_to_convergence(deformer: Deformer, targets: FloatArray) -> tuple[int, Solution]:
-    """Return the number of steps until convergence, and the solution."""
-    near = CONVERGED * deformer.mesh.diagonal
-    here = deformer.solve(targets, max_steps=1)
-    for steps in range(1, _MOST_STEPS):
-        ahead = deformer.solve(targets, max_steps=1)
-        if np.linalg.norm(ahead.vertices - here.vertices, axis=1).max() <= near:
-            return steps, here
-        here = ahead
-    return _MOST_STEPS, here
+@dataclass(frozen=True)
+class Shape:
+    """How good a pose is."""
+
+    error: float  # of handles, diagonals
+    distortion: float
+    worst: float  # distortion of ten triangles
+    detail: float  # change of dihedral angles, root mean square, degrees
+    folds: int  # triangles
+
+    @classmethod
+    def of(cls, mesh: Mesh, solution: Solution) -> Shape:
+        """Measure *solution*, a pose of *mesh*."""
+        x, (first, second) = solution.vertices, _adjacent_faces(mesh.faces)
+        turned = [_angles(p[mesh.faces], first, second) for p in (mesh.vertices, x)]
+        weights = mesh.face_areas[first] + mesh.face_areas[second]
+        change = (turned[1] - turned[0] + np.pi) % (2.0 * np.pi) - np.pi
+        return cls(
+            error=solution.handle_error,
+            distortion=distortion(mesh, x),
+            worst=float(np.sort(triangle_distortion(mesh, x))[-_WORST:].mean()),
+            detail=float(np.degrees(np.sqrt(np.average(change**2, weights=weights)))),
+            folds=len(solution.folds()),
+        )
 
 
-def frames(deformer: Deformer, path: Sequence[FloatArray]) -> Iterator[Frame]:
-    """Drag the handles along a *path* of targets (k, 3), starting at rest."""
-    deformer.reset()
-    for targets in path:
-        steps, _ = steps_to_convergence(deformer.copy(), targets)
-        start = time.process_time()
-        solution, seconds = timed(partial(deformer.solve, targets, max_steps=steps))
-        yield Frame(solution, steps, seconds, time.process_time() - start)
+@dataclass(frozen=True, eq=False)
+class Drag:
+    """What a drag feels like; times in seconds of the processor."""
+
+    first: float
+    times: FloatArray  # of all frames but the first
+    steps: FloatArray  # of all frames
+    away: FloatArray  # largest distance from the converged pose, diagonals, of the checked frames
+    jump: float  # the largest
+    error: float  # of the handle or the pulled point, diagonals, largest of the checked frames
+    distortion: float  # mean of these frames
+    worst: float  # of ten triangles, the largest of these frames
+    detail: float  # change of dihedral angles, root mean square, degrees, mean of these frames
+    folds: int  # triangles that are turned over, most of these frames
+    volume: float  # largest relative change
+
+    @property
+    def felt(self) -> tuple[float, float, float]:
+        """Median, 95 % and longest of `times`."""
+        median, most, longest = np.quantile(self.times, [0.5, 0.95, 1.0]).tolist()
+        return median, most, longest
 
 
-def times_beside_first(deformers: Sequence[Deformer], path: Sequence[FloatArray]) -> list[float]:
-    """Return the time of a drag along *path* with each of *deformers*, relative to the first.
+class Record:
+    """Collects the frames of a drag of *session*, and checks one in *every* so many.
 
-    Each frame takes the steps that the first one needs.  The deformers alternate, so that the load
-    of the machine is the same for all of them.
+    These are compared with converged poses.
     """
-    spent = np.zeros(len(deformers))
-    for each in deformers:
-        each.reset()
-    for number, targets in enumerate(path):
-        steps, _ = steps_to_convergence(deformers[0].copy(), targets)
-        solves = [partial(each.solve, targets, max_steps=steps) for each in deformers]
-        times = np.array([timed(solve)[1] for solve in solves])
-        spent += times if number >= _WARM_UP else 0.0
-    return [float(each) for each in spent / spent[0]]
+
+    def __init__(self, session: Session, preparation: Preparation, every: int = _CHECKED) -> None:
+        self._session, self._preparation, self._every = session, preparation, every
+        self._frames: list[Frame] = []
+        self._away: list[float] = []
+        self._shapes: list[Shape] = []
+
+    def add(self, frame: Frame) -> None:
+        """Add the current frame."""
+        self._frames.append(frame)
+        if len(self._frames) % self._every == 0:
+            mesh, x = self._session.mesh, self._session.vertices
+            off = np.linalg.norm(converged(self._session, self._preparation) - x, axis=1).max()
+            self._away.append(float(off) / mesh.diagonal)
+            self._shapes.append(Shape.of(mesh, frame.solution))
+
+    @property
+    def drag(self) -> Drag:
+        """All frames."""
+        times = [frame.seconds for frame in self._frames]
+        return Drag(
+            first=times[0],
+            times=np.array(times[1:]),
+            steps=np.array([frame.steps for frame in self._frames]),
+            away=np.array(self._away),
+            jump=float(np.nanmax([frame.jump for frame in self._frames])),
+            error=max(shape.error for shape in self._shapes),
+            distortion=float(np.mean([shape.distortion for shape in self._shapes])),
+            worst=max(shape.worst for shape in self._shapes),
+            detail=float(np.mean([shape.detail for shape in self._shapes])),
+            folds=max(shape.folds for shape in self._shapes),
+            volume=max(frame.volume for frame in self._frames),
+        )
 
 
-def drag_path(task: Task, moves: int) -> list[FloatArray]:
-    """Return targets that move by 1 % of the mesh diagonal per frame, starting at rest."""
-    rest = task.mesh.vertices[task.handle]
-    aside = task.shifted(0.01).targets - task.targets
-    return [rest + (k + 1) * aside for k in range(moves)]
+def hand(*, is_short: bool = False) -> list[tuple[float, FloatArray]]:
+    """Return the path of the hand: how far it has turned, in radians, and a shift in diagonals.
 
-
-def seconds_per_step(cases: Sequence[tuple[Deformer, Task]], repeats: int) -> list[float]:
-    """Return the time of one step of the solver in each of *cases*.
-
-    This is the slope between the times of frames of one step and of four.  The cases alternate,
-    so that the load of the machine and the state of processor caches are the same for all of them.
-    NaN if no frame takes that many steps, or if the machine is too busy.
+    It goes out, turns back through the start to the other side, flicks back, hesitates, and
+    returns slowly; while it moves it wobbles.  The short path turns back before the start.
     """
-    slopes: list[list[float]] = [[] for _ in cases]
-    paths = []
-    for deformer, task in cases:
-        deformer.reset()
-        path = drag_path(task, _WARM_UP + 3 * repeats)
-        paths.append([*path, *path[-2::-1]])  # there and back
-    with clocked(GaussNewton, "minimise") as spent:
-        for goals in zip(*paths, strict=True):
-            times = [{_FEW: math.inf, _MANY: math.inf} for _ in cases]
-            for steps in _TURNS * [_FEW, _MANY]:
-                for (deformer, _), goal, quickest in zip(cases, goals, times, strict=True):
-                    spent.clear()
-                    pose = deformer.copy().solve(goal, max_steps=steps)
-                    is_whole = pose.status is Status.STEP_LIMIT and pose.steps == steps
-                    once = sum(spent) if is_whole else math.nan
-                    quickest[steps] = min(quickest[steps], once)
-            for (deformer, _), goal, quickest, own in zip(cases, goals, times, slopes, strict=True):
-                slope = (quickest[_MANY] - quickest[_FEW]) / (_MANY - _FEW)
-                if math.isfinite(slope):
-                    own.append(slope)
-                deformer.solve(goal, max_steps=_MANY)
-    found = [median(own[_WARM_UP:] or [math.nan]) for own in slopes]
-    return [slope if slope > 0.0 else math.nan for slope in found]
+    places, counts = (1.4, -0.8, 0.9, 0.9, 0.2), (50, 60, 12, 10, 40)
+    if is_short:
+        places, counts = (0.8, 0.3, 1.0, 1.0, 0.7), (25, 14, 5, 10, 12)
+    legs = zip((0.0, *places), places, counts, strict=False)
+    turns = np.pi / 3.0 * np.concatenate([np.linspace(*leg) for leg in legs])[1:]
+    k = np.cumsum(np.diff(turns, prepend=0.0) != 0.0)  # stops while the hand rests
+    aside = np.stack([0.02 * np.sin(k / 7), 0.015 * np.cos(k / 11) - 0.015, 0.0 * k], axis=1)
+    return list(zip(turns.tolist(), aside, strict=True))
+
+
+def ready(
+    preparation: Preparation, own: Hand, *, handle: bool, avoid_contact: bool = False
+) -> Session:
+    """Return a bound session; with *handle* it has the fixed vertices and the handle of *own*."""
+    session = Session(own.mesh)
+    session.change_options(avoid_contact=avoid_contact)
+    session.accept(preparation)
+    if handle:
+        session.set_fixed(own.fixed)
+        session.add_handle(own.handle)
+    session.bind()
+    return session
+
+
+def dragged(session: Session, own: Hand, preparation: Preparation, *, pulls: bool) -> Drag:
+    """Drag the handle of *session*, or pull the tip, along the path of `hand`; see `Drag`."""
+    record = Record(session, preparation)
+    goals = way_of_tip(session, own) if pulls else way_of_handle(own)
+    for frame in frames(session, goals, own.tip if pulls else None):
+        record.add(frame)
+    return record.drag
+
+
+def way_of_handle(own: Hand, *, is_short: bool = False) -> list[FloatArray]:
+    """Return the targets (k, 3) of the handle along the path of `hand`."""
+    return [own.targets(turn, aside) for turn, aside in hand(is_short=is_short)]
+
+
+def way_of_tip(session: Session, own: Hand, *, is_short: bool = False) -> list[FloatArray]:
+    """Return where the tip (3,) is pulled to along the path of `hand`, from where it is."""
+    start, path = session.vertices[own.tip], hand(is_short=is_short)
+    return [own.pulled_to(turn, aside, start=start) for turn, aside in path]
+
+
+def frames(
+    session: Session, goals: Sequence[FloatArray], pulled: int | None, limit: int | None = None
+) -> Iterator[Frame]:
+    """Drag the handle of *session* along its targets, or the vertex *pulled*, frame by frame.
+
+    *limit* is the number of steps of a frame, at most; None: that of the widgets, which depends on
+    the time that the last ones took.
+    """
+    x = session.vertices
+    move: Callable[..., Solution] = session.drag
+    before = x[session.state.handle] if pulled is None else x[pulled]
+    if pulled is not None:
+        move = partial(session.pull, session.mesh.vertices[pulled])
+    pace, diagonal, last = Pace(), session.mesh.diagonal, x
+    for goal in goals:
+        moved = float(np.linalg.norm(goal - before, axis=-1).max())
+        if moved == 0.0 and not session.is_unsettled:
+            continue
+        clock, began = time.perf_counter(), time.process_time()
+        if moved > 0.0:
+            solution = move(goal, max_steps=limit or pace.of_event)
+        else:
+            solution = session.refine(max_steps=limit or pace.of_rest)
+        seconds = time.process_time() - began
+        pace.measure(time.perf_counter() - clock, solution.steps)
+        x, before = session.vertices, goal
+        jump = float(np.linalg.norm(x - last, axis=1).max()) / max(moved, 1e-300)
+        jump = jump if moved > _LEAST_MOTION * diagonal else np.nan
+        last = x
+        yield Frame(seconds, solution.steps, jump, abs(session.volume_change), solution)
+
+
+def converged(session: Session, preparation: Preparation) -> FloatArray:
+    """Return the converged pose (n, 3) for the targets of *session*, from its pose."""
+    other = Session(session.mesh, state=session.state)
+    other.accept(preparation)
+    return other.refine(max_steps=_MOST_STEPS).vertices
+
+
+def _adjacent_faces(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the faces (e,) on both sides of each edge that has two."""
+    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owner, order = np.repeat(np.arange(len(faces)), 3), np.lexsort(edges.T)
+    twice = np.flatnonzero((edges[order][1:] == edges[order][:-1]).all(axis=1))
+    return owner[order[twice]], owner[order[twice + 1]]
+
+
+def _angles(corners: FloatArray, first: IntArray, second: IntArray) -> FloatArray:
+    """Return the angles (e,) between adjacent faces, positive where the surface is convex."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    p, q, middles = normals[first], normals[second], corners.mean(axis=1)
+    sign = np.sign(np.einsum("ij,ij->i", p, middles[first] - middles[second]))
+    cosine = np.clip(np.einsum("ij,ij->i", p, q), -1.0, 1.0)
+    return np.asarray(sign * np.arccos(cosine))

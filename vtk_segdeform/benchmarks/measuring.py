@@ -1,22 +1,19 @@
-"""Measuring time and memory, and running in a child process.
+"""Measuring time, and running in a child process.
 
-Times are medians.  Peak memory is that of a whole process, so work that is measured for memory, and
-programs that may crash or compete for threads, run in a child process, by `in_own_process`.
+Programs that may crash or compete for threads run in a child process, by `in_own_process`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 import platform
 import statistics
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 import scipy
@@ -28,7 +25,6 @@ from ..version import __version__
 
 _T = TypeVar("_T")
 _P = ParamSpec("_P")
-_LONG_ENOUGH, _MOST = 0.02, 20  # mean seconds per run, and maximum runs per repeat
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -37,32 +33,6 @@ def timed(work: Callable[[], _T]) -> tuple[_T, float]:
     start = time.perf_counter()
     result = work()
     return result, time.perf_counter() - start
-
-
-@contextlib.contextmanager
-def clocked(owner: type, method: str) -> Iterator[list[float]]:
-    """Record the seconds of every call of a method within this context."""
-    untimed, spent = getattr(owner, method), list[float]()
-
-    def clocking(*args: Any, **kwargs: Any) -> Any:
-        result, seconds = timed(lambda: untimed(*args, **kwargs))
-        spent.append(seconds)
-        return result
-
-    setattr(owner, method, clocking)
-    try:
-        yield spent
-    finally:
-        setattr(owner, method, untimed)
-
-
-def median_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the median of *repeats* runs of *work*, or of more if short, after a first run."""
-    work()
-    times = [timed(work)[1] for _ in range(repeats)]
-    while sum(times) < _LONG_ENOUGH * repeats and len(times) < _MOST * repeats:
-        times.append(timed(work)[1])
-    return statistics.median(times)
 
 
 def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
@@ -78,27 +48,6 @@ def processor_seconds(work: Callable[[], object], repeats: int) -> float:
     for _ in range(repeats):
         work()
     return (time.process_time() - start) / repeats
-
-
-def forget_peak() -> None:
-    """Reset `peak_memory`, where the system can (Linux)."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-
-
-def peak_memory() -> float:
-    """Return the peak memory of this process in gigabytes; NaN if unknown."""
-    status = Path("/proc/self/status")
-    if status.is_file():
-        for line in status.read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return float(line.split()[1]) / 1e6
-    try:
-        import resource
-    except ImportError:  # Windows
-        return float("nan")
-    unit = 1e9 if sys.platform == "darwin" else 1e6
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 def in_own_process(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:

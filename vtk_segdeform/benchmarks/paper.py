@@ -20,12 +20,13 @@ from statistics import median
 
 import numpy as np
 
+from ..arrays import FloatArray
 from ..cages import scaled_cages
-from ..deformer import Deformer, PaperDeformer
+from ..deformer import Deformer, PaperDeformer, PaperSolution
 from ..geometry import distortion
 from ..mesh import inside_points
 from ..progress import Progress, tell
-from .drags import drag_path, frames
+from ..solver import Solution
 from .measuring import by_turns
 from .scale import Scale
 from .sections import Cell, Ratio, Section, Table
@@ -37,7 +38,7 @@ _SCALE = 1.2  # of the cages
 _MIN_CAGE = 8  # vertices of a cage
 _TIMED, _ROUNDS = 3, 3  # steps in one measurement; measurements per repeat
 _FRAMES = 12  # of a drag
-_MOST_STEPS = 500
+_MOST_STEPS, _LIVE_STEPS = 500, 8  # of a bend, and of a frame as the editor solves it
 
 
 @dataclass(frozen=True)
@@ -155,12 +156,18 @@ def bend(deformer: PaperDeformer, task: Task) -> Bend:
 
 
 def drag(deformer: PaperDeformer, task: Task, max_steps: int = _MOST_STEPS) -> Drag:
-    """Drag the handle of *task* from rest; the first frame is not counted."""
+    """Drag the handle of *task* from rest, by `_dragged`."""
     deformer.reset()
+    return _dragged(task, partial(deformer.solve, max_steps=max_steps, tolerance=CONVERGED))
+
+
+def _dragged(task: Task, solve: Callable[[FloatArray], Solution | PaperSolution]) -> Drag:
+    """Solve for targets that move by 1 % of the diagonal per frame; the first is not counted."""
+    aside = task.shifted(0.01).targets - task.targets
     solutions, seconds = [], []
-    for targets in drag_path(task, _FRAMES):
+    for k in range(_FRAMES):
         start = time.process_time()
-        solutions.append(deformer.solve(targets, max_steps=max_steps, tolerance=CONVERGED))
+        solutions.append(solve(task.mesh.vertices[task.handle] + (k + 1) * aside))
         seconds.append(time.process_time() - start)
     return Drag(
         steps=int(median(each.steps for each in solutions[1:])),
@@ -214,11 +221,8 @@ def _table_of_units(task: Task, n_vertices: int) -> Table:
 
 def _table_of_ours(task: Task, scale: Scale) -> tuple[Table, float]:
     """Return vtk_segdeform on the same task, and its time per frame, three regions / one cage."""
-    path = drag_path(task, _FRAMES)
     cases = [prepare(task, n_regions, scale.n_cage_vertices).deformer for n_regions in (1, 3)]
-    drags = [list(frames(case, path))[1:] for case in cases]
-    changes = [max((each.solution.volume_change for each in one), key=abs) for one in drags]
-    one, three = (sum(each.processors for each in frame) for frame in drags)
+    drags = [_dragged(task, partial(case.solve, max_steps=_LIVE_STEPS)) for case in cases]
     poses = []
     for case in cases:
         case.reset()
@@ -227,13 +231,13 @@ def _table_of_ours(task: Task, scale: Scale) -> tuple[Table, float]:
         ("steps of the bend", *(pose.steps for pose in poses)),
         ("its distortion", *(distortion(task.mesh, pose.vertices) for pose in poses)),
         ("its handle error, diagonals", *(pose.handle_error for pose in poses)),
-        ("steps per frame of the drag", *(int(median(each.steps for each in d)) for d in drags)),
-        ("frame, s", *(median(each.processors for each in one) for one in drags)),
-        ("its volume change, %", *(100.0 * change for change in changes)),
+        ("steps per frame of the drag", *(each.steps for each in drags)),
+        ("frame, s", *(each.seconds for each in drags)),
+        ("its volume change, %", *(100.0 * each.volume_change for each in drags)),
     ]
-    return Table(
-        ("quantity", "one cage", "three regions"), rows, "vtk_segdeform", True
-    ), three / one
+    one, three = (each.seconds for each in drags)
+    columns = "quantity", "one cage", "three regions"
+    return Table(columns, rows, "vtk_segdeform", True), three / one
 
 
 def _outside(case: PaperDeformer) -> int:

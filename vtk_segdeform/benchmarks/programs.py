@@ -1,12 +1,15 @@
 """Deformation by other programs, called as documented by each of them.
 
-All are optional and imported inside the call.  A program runs until an iteration moves no vertex
-by more than 1e-4 of the mesh diagonal, up to a maximum number of iterations.  Open3D and Blender
-do not report movement and run a given number of iterations.
+All are optional and imported inside the call.  A program runs until its pose is within 1e-4 of the
+mesh diagonal of the converged one, up to a maximum number of iterations.  Iterations of
+as-rigid-as-possible deformation converge linearly: they move the farthest vertex by d, q d, q^2 d
+..., so that d q / (1 - q) remains.  Open3D and Blender do not report movement, so their number of
+iterations is doubled until the pose moves by no more.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -15,10 +18,10 @@ import numpy as np
 
 from ..arrays import FloatArray
 from ..errors import MissingDependencyError
-from .measuring import median_seconds, processor_seconds, timed
+from .measuring import by_turns, timed
 from .tasks import CONVERGED, Task
 
-_OPEN3D_ITERATIONS = 50
+_FEWEST = 50  # iterations of Open3D and Blender
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +37,32 @@ class Answer:
 def iterate_to_convergence(
     start: FloatArray, near: float, most: int, iterate: Callable[[FloatArray], FloatArray]
 ) -> tuple[FloatArray, int]:
-    """Iterate from *start* to convergence; return the result and the number of iterations."""
-    here = start
+    """Iterate from *start* until *near* (a length) the limit; return the result and the count."""
+    here, before = start, math.inf
     for count in range(1, most + 1):
         ahead = iterate(here)
-        if np.linalg.norm(ahead - here, axis=1).max() <= near:
-            return ahead, count
-        here = ahead
+        moved = float(np.linalg.norm(ahead - here, axis=1).max())
+        here, rate, before = ahead, moved / before if before else 0.0, moved
+        if count > 1 and rate < 1.0 and moved * rate / (1.0 - rate) <= near:
+            return here, count
     return here, most
+
+
+def double_to_convergence(
+    near: float, most: int, run: Callable[[int], tuple[FloatArray, float]]
+) -> tuple[FloatArray, float, int]:
+    """Return the pose and seconds of ``run(count)``, and the count at which it is *near* its limit.
+
+    That is where half as many iterations give the same pose.
+    """
+    count = min(_FEWEST, most)
+    pose, seconds = run(count)
+    while 2 * count <= most:
+        before, count = pose, 2 * count
+        pose, seconds = run(count)
+        if np.linalg.norm(pose - before, axis=1).max() <= near:
+            break
+    return pose, seconds, count
 
 
 def libigl_arap(task: Task, most: int) -> Answer:
@@ -58,16 +79,12 @@ def libigl_arap(task: Task, most: int) -> Answer:
     return Answer(np.asarray(pose), set_up, solve, count)
 
 
-def arap_iteration_seconds(task: Task, repeats: int) -> tuple[float, float]:
-    """Return the elapsed time and the processor time of one iteration of libigl's ARAP."""
-    data, positions = _arap_data(task.shifted(0.0))
+def arap_iteration_seconds(task: Task, repeats: int) -> float:
+    """Return the processor time of one iteration of libigl's ARAP, the median of *repeats*."""
+    data, positions = _arap_data(task)
     data.max_iter = 1
     igl, start = _igl(), np.array(task.mesh.vertices)
-
-    def iterate() -> None:
-        igl.arap_solve(positions, data, start)
-
-    return median_seconds(iterate, repeats), processor_seconds(iterate, repeats)
+    return by_turns([lambda: igl.arap_solve(positions, data, start)], repeats)[0]
 
 
 def open3d_arap(task: Task, most: int) -> Answer:
@@ -82,12 +99,16 @@ def open3d_arap(task: Task, most: int) -> Answer:
     )
     constrained = open3d.utility.IntVector(_constrained(task).astype(np.int32))
     positions = open3d.utility.Vector3dVector(_positions(task))
-    count = min(most, _OPEN3D_ITERATIONS)
-    with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
-        bent, solve = timed(
-            lambda: mesh.deform_as_rigid_as_possible(constrained, positions, max_iter=count)
-        )
-    return Answer(np.asarray(bent.vertices).copy(), 0.0, solve, count)
+
+    def run(count: int) -> tuple[FloatArray, float]:
+        with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
+            bent, seconds = timed(
+                lambda: mesh.deform_as_rigid_as_possible(constrained, positions, max_iter=count)
+            )
+        return np.asarray(bent.vertices).copy(), seconds
+
+    pose, solve, count = double_to_convergence(CONVERGED * task.mesh.diagonal, most, run)
+    return Answer(pose, 0.0, solve, count)
 
 
 def blender_laplacian(task: Task, most: int) -> Answer:
@@ -105,7 +126,7 @@ def blender_laplacian(task: Task, most: int) -> Answer:
     anchors = body.vertex_groups.new(name="anchors")
     anchors.add(_constrained(task).tolist(), 1.0, "REPLACE")
     modifier: Any = body.modifiers.new("bend", "LAPLACIANDEFORM")
-    modifier.vertex_group, modifier.iterations = "anchors", min(most, _OPEN3D_ITERATIONS)
+    modifier.vertex_group = "anchors"
     _, set_up = timed(lambda: bpy.ops.object.laplaciandeform_bind(modifier="bend"))
     if not modifier.is_bind:
         raise MissingDependencyError("Blender could not bind its modifier")
@@ -120,8 +141,12 @@ def blender_laplacian(task: Task, most: int) -> Answer:
         seen.vertices.foreach_get("co", out)
         return out.reshape(-1, 3).astype(np.float64)
 
-    pose, solve = timed(evaluate)
-    return Answer(pose, set_up, solve, int(modifier.iterations))
+    def run(count: int) -> tuple[FloatArray, float]:
+        modifier.iterations = count
+        return timed(evaluate)
+
+    pose, solve, count = double_to_convergence(CONVERGED * task.mesh.diagonal, most, run)
+    return Answer(pose, set_up, solve, count)
 
 
 def _igl() -> Any:

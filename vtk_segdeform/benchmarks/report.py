@@ -15,19 +15,18 @@ from pathlib import Path
 from ..errors import Cancelled, MissingDependencyError, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import browser, cage_making, drag_profile, experiments, paper, peers, segmentation_study
+from . import browser, experiments, felt, mechanisms, paper, peers
 from .measuring import conditions, timed
 from .scale import Scale
 from .sections import Figure, Section, Table
 from .tasks import warm_up
 
 EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
-    "drag": drag_profile.run,
+    "drag": felt.run,
+    "mechanisms": mechanisms.run,
     "paper": paper.run,
-    "segmentation": segmentation_study.run,
     "figures": experiments.run,
     "peers": peers.run,
-    "cages": cage_making.run,
     "browser": browser.run,
 }
 NAME = "report.md"

@@ -16,7 +16,6 @@ The files, in reading order:
     application     ``segdeform app``
     serving         ``segdeform serve``
     interactive     ``segdeform bench --interactive``
-    live_pulls      bench --interactive: live pulls, and the errors of their poses
     opening         ``segdeform bench --interactive --open``
     replaying       ``segdeform replay``
     progress_bar    progress bar in the terminal

@@ -17,9 +17,8 @@ from ..benchmarks import (
 )
 from ..errors import ArgumentError
 from ..kernels import wait_until_compiled
-from ..progress import Progress, part
+from ..progress import Progress
 from .interactive import interactive_table
-from .live_pulls import pull_table
 from .opening import DRAWN_SIZES, opening_table
 from .outputs import Say
 
@@ -44,17 +43,15 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         _print_table(opening_table(sizes=sizes, progress=progress), say)
         return True
     if options.interactive:
-        drag, pulls = part(progress, 0.0, 0.3), part(progress, 0.3, 1.0)
-        table = interactive_table(n_cage_vertices=options.cage_vertices, progress=drag)
-        _print_table(f"{table}\n\n{pull_table(progress=pulls)}", say)
+        _print_table(
+            interactive_table(n_cage_vertices=options.cage_vertices, progress=progress), say
+        )
         return True
     scale = QUICK if options.quick else FULL if options.full else USUAL
     scale = replace(scale, n_cage_vertices=options.cage_vertices)
     if options.size is not None:
         one = (options.size,)
-        scale = replace(
-            scale, paper_size=options.size, drag_sizes=one, peer_sizes=one, cage_sizes=one
-        )
+        scale = replace(scale, paper_size=options.size, drag_sizes=one, peer_sizes=one)
     sections = write_report(options.output, scale, options.only, progress)
     ratios = [ratio for section in sections for ratio in section.ratios]
     for ratio in ratios:

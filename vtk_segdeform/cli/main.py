@@ -53,7 +53,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "paper", "segmentation", "figures", "peers", "cages", "browser")
+EXPERIMENTS = ("drag", "mechanisms", "paper", "figures", "peers", "browser")
 
 _SELECTION = """\
 selections (SEL):
@@ -355,7 +355,7 @@ def _bench(parser: argparse.ArgumentParser) -> None:
     _output_folder(parser, "bench-output")
     scale = parser.add_mutually_exclusive_group()
     scale.add_argument("--quick", action="store_true", help="small meshes; a few minutes")
-    scale.add_argument("--full", action="store_true", help="up to a million vertices; an hour")
+    scale.add_argument("--full", action="store_true", help="up to 500,000 vertices; an hour")
     text = f"run one experiment: {', '.join(EXPERIMENTS)}; may be repeated"
     add("--only", action="append", default=[], choices=EXPERIMENTS, metavar="NAME", help=text)
     add("--size", type=_count, default=None, metavar="N", help="one mesh size, in vertices")

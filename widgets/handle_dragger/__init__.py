@@ -17,7 +17,7 @@ from .gizmo import AXIS_COLOURS, Gizmo
 from .gizmo_shapes import FREE, Kind, Part
 from .handle_dragger import HandleDragger
 from .handle_motion import Grip, Motion, next_constraint, step_of
-from .live_solve import LiveSolve
+from .live_solve import LiveSolve, Pace
 from .number_entry import NumberEntry
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "LiveSolve",
     "Motion",
     "NumberEntry",
+    "Pace",
     "Part",
     "next_constraint",
     "step_of",

@@ -29,6 +29,32 @@ _LEAST_REFINE_STEPS = 3  # with fewer per call, Anderson acceleration has no eff
 _PERIOD = 40  # milliseconds between two refinements
 
 
+class Pace:
+    """How many steps a call takes, by the measured time of the last ones."""
+
+    def __init__(self) -> None:
+        self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
+
+    @property
+    def of_event(self) -> int:
+        """The number of steps of the next event: 3 to 8, and 3 before the first measurement."""
+        return self._steps_in(_EVENT_TIME, _LEAST_STEPS)
+
+    @property
+    def of_rest(self) -> int:
+        """The number of steps of a refinement between two events."""
+        return self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)
+
+    def measure(self, seconds: float, steps: int) -> None:
+        """Record that a call of so many *steps* took so many *seconds*."""
+        self._seconds.append(seconds / max(1, steps))
+
+    def _steps_in(self, seconds: float, fewest: int) -> int:
+        if not self._seconds:
+            return fewest
+        return max(fewest, min(_MOST_STEPS, int(seconds / max(median(self._seconds), 1e-6))))
+
+
 class LiveSolve:
     """Solves for a session within the time between events.
 
@@ -52,7 +78,7 @@ class LiveSolve:
     def __init__(self, view: View, session: Session, failed: Callable[[], object]) -> None:
         self.is_enabled, self.is_refused = True, False
         self._view, self._session, self._failed = view, session, failed
-        self._seconds: deque[float] = deque(maxlen=5)  # per step; their median is used
+        self._pace = Pace()
         self._stop: Stop | None = None
         self._halted: Solution | None = None  # of the pose that is not to be refined
         self._budget = StepBudget(view.interactor)
@@ -61,7 +87,7 @@ class LiveSolve:
     @property
     def steps(self) -> int:
         """The number of steps of the next event: 3 to 8, and 3 before the first measurement."""
-        return self._steps_in(_EVENT_TIME, _LEAST_STEPS)
+        return self._pace.of_event
 
     @property
     def is_refining(self) -> bool:
@@ -139,8 +165,7 @@ class LiveSolve:
             return
         is_done = False
         try:
-            steps = self._steps_in(_REFINE_TIME, _LEAST_REFINE_STEPS)
-            self._measure(self._session.refine, steps)
+            self._measure(self._session.refine, self._pace.of_rest)
             is_done = True
         finally:
             if not is_done:
@@ -153,13 +178,8 @@ class LiveSolve:
             self._stop()
             self._stop = None
 
-    def _steps_in(self, seconds: float, fewest: int) -> int:
-        if not self._seconds:
-            return fewest
-        return max(fewest, min(_MOST_STEPS, int(seconds / max(median(self._seconds), 1e-6))))
-
     def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
         """Solve and record the time per step."""
         began = time.perf_counter()
         solution = solve(max_steps=self._budget.steps(steps))
-        self._seconds.append((time.perf_counter() - began) / max(1, solution.steps))
+        self._pace.measure(time.perf_counter() - began, solution.steps)

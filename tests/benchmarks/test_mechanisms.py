@@ -1,0 +1,81 @@
+"""Every mechanism that `segdeform bench --only mechanisms` turns off makes a difference."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+
+import numpy as np
+import pytest
+
+from vtk_segdeform import sizes
+from vtk_segdeform.benchmarks import mechanisms
+from vtk_segdeform.benchmarks.bodies import Hand, bowl, random_body, with_loose_parts
+from vtk_segdeform.benchmarks.drags import frames, ready
+from vtk_segdeform.benchmarks.mechanisms import MECHANISMS, Mechanism
+from vtk_segdeform.session import Session
+
+FEW = 6  # frames
+
+
+class Body:
+    """A small body, bound once."""
+
+    def __init__(self, mesh):
+        self.own, self.preparation = Hand.on(mesh), Session(mesh).preparation()
+        self.given = functools.cache(self.poses)
+
+    def poses(self, case, mechanism=None):
+        """Return poses (k, n, 3) of *case*, with *mechanism* turned off."""
+        preparation = self.preparation
+        if mechanism is not None and mechanism.binds:
+            preparation = mechanisms.bound_again(self.own, preparation)
+        if case == "bend":
+            session = ready(preparation, self.own, handle=True)
+            mechanisms.turn_and_finish(session, self.own)
+            return np.array([session.vertices])
+        session, goals, pulled = mechanisms.begun(case, self.own, preparation)
+        drag = frames(session, goals[::9][:FEW], pulled, 8)
+        return np.array([frame.solution.vertices for frame in drag])
+
+    def differs(self, mechanism):
+        """Tell whether *mechanism* makes a difference to any of its cases."""
+        for case in mechanism.cases:
+            given = self.given(case)
+            with mechanism.off():
+                without = self.poses(case, mechanism)
+            if given.shape != without.shape or np.abs(given - without).max() > 1e-12:
+                return True
+        return False
+
+
+@pytest.fixture(scope="module")
+def bodies():
+    meshes = with_loose_parts(random_body(700, 4), 4), random_body(700, 1), bowl(700)
+    with pytest.MonkeyPatch.context() as patch:  # small meshes are computed like large ones
+        patch.setattr(sizes, "COARSE_VOLUME", 300)
+        patch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
+        patch.setattr(sizes, "SCALED_VOLUME", 300)
+        yield [Body(mesh) for mesh in meshes]
+
+
+@pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.name)
+def test_without_the_mechanism_poses_differ(bodies, mechanism):
+    assert any(body.differs(mechanism) for body in bodies)
+
+
+def test_a_patch_that_patches_nothing_is_noticed(bodies):
+    known = MECHANISMS[0]
+    same = Mechanism(
+        "nothing", "", known.owner, known.attribute, vars(known.owner)[known.attribute], known.cases
+    )
+    assert not any(body.differs(same) for body in bodies)
+
+
+@pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.name)
+def test_afterwards_everything_is_as_before(mechanism):
+    before = vars(mechanism.owner)[mechanism.attribute]
+    with contextlib.suppress(ZeroDivisionError), mechanism.off():
+        assert vars(mechanism.owner)[mechanism.attribute] is mechanism.instead
+        raise ZeroDivisionError
+    assert vars(mechanism.owner)[mechanism.attribute] is before

@@ -1,0 +1,140 @@
+"""Bodies of the benchmarks that are not sample meshes, and what a hand does with a body.
+
+`random_body` is a solid of random limbs.  A `Hand` moves the end of the limb whose tip is farthest
+from everything else along the surface, so that it needs no choice for a body.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial.transform import Rotation
+
+from ..arrays import FloatArray, IntArray
+from ..mesh import Mesh
+from ..models import sphere
+from ..models.implicit import Limb, implicit_surface, standing_body
+
+_HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
+_RING = 0.03  # half the width of the ring around the root
+_RADIUS, _WALL = 0.5, 0.07  # of the bowl
+_PULL = 0.25  # diagonals that a pull moves while a handle would turn by a radian
+
+
+def random_body(n_vertices: int, seed: int) -> Mesh:
+    """Return a standing trunk with four to six bent limbs, all random."""
+    rng = np.random.default_rng(seed)
+    lean = rng.uniform(-0.15, 0.15, 2)
+    trunk = [(s * lean[0], s * lean[1], 0.9 * s) for s in (-0.1, 0.35, 0.7, 1.0)]
+    limbs = [Limb(trunk, rng.uniform(0.09, 0.15, 4).tolist())]
+    for around in rng.permutation(6)[: rng.integers(4, 7)]:
+        height, turn = rng.uniform(0.2, 0.9), np.pi / 3.0 * (around + rng.uniform(-0.3, 0.3))
+        way = np.array([np.cos(turn), np.sin(turn), rng.uniform(-0.4, 0.6)])
+        points = [np.array([*height * lean, 0.9 * height])]
+        for _ in range(3):
+            points.append(points[-1] + rng.uniform(0.1, 0.18) * way / np.linalg.norm(way))
+            way = way + rng.uniform(-0.6, 0.6, 3)
+        points = [np.array([x, y, max(z, 0.08)]) for x, y, z in points]
+        radii = np.linspace(rng.uniform(0.05, 0.08), rng.uniform(0.03, 0.05), 4)
+        limbs.append(Limb([tuple(p.tolist()) for p in points], radii.tolist()))
+    return standing_body(limbs, n_vertices, blend=0.04)
+
+
+def with_loose_parts(body: Mesh, seed: int, count: int = 4) -> Mesh:
+    """Return *body* with *count* small spheres close to its surface, as separate components."""
+    rng, x = np.random.default_rng(seed), body.vertices
+    a, b, c = x[body.faces.T]
+    normals = np.cross(b - a, c - a)
+    vertices, faces = [x], [body.faces]
+    for face in rng.choice(len(body.faces), count, replace=False):
+        normal, ball = normals[face] / np.linalg.norm(normals[face]), sphere(100)
+        centre = x[body.faces[face]].mean(axis=0) + 0.025 * body.diagonal * normal
+        faces.append(ball.faces + sum(map(len, vertices)))
+        vertices.append(0.02 * body.diagonal * ball.vertices + centre)
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def bowl(n_vertices: int) -> Mesh:
+    """Return half a sphere with a thin wall."""
+
+    def field(x: FloatArray) -> FloatArray:
+        wall = np.abs(np.linalg.norm(x, axis=1) - _RADIUS) - 0.5 * _WALL
+        return np.asarray(np.maximum(wall, x[:, 2]))
+
+    reach = _RADIUS + _WALL
+    return implicit_surface(field, np.array([[-reach] * 3, [reach, reach, _WALL]]), n_vertices)
+
+
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A handle at the end of a limb, the vertices that are fixed, and how the handle turns.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The body.
+    fixed, handle : (f,) int, (k,) int
+        Vertices.
+    tip : int
+        The vertex at the end of the limb.
+    root, axis : (3,) float
+        The handle turns about the line through *root* along *axis*.
+    """
+
+    mesh: Mesh
+    fixed: IntArray
+    handle: IntArray
+    tip: int
+    root: FloatArray
+    axis: FloatArray
+
+    @classmethod
+    def on(cls, mesh: Mesh) -> Hand:
+        """Return the hand on the limb of *mesh* whose tip is farthest along the surface."""
+        x = mesh.vertices
+        i, j = np.concatenate(
+            [mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]
+        ).T
+        lengths = np.linalg.norm(x[i] - x[j], axis=1)
+        graph = sparse.coo_array((lengths, (i, j)), shape=(len(x),) * 2).tocsr()
+        largest = mesh.components == np.bincount(mesh.components).argmax()
+        middle = np.where(largest, np.linalg.norm(x - x.mean(axis=0), axis=1), np.inf).argmin()
+
+        def distances(start: int) -> FloatArray:
+            found = csgraph.dijkstra(graph, directed=False, indices=start)
+            return np.asarray(np.where(np.isfinite(found), found, -1.0))
+
+        tip = int(distances(int(middle)).argmax())
+        away = distances(tip) / distances(tip).max()
+        handle = np.flatnonzero((away >= 0.0) & (away < _HANDLE))
+        root = x[np.abs(away - _ROOT) < _RING].mean(axis=0)
+        along = x[handle].mean(axis=0) - root
+        side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+        return cls(
+            mesh, np.flatnonzero(away > _FIXED), handle, tip, root, side / np.linalg.norm(side)
+        )
+
+    def targets(self, radians: float, aside: FloatArray | float = 0.0) -> FloatArray:
+        """Return the targets (k, 3) of the handle, turned and moved *aside* (3,), in diagonals."""
+        turn = Rotation.from_rotvec(radians * self.axis)
+        places = turn.apply(self.mesh.vertices[self.handle] - self.root) + self.root
+        return np.asarray(places + self.mesh.diagonal * np.asarray(aside))
+
+    def twisted(self, radians: float) -> FloatArray:
+        """Return the targets (k, 3) of the handle, turned about the limb."""
+        x = self.mesh.vertices[self.handle]
+        along = x.mean(axis=0) - self.root
+        turn = Rotation.from_rotvec(radians * along / np.linalg.norm(along))
+        return np.asarray(turn.apply(x - self.root) + self.root)
+
+    def pulled_to(
+        self, radians: float, aside: FloatArray | float = 0.0, *, start: FloatArray | None = None
+    ) -> FloatArray:
+        """Return where the tip (3,) is pulled to from *start*, about as far as the handle moves."""
+        start = self.mesh.vertices[self.tip] if start is None else start
+        way = np.cross(self.axis, start - self.root)
+        moved = _PULL * radians * way / np.linalg.norm(way) + np.asarray(aside)
+        return np.asarray(start + self.mesh.diagonal * moved)

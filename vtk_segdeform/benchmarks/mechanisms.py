@@ -1,0 +1,363 @@
+"""What each mechanism of the solver buys: the same drags and bends with each one turned off alone.
+
+    handle    the end of a limb is dragged, see `drags`
+    pull      its tip is pulled
+    second    after that pull another point is, of a loose part if there is one
+    twist     the handle is turned about the limb, by 270 degrees in steps of 5
+    bend      the handle is turned by 90 degrees at once, and the pose is finished
+
+Each pair of frames, with a mechanism and without it, is solved one after the other, so that a busy
+machine slows both.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .. import sizes
+from ..arrays import FloatArray
+from ..deformer import Deformer, binding, locality
+from ..energy import Factor
+from ..finish import cell_energy, finisher
+from ..mesh import Mesh
+from ..models import cactus
+from ..progress import Progress, tell
+from ..session import Preparation, Session
+from ..solver import Anderson, GaussNewton, gauss_newton
+from .bodies import Hand, random_body, with_loose_parts
+from .drags import Record, Shape, frames, ready, way_of_handle, way_of_tip
+from .measuring import run_in
+from .scale import Scale
+from .sections import Cell, Section, Table
+
+_DRAGS, _PULLS, _SECOND = ("handle", "pull"), ("pull", "second"), ("second",)
+_EVERY, _SHAPE, _BEND = (*_DRAGS, "bend"), (*_DRAGS, "twist", "bend"), ("bend",)
+_LIMIT = 8  # steps of a frame, as the widgets take on a machine that is not busy
+_TURN = 0.5 * np.pi
+_TWIST = np.radians(np.arange(5.0, 275.0, 5.0))
+_REPEATS = 3  # of the bend
+_CHECKED = 15  # one frame of so many is compared with the converged pose
+_BUYS = 1.05  # less is hardly felt
+# By how much others must differ to be seen: motions of the hand, diagonals, triangles, relative.
+_SEEN = {"jump": 1.0, "away": 1e-4, "error": 1e-4, "folds": 1.0, "volume": 1e-9}
+QUANTITIES = ("time", "slow", "steps", "distortion", "worst", "detail", *_SEEN)
+_MEASURED = "jump", "error", "distortion", "worst", "detail", "folds", "volume"  # of a `Drag`
+Values = dict[str, tuple[float, float]]  # by quantity, with a mechanism and without it
+BODIES: dict[str, Callable[[], Mesh]] = {
+    "cactus": cactus,
+    "random limbs": lambda: random_body(22_000, 1),
+    "random limbs, loose parts": lambda: with_loose_parts(random_body(5000, 4), 4),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """Something that the method does, and how it is turned off.
+
+    Parameters
+    ----------
+    name, what : str
+        What it is, in one line.
+    owner, attribute, instead : object, str, object
+        While it is off, *owner* has *instead* as its *attribute*.
+    cases : tuple of str
+        What it can make a difference to.
+    binds : bool
+        Whether it is part of the binding.
+    """
+
+    name: str
+    what: str
+    owner: Any
+    attribute: str
+    instead: Any
+    cases: tuple[str, ...]
+    binds: bool = False
+
+    @contextlib.contextmanager
+    def off(self) -> Iterator[None]:
+        """Turn it off within this context."""
+        known = vars(self.owner)[self.attribute]
+        setattr(self.owner, self.attribute, self.instead)
+        try:
+            yield
+        finally:
+            setattr(self.owner, self.attribute, known)
+
+
+class _Plain(Anderson):
+    """No acceleration."""
+
+    def extrapolate(self, p: FloatArray, h: FloatArray, _residual: FloatArray) -> FloatArray:
+        """Return p + h."""
+        return p + h
+
+
+def _without_volumes(*given: Any, added: FloatArray | None = None, **_: object) -> Factor | None:
+    return _full_factor(*given, added=added)
+
+
+_full_factor = gauss_newton.full_factor
+
+
+def _no_quadratic(deformer: Deformer, *_: object) -> FloatArray:
+    return np.zeros_like(deformer._binding.energy.quadratic)
+
+
+MECHANISMS = (
+    Mechanism(
+        "Anderson acceleration", "combines the last steps",
+        gauss_newton, "Anderson", _Plain, _EVERY,
+    ),
+    Mechanism(
+        "extrapolation", "a frame starts ahead, along the way of the last ones",
+        GaussNewton, "_ahead", lambda _, here, *__: here, _DRAGS,
+    ),
+    Mechanism(
+        "exact Hessian", "steps with the derivatives of rotations, not only the paper's matrix",
+        GaussNewton, "_full_factor", lambda *_: None, _EVERY,
+    ),
+    Mechanism(
+        "Hessian of volumes", "the second derivatives of volumes in it",
+        gauss_newton, "full_factor", _without_volumes, _EVERY,
+    ),
+    Mechanism(
+        "coarse volume", "steps preserve the volume of some 2,000 points",
+        sizes, "COARSE_VOLUME", 1 << 62, _EVERY, binds=True,
+    ),
+    Mechanism(
+        "scaled volume", "beyond 20,000 vertices a pose is scaled to its exact volume",
+        sizes, "SCALED_VOLUME", 1 << 62, _EVERY,
+    ),
+    Mechanism(
+        "inside of the body", "rotations of points inside are in the energy",
+        binding, "_with_interior", lambda _, energy: energy, _SHAPE, binds=True,
+    ),
+    Mechanism(
+        "cage stiffness", "the edges of the cages are in the energy",
+        binding, "with_cage_stiffness", lambda energy, *_: energy, _SHAPE, binds=True,
+    ),
+    Mechanism(
+        "anchors of loose parts", "weak springs on parts without handles",
+        Deformer, "_of_loose_parts", _no_quadratic, (*_EVERY, *_SECOND),
+    ),
+    Mechanism(
+        "waypoints", "a far motion goes through intermediate targets",
+        Deformer, "_way_to", lambda *_: iter(()), _BEND,
+    ),
+    Mechanism(
+        "pulled surroundings", "a pull moves a weighted mean around the point",
+        locality.SurfaceSamples, "soft_row", lambda *_: None, _PULLS,
+    ),
+    Mechanism(
+        "flat rings", "the neighbours of a pulled point resist a spike",
+        Deformer, "_with_flat_rings", lambda self, *_: (self._binding.energy, {}), _PULLS,
+    ),
+    Mechanism(
+        "shifts of pulled points", "targets are shifted by the error of the point",
+        Deformer, "_off",
+        lambda self, *_: np.zeros((len(self._constraints.pulled.targets), 3)), _PULLS,
+    ),
+    Mechanism(
+        "load at the press", "forces that are not in balance remain as a constant load",
+        GaussNewton, "unbalanced", lambda _, p, *__: np.zeros_like(p), _SECOND,
+    ),
+    Mechanism(
+        "steadying", "springs that make the pose at the press stable",
+        GaussNewton, "steadying", lambda *_: 0.0, _SECOND,
+    ),
+    Mechanism(
+        "drag on free parts", "a weak drag on a part that is all within reach",
+        Deformer, "_drag_of", _no_quadratic, _SECOND,
+    ),
+    Mechanism(
+        "layers and parts that move together", "distances of a pull go across thin walls",
+        locality.SurfaceSamples, "_joined", property(lambda self: self.edges), _SECOND,
+    ),
+    Mechanism(
+        "acceleration of the finish", "combines its last steps",
+        finisher, "Anderson", _Plain, _BEND,
+    ),
+    Mechanism(
+        "cells of the finish", "rotations are shared over more than a ring of triangles",
+        cell_energy, "_CELL", 0.0, _BEND,
+    ),
+    Mechanism(
+        "proximal weight", "the finish keeps long waves where the cages found them",
+        Deformer, "_cage_weights", property(lambda self: np.zeros(self.mesh.n_vertices)), _BEND,
+    ),
+)  # fmt: skip
+
+
+def run(scale: Scale, progress: Progress | None = None) -> Section:
+    """Return a summary and all ratios, for every mechanism, body and case."""
+    found: dict[tuple[str, str, str], Values] = {}
+    for k, body in enumerate(BODIES):
+        tell(progress, k / len(BODIES), f"mechanisms: {body}")
+        for (name, case), values in run_in(scale.own_process, measured, body).items():
+            found[name, body, case] = values
+    return Section(
+        "What the mechanisms buy",
+        text=[
+            (
+                "Each mechanism is turned off alone; a number is that without it over that with "
+                "it, so that 1 makes no difference. *Time* is of the processor, all frames "
+                "together; *slow* the 90 % of frames; *distortion* the mean of the poses, *worst* "
+                "that of ten triangles, *detail* the change of dihedral angles. Of *jump* "
+                "(farthest that a vertex moves between two frames, over how far the hand does), "
+                "*away* (of a shown pose from the converged one, diagonals), *error* (of handles "
+                "and pulled points, diagonals), *folds* (triangles turned over) and *volume* "
+                "(relative) it is the difference. The first table has the largest numbers of all "
+                "bodies and cases, and in how many of these the mechanism improves something by 5 "
+                "%, or by what can be seen: once the motion of the hand, 1e-4 diagonals, a "
+                "triangle, or 1e-9 of the volume."
+            )
+        ],
+        tables=[_summary(found), *(_table(found, body) for body in BODIES)],
+    )
+
+
+def measured(body: str) -> dict[tuple[str, str], Values]:
+    """Return both values of each quantity, with a mechanism and without it, by name and case."""
+    mesh = BODIES[body]()
+    own, given = Hand.on(mesh), Session(mesh).preparation()
+    found = {}
+    for each in MECHANISMS:
+        without = given
+        if each.binds:
+            with each.off():
+                without = bound_again(own, given)
+        for case in each.cases:
+            found[each.name, case] = compared(each, case, own, (given, without))
+    return found
+
+
+def bound_again(own: Hand, given: Preparation) -> Preparation:
+    """Return a preparation with the regions and cages of *given*."""
+    deformer = Deformer(own.mesh, given.regions, given.cages)
+    return Preparation(given.regions, given.cages, deformer)
+
+
+def compared(
+    mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
+) -> Values:
+    """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
+    ways = [contextlib.nullcontext, mechanism.off]
+    if case == "bend":
+        bends: list[list[dict[str, float]]] = [[], []]
+        for _ in range(_REPEATS):
+            for way, preparation, own_bends in zip(ways, preparations, bends, strict=True):
+                with way():
+                    own_bends.append(bend(own, preparation))
+        pair = [{name: min(each[name] for each in b) for name in b[0]} for b in bends]
+    else:
+        records, drags = [], []
+        for way, preparation in zip(ways, preparations, strict=True):
+            with way():
+                session, goals, pulled = begun(case, own, preparation)
+            records.append(Record(session, preparation, _CHECKED))
+            drags.append(frames(session, goals, pulled, _LIMIT))
+        is_going = [True, True]
+        while any(is_going):
+            for k, (way, record, drag) in enumerate(zip(ways, records, drags, strict=True)):
+                with way():
+                    frame = next(drag, None)
+                    is_going[k] = frame is not None
+                    if frame is not None:
+                        record.add(frame)
+        pair = [_quantities(record) for record in records]
+    return {name: (pair[0][name], pair[1][name]) for name in pair[0]}
+
+
+def begun(
+    case: str, own: Hand, preparation: Preparation
+) -> tuple[Session, list[FloatArray], int | None]:
+    """Return a session in which a drag can begin, its goals, and the vertex that is pulled."""
+    session = ready(preparation, own, handle=case not in _PULLS)
+    if case == "twist":
+        return session, [own.twisted(angle) for angle in _TWIST], None
+    if case == "handle":
+        return session, way_of_handle(own, is_short=True), None
+    if case == "second":
+        mesh = own.mesh
+        session.pull(mesh.vertices[own.tip], own.pulled_to(1.0))
+        session.commit()
+        away = np.linalg.norm(mesh.vertices - mesh.vertices[own.tip], axis=1)
+        smallest = mesh.components == np.bincount(mesh.components).argmin()
+        own = replace(own, tip=int(np.where(smallest, away, -1.0).argmax()))
+    return session, way_of_tip(session, own, is_short=True), own.tip
+
+
+def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
+    """Return `QUANTITIES` of the case "bend"."""
+    session = ready(preparation, own, handle=True)
+    began = time.process_time()
+    turn_and_finish(session, own)
+    seconds, steps = time.process_time() - began, session.effort.steps
+    solution = session.solution
+    assert solution is not None
+    return {
+        "time": seconds,
+        "steps": float(steps),
+        "volume": abs(solution.volume_change),
+        **vars(Shape.of(own.mesh, solution)),
+    }
+
+
+def turn_and_finish(session: Session, own: Hand) -> None:
+    """Turn the handle by 90 degrees at once, and finish the pose."""
+    session.drag(own.targets(_TURN))
+    session.finish()
+
+
+def improves(values: Values) -> bool:
+    """Return whether anything is better with a mechanism than without it, so that it is felt."""
+    return any(
+        without - given >= _SEEN[name] if name in _SEEN else without >= _BUYS * given
+        for name, (given, without) in values.items()
+        if name != "steps"  # which are in the time
+    )
+
+
+def _effect(name: str, values: Values) -> float | None:
+    if name not in values:
+        return None
+    given, without = values[name]
+    return without - given if name in _SEEN else without / given
+
+
+def _summary(found: Mapping[tuple[str, str, str], Values]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for each in MECHANISMS:
+        own = [values for (name, _, _), values in found.items() if name == each.name]
+        effects = ([_effect(name, values) for values in own] for name in QUANTITIES)
+        most = (max((e for e in some if e is not None), default=None) for some in effects)
+        count = sum(map(improves, own))
+        rows.append((each.name, each.what, *most, f"{count} of {len(own)}"))
+    return Table(("mechanism", "what it is", *QUANTITIES, "improves"), rows, "largest", mixed=True)
+
+
+def _table(found: Mapping[tuple[str, str, str], Values], body: str) -> Table:
+    rows: list[tuple[Cell, ...]] = [
+        (name, case, *(_effect(quantity, values) for quantity in QUANTITIES))
+        for (name, own, case), values in found.items()
+        if own == body
+    ]
+    return Table(("mechanism", "case", *QUANTITIES), rows, body, mixed=True)
+
+
+def _quantities(record: Record) -> dict[str, float]:
+    drag = record.drag
+    return {
+        "time": float(drag.times.sum()),
+        "slow": float(np.quantile(drag.times, 0.9)),
+        "steps": float(drag.steps.sum()),
+        "away": float(drag.away.max()),
+        **{name: float(vars(drag)[name]) for name in _MEASURED},
+    }
