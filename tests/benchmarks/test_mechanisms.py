@@ -13,6 +13,8 @@ from vtk_segdeform.benchmarks import mechanisms
 from vtk_segdeform.benchmarks.bodies import Hand, bowl, random_body, with_loose_parts
 from vtk_segdeform.benchmarks.drags import frames, ready
 from vtk_segdeform.benchmarks.mechanisms import MECHANISMS, Mechanism
+from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.models import sphere
 from vtk_segdeform.session import Session
 
 FEW = 6  # frames
@@ -49,6 +51,13 @@ class Body:
         return False
 
 
+def apart():
+    """Return two spheres that share no region."""
+    large, small = sphere(500), sphere(200)
+    vertices = [large.vertices, 0.3 * small.vertices + [3.0, 0.0, 0.0]]
+    return Mesh(np.concatenate(vertices), np.concatenate([large.faces, small.faces + 500]))
+
+
 @pytest.fixture(scope="module")
 def bodies():
     meshes = with_loose_parts(random_body(700, 4), 4), random_body(700, 1), bowl(700)
@@ -56,7 +65,7 @@ def bodies():
         patch.setattr(sizes, "COARSE_VOLUME", 300)
         patch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
         patch.setattr(sizes, "SCALED_VOLUME", 300)
-        yield [Body(mesh) for mesh in meshes]
+        yield [Body(mesh) for mesh in (*meshes, apart())]
 
 
 @pytest.mark.parametrize("mechanism", MECHANISMS, ids=lambda each: each.name)
@@ -67,7 +76,7 @@ def test_without_the_mechanism_poses_differ(bodies, mechanism):
 def test_a_patch_that_patches_nothing_is_noticed(bodies):
     known = MECHANISMS[0]
     same = Mechanism(
-        "nothing", "", known.owner, known.attribute, vars(known.owner)[known.attribute], known.cases
+        "nothing", "", known.place, known.attribute, vars(known.owner)[known.attribute], known.cases
     )
     assert not any(body.differs(same) for body in bodies)
 

@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, IntArray
 from ..mesh import Mesh
-from ..models import sphere
-from ..models.implicit import Limb, implicit_surface, standing_body
+from ..models import Limb, implicit_surface, sphere, standing_body
 
 _HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
 _RING = 0.03  # half the width of the ring around the root

@@ -20,16 +20,15 @@ from typing import Any
 
 import numpy as np
 
-from .. import sizes
 from ..arrays import FloatArray
-from ..deformer import Deformer, binding, locality
-from ..energy import Factor
-from ..finish import cell_energy, finisher
+from ..deformer import Deformer
+from ..energy import Factor, full_factor
+from ..importing import imported
 from ..mesh import Mesh
 from ..models import cactus
 from ..progress import Progress, tell
 from ..session import Preparation, Session
-from ..solver import Anderson, GaussNewton, gauss_newton
+from ..solver import Anderson
 from .bodies import Hand, random_body, with_loose_parts
 from .drags import Record, Shape, frames, ready, way_of_handle, way_of_tip
 from .measuring import run_in
@@ -38,6 +37,8 @@ from .sections import Cell, Section, Table
 
 _DRAGS, _PULLS, _SECOND = ("handle", "pull"), ("pull", "second"), ("second",)
 _EVERY, _SHAPE, _BEND = (*_DRAGS, "bend"), (*_DRAGS, "twist", "bend"), ("bend",)
+_PACKAGE = __name__.partition(".")[0]
+_DEFORMER, _SOLVER = "deformer.deformer:Deformer", "solver.gauss_newton:GaussNewton"
 _LIMIT = 8  # steps of a frame, as the widgets take on a machine that is not busy
 _TURN = 0.5 * np.pi
 _TWIST = np.radians(np.arange(5.0, 275.0, 5.0))
@@ -46,6 +47,7 @@ _CHECKED = 15  # one frame of so many is compared with the converged pose
 _BUYS = 1.05  # less is hardly felt
 # By how much others must differ to be seen: motions of the hand, diagonals, triangles, relative.
 _SEEN = {"jump": 1.0, "away": 1e-4, "error": 1e-4, "folds": 1.0, "volume": 1e-9}
+_IN_TIME = "steps", "slow"  # which explain the time; 90 % of few frames is inexact
 QUANTITIES = ("time", "slow", "steps", "distortion", "worst", "detail", *_SEEN)
 _MEASURED = "jump", "error", "distortion", "worst", "detail", "folds", "volume"  # of a `Drag`
 Values = dict[str, tuple[float, float]]  # by quantity, with a mechanism and without it
@@ -64,8 +66,8 @@ class Mechanism:
     ----------
     name, what : str
         What it is, in one line.
-    owner, attribute, instead : object, str, object
-        While it is off, *owner* has *instead* as its *attribute*.
+    place, attribute, instead : str, str, object
+        While it is off, the module or class at *place* has *instead* as its *attribute*.
     cases : tuple of str
         What it can make a difference to.
     binds : bool
@@ -74,7 +76,7 @@ class Mechanism:
 
     name: str
     what: str
-    owner: Any
+    place: str
     attribute: str
     instead: Any
     cases: tuple[str, ...]
@@ -83,12 +85,20 @@ class Mechanism:
     @contextlib.contextmanager
     def off(self) -> Iterator[None]:
         """Turn it off within this context."""
-        known = vars(self.owner)[self.attribute]
-        setattr(self.owner, self.attribute, self.instead)
+        owner = self.owner
+        known = vars(owner)[self.attribute]
+        setattr(owner, self.attribute, self.instead)
         try:
             yield
         finally:
-            setattr(self.owner, self.attribute, known)
+            setattr(owner, self.attribute, known)
+
+    @property
+    def owner(self) -> Any:
+        """The module or class."""
+        module, _, cls = self.place.partition(":")
+        found = imported(f"{_PACKAGE}.{module}")
+        return getattr(found, cls) if cls else found
 
 
 class _Plain(Anderson):
@@ -100,10 +110,7 @@ class _Plain(Anderson):
 
 
 def _without_volumes(*given: Any, added: FloatArray | None = None, **_: object) -> Factor | None:
-    return _full_factor(*given, added=added)
-
-
-_full_factor = gauss_newton.full_factor
+    return full_factor(*given, added=added)
 
 
 def _no_quadratic(deformer: Deformer, *_: object) -> FloatArray:
@@ -113,84 +120,85 @@ def _no_quadratic(deformer: Deformer, *_: object) -> FloatArray:
 MECHANISMS = (
     Mechanism(
         "Anderson acceleration", "combines the last steps",
-        gauss_newton, "Anderson", _Plain, _EVERY,
+        "solver.gauss_newton", "Anderson", _Plain, _EVERY,
     ),
     Mechanism(
         "extrapolation", "a frame starts ahead, along the way of the last ones",
-        GaussNewton, "_ahead", lambda _, here, *__: here, _DRAGS,
+        _SOLVER, "_ahead", lambda _, here, *__: here, _DRAGS,
     ),
     Mechanism(
         "exact Hessian", "steps with the derivatives of rotations, not only the paper's matrix",
-        GaussNewton, "_full_factor", lambda *_: None, _EVERY,
+        _SOLVER, "_factor_at", lambda solver, _: solver._factor, _EVERY,
     ),
     Mechanism(
         "Hessian of volumes", "the second derivatives of volumes in it",
-        gauss_newton, "full_factor", _without_volumes, _EVERY,
+        "solver.gauss_newton", "full_factor", _without_volumes, _EVERY,
     ),
     Mechanism(
         "coarse volume", "steps preserve the volume of some 2,000 points",
-        sizes, "COARSE_VOLUME", 1 << 62, _EVERY, binds=True,
+        "sizes", "COARSE_VOLUME", 1 << 62, _EVERY, binds=True,
     ),
     Mechanism(
         "scaled volume", "beyond 20,000 vertices a pose is scaled to its exact volume",
-        sizes, "SCALED_VOLUME", 1 << 62, _EVERY,
+        "sizes", "SCALED_VOLUME", 1 << 62, _EVERY, binds=True,
     ),
     Mechanism(
         "inside of the body", "rotations of points inside are in the energy",
-        binding, "_with_interior", lambda _, energy: energy, _SHAPE, binds=True,
+        "deformer.binding", "_with_interior", lambda _, energy: energy, _SHAPE, binds=True,
     ),
     Mechanism(
         "cage stiffness", "the edges of the cages are in the energy",
-        binding, "with_cage_stiffness", lambda energy, *_: energy, _SHAPE, binds=True,
+        "deformer.binding", "with_cage_stiffness", lambda energy, *_: energy, _SHAPE, binds=True,
     ),
     Mechanism(
         "anchors of loose parts", "weak springs on parts without handles",
-        Deformer, "_of_loose_parts", _no_quadratic, (*_EVERY, *_SECOND),
+        _DEFORMER, "_of_loose_parts", _no_quadratic, (*_EVERY, *_SECOND),
     ),
     Mechanism(
         "waypoints", "a far motion goes through intermediate targets",
-        Deformer, "_way_to", lambda *_: iter(()), _BEND,
+        _DEFORMER, "_way_to", lambda *_: iter(()), _BEND,
     ),
     Mechanism(
         "pulled surroundings", "a pull moves a weighted mean around the point",
-        locality.SurfaceSamples, "soft_row", lambda *_: None, _PULLS,
+        "deformer.locality:SurfaceSamples", "soft_row", lambda *_: None, _PULLS,
     ),
     Mechanism(
         "flat rings", "the neighbours of a pulled point resist a spike",
-        Deformer, "_with_flat_rings", lambda self, *_: (self._binding.energy, {}), _PULLS,
+        _DEFORMER, "_with_flat_rings", lambda self, *_: (self._binding.energy, {}), _PULLS,
     ),
     Mechanism(
         "shifts of pulled points", "targets are shifted by the error of the point",
-        Deformer, "_off",
+        _DEFORMER, "_off",
         lambda self, *_: np.zeros((len(self._constraints.pulled.targets), 3)), _PULLS,
     ),
     Mechanism(
         "load at the press", "forces that are not in balance remain as a constant load",
-        GaussNewton, "unbalanced", lambda _, p, *__: np.zeros_like(p), _SECOND,
+        _SOLVER, "unbalanced", lambda _, p, *__: np.zeros_like(p), _SECOND,
     ),
     Mechanism(
         "steadying", "springs that make the pose at the press stable",
-        GaussNewton, "steadying", lambda *_: 0.0, _SECOND,
+        _SOLVER, "steadying", lambda *_: 0.0, _SECOND,
     ),
     Mechanism(
         "drag on free parts", "a weak drag on a part that is all within reach",
-        Deformer, "_drag_of", _no_quadratic, _SECOND,
+        _DEFORMER, "_drag_of", _no_quadratic, _SECOND,
     ),
     Mechanism(
         "layers and parts that move together", "distances of a pull go across thin walls",
-        locality.SurfaceSamples, "_joined", property(lambda self: self.edges), _SECOND,
+        "deformer.locality:SurfaceSamples", "_joined", property(lambda self: self.edges), _SECOND,
     ),
     Mechanism(
         "acceleration of the finish", "combines its last steps",
-        finisher, "Anderson", _Plain, _BEND,
+        "finish.finisher", "Anderson", _Plain, _BEND,
     ),
     Mechanism(
         "cells of the finish", "rotations are shared over more than a ring of triangles",
-        cell_energy, "_CELL", 0.0, _BEND,
+        "finish.cell_energy", "_CELL", 0.0, _BEND,
     ),
     Mechanism(
         "proximal weight", "the finish keeps long waves where the cages found them",
-        Deformer, "_cage_weights", property(lambda self: np.zeros(self.mesh.n_vertices)), _BEND,
+        _DEFORMER, "_cage_weights",
+        property(lambda self: np.zeros(self.mesh.n_vertices)), _BEND,
     ),
 )  # fmt: skip
 
@@ -321,7 +329,7 @@ def improves(values: Values) -> bool:
     return any(
         without - given >= _SEEN[name] if name in _SEEN else without >= _BUYS * given
         for name, (given, without) in values.items()
-        if name != "steps"  # which are in the time
+        if name not in _IN_TIME
     )
 
 

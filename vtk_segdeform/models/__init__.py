@@ -7,12 +7,16 @@ The files, in reading order:
     remeshing    edge splits, edge flips, relaxation and refinement
 """
 
+from .implicit import Limb, implicit_surface, standing_body
 from .shapes import bar, cactus, dinosaur, sphere, torus
 
 __all__ = [
+    "Limb",
     "bar",
     "cactus",
     "dinosaur",
+    "implicit_surface",
     "sphere",
+    "standing_body",
     "torus",
 ]
