@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.deformer.path import Path
 from vtk_segdeform.errors import (
     ArgumentError,
     CageError,
@@ -486,3 +488,104 @@ def test_the_number_of_cage_vertices_is_named_if_it_is_none(number):
     mesh = SCENE.mesh
     with pytest.raises(ArgumentError, match="n_cage_vertices must be a whole number, 4 or more"):
         deform(mesh, [0], [9], mesh.vertices[[9]], n_cage_vertices=number)
+
+
+def test_the_mesh_moves_with_its_cages_by_affine_maps():
+    deformer, turn = SCENE.held(), rotation([1.0, 2.0, 3.0], 1.2)
+    rest = [cage.vertices for cage in SCENE.cages]
+    assert_allclose(deformer.surface(rest), VERTICES, atol=1e-15)
+    affine, shift = turn @ np.diag([1.1, 0.9, 1.3]), np.array([3.0, -1.0, 2.0])
+    moved = deformer.surface([p @ affine.T + shift for p in rest])
+    assert_allclose(moved, VERTICES @ affine.T + shift, atol=1e-9)
+    turned = deformer.rotations([p @ turn.T + shift for p in rest])
+    assert_allclose(turned, np.broadcast_to(turn, (len(VERTICES), 3, 3)), atol=1e-7)
+    with pytest.raises(CageError, match="cage by cage"):
+        deformer.rotations(rest[:1])
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e4])
+def test_other_points_are_carried_along(shift):
+    scene = SCENE.transformed(shift=np.full(3, shift))
+    deformer = scene.held()
+    x, points = scene.mesh.vertices, 0.5 * SCENE.mesh.vertices[::7] + shift
+    assert_allclose(deformer.carry(points), points, atol=1e-9 * (1.0 + shift))
+    solution = deformer.solve(scene.turned(30, about=np.full(3, shift)))
+    assert_allclose(deformer.carry(x[::9]), solution.vertices[::9], atol=0.02)
+    bound = deformer.passengers(points)
+    assert_array_equal(bound.moved(solution.cage_vertices), deformer.carry(points))
+
+
+def test_fixed_vertices_are_kept_where_they_are_wanted():
+    deformer = SCENE.held()
+    places = VERTICES[SCENE.fixed] + [-0.2, 0.1, 0.0]
+    other = deformer.hold(fixed=SCENE.fixed, handle=SCENE.handle, fixed_at=places)
+    solution = other.solve(REST)
+    assert solution.fixed_error < 1e-3
+    assert_allclose(solution.vertices[SCENE.fixed], places, atol=1e-3 * SCENE.mesh.diagonal)
+    assert other.finish(solution).fixed_error < 1e-12
+    says = f"fixed_at must give one point for each of the {len(places)} fixed vertices"
+    with pytest.raises(ConstraintError, match=says):
+        deformer.hold(fixed=SCENE.fixed, fixed_at=places[:-1])
+    with pytest.raises(ConstraintError, match="mesh sizes away"):
+        deformer.hold(fixed=SCENE.fixed, fixed_at=1e5 * places)
+
+
+def test_options_of_a_deformer_are_kept_unless_they_are_changed():
+    first = SCENE.deformer(preserve_volume=False, avoid_contact=True)
+    assert first.preserved_volumes == ()
+    same = first.hold(handle=[0])
+    assert same.preserved_volumes == ()
+    assert same._constraints.contact is not None
+    other = first.hold(handle=[0], preserve_volume=True, avoid_contact=False)
+    assert len(other.preserved_volumes) == 1
+    assert other._constraints.contact is None
+    regions = first.hold(handle=[0], preserve_region_volumes=True)
+    assert len(regions.preserved_volumes) == SCENE.regions.n_regions
+    assert len(regions.hold(handle=[1], preserve_volume=True).preserved_volumes) == 2
+    sheet = Mesh(VERTICES, SCENE.mesh.faces[1:])
+    open_mesh = Deformer(sheet, Regions(sheet, SCENE.regions.membership), SCENE.cages, lids=False)
+    assert not open_mesh.has_volume
+    assert not open_mesh.hold(handle=[0]).has_volume
+    assert open_mesh.hold(handle=[0], lids=True).has_volume
+    assert open_mesh.hold(handle=[0], lids=True).hold(handle=[1]).has_volume
+    for option in ("preserve_volume", "preserve_region_volumes", "avoid_contact", "lids"):
+        with pytest.raises(ArgumentError, match=option):
+            first.hold(**{option: "yes"})
+        with pytest.raises(ArgumentError, match=option):
+            SCENE.deformer(**{option: "yes"})
+
+
+def test_a_pickled_deformer_continues_like_the_deformer():
+    deformer = SCENE.held().copy()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    again = pickle.loads(pickle.dumps(deformer))
+    assert not again.fixed.flags.writeable
+    assert not again.handle.flags.writeable
+    targets = SCENE.turned(30)
+    assert_array_equal(again.solve(targets).vertices, deformer.solve(targets).vertices)
+
+
+def test_a_block_that_fails_leaves_the_deformer_as_it_was():
+    deformer, other = SCENE.held(), SCENE.held()
+    with pytest.raises(KeyError), deformer.restoring():
+        deformer.solve(SCENE.turned(50))
+        raise KeyError
+    assert_array_equal(deformer.solve(SCENE.turned(20)).vertices, other.solve(SCENE.turned(20)).vertices)
+    with deformer.restoring():
+        deformer.solve(SCENE.turned(30))
+    assert_allclose(deformer.carry(VERTICES[:1]), other.solve(SCENE.turned(30)).vertices[:1], atol=0.02)
+
+
+def test_a_cache_that_is_no_path_is_refused_by_name():
+    with pytest.raises(ArgumentError, match="^cache must be"):
+        SCENE.deformer(cache=3.5)
+
+
+def test_a_small_mesh_is_solved_once_for_its_targets(monkeypatch):
+    """Only scaling a large one to its volume, by much, takes further solves."""
+    solves, solve = [], Path.solve
+    monkeypatch.setattr(Path, "solve", lambda *given: solves.append(1) or solve(*given))
+    SCENE.held().solve(SCENE.turned(4))
+    assert len(solves) == 1
+    SCENE.held(preserve_volume=False).solve(SCENE.turned(4))
+    assert len(solves) == 2
