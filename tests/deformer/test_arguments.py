@@ -73,7 +73,9 @@ def test_vertices_are_fixed_or_in_a_handle():
 def test_a_vertex_is_one_of_the_mesh():
     assert [arguments.checked_vertex(MESH, k) for k in (0, 65)] == [0, 65]
     for wrong in (-1, 66, 1.5, "1"):
-        refused("vertex must be a whole number, 0 to 65; got", arguments.checked_vertex, MESH, wrong)
+        refused(
+            "vertex must be a whole number, 0 to 65; got", arguments.checked_vertex, MESH, wrong
+        )
 
 
 def test_a_place_is_a_vertex_or_near_the_surface():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -284,7 +285,9 @@ def test_no_rotation_cluster_spans_two_bodies_or_regions(monkeypatch):
     mesh = Mesh(*together(icosphere(2), (icosphere(2)[0] * 0.9 + [1.2, 0.0, 2.1], icosphere(2)[1])))
     regions = Regions.from_labels(mesh, (mesh.vertices[:, 2] > 2.0).astype(int), overlap=2)
     ball, cage_faces = icosphere(1)
-    cages = [Cage(r * ball + at, cage_faces) for r, at in ((3.5, [0.6, 0, 0.9]), (2.5, [1.2, 0, 2.4]))]
+    cages = [
+        Cage(r * ball + at, cage_faces) for r, at in ((3.5, [0.6, 0, 0.9]), (2.5, [1.2, 0, 2.4]))
+    ]
     rest_cages = np.concatenate([cage.vertices for cage in cages])
     inputs = binding.BindingInputs(mesh, regions, cages, rest_cages, 1.0, 8)
     assert len(np.unique(inputs.parts)) == 3
@@ -303,3 +306,25 @@ def test_no_rotation_cluster_spans_two_bodies_or_regions(monkeypatch):
     for clusters in (first, joined[0][first]):
         for k in range(clusters.max() + 1):
             assert len(np.unique(inputs.parts[clusters == k])) == 1
+
+
+class Trap:
+    """Its unpickling would leave a trace."""
+
+    sprung: ClassVar[list[int]] = []
+
+    def __reduce__(self):
+        return Trap.sprung.append, (1,)
+
+
+def test_no_file_of_a_binding_is_unpickled(tmp_path, counted):
+    path = bound_in(tmp_path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays["quadratic"] = np.array([Trap()], dtype=object)
+    with open(path, "wb") as file:
+        np.savez(file, allow_pickle=True, **arrays)
+    counted.clear()
+    SCENE.deformer(cache=tmp_path)
+    assert len(counted) == 1
+    assert Trap.sprung == []

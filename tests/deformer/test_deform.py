@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.testing import assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform import sizes
-from vtk_segdeform.deformer import deform
+from vtk_segdeform.deformer import deform, pull
 from vtk_segdeform.deformer.deform import finished, is_finished, solved_along, stages_of
 from vtk_segdeform.errors import ArgumentError, Cancelled, ConstraintError, MeshError
 
@@ -101,3 +102,37 @@ def test_a_pose_that_cannot_be_finished_is_an_error_only_if_it_was_asked_for(cap
     same = finished(failing(None), solution, False, progress=lambda *given: told.append(given))
     assert same is solution
     assert told == [(1.0, "solved")]
+
+
+@dataclass
+class Pose:
+    """Something like a solution."""
+
+    steps: int
+
+
+def test_every_target_of_a_way_has_an_equal_part_of_the_progress():
+    def solve(targets, progress):
+        progress(0.0, "begin")
+        progress(1.0, "end")
+        return Pose(len(targets))
+
+    told, way = [], [X[:2], X[:3], X[:4], X[:5]]
+    solver = SimpleNamespace(solve=solve)
+    assert solved_along(solver, way, progress=lambda share, _: told.append(share)) == Pose(14)
+    assert told == pytest.approx([0.0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1.0])
+
+
+@pytest.mark.parametrize("option", ["lids", "avoid_contact", "refine", "preserve_volume", "mesh"])
+def test_wrong_options_are_refused_before_the_work(option):
+    def work(*_):
+        raise AssertionError("it has begun")
+
+    given = {"mesh": SCENE.mesh, option: "yes", "progress": work}
+    with pytest.raises((ArgumentError, MeshError), match=rf"^{option} must be"):
+        deform(fixed=[0], handle=[1], targets=X[[1]], **given)
+    if option != "preserve_volume":
+        with pytest.raises((ArgumentError, MeshError), match=rf"^{option} must be"):
+            pull(vertex=1, to=X[1], **given)
+    with pytest.raises(ConstraintError, match=r"1 vertex is both pins and handle"):
+        pull(SCENE.mesh, 1, X[1], pins=[1], progress=work)

@@ -23,6 +23,7 @@ from vtk_segdeform.errors import (
     CageError,
     Cancelled,
     ConstraintError,
+    MeshError,
     RegionError,
 )
 from vtk_segdeform.geometry.rotations import rigid_fit
@@ -567,17 +568,25 @@ def test_a_pickled_deformer_continues_like_the_deformer():
 
 def test_a_block_that_fails_leaves_the_deformer_as_it_was():
     deformer, other = SCENE.held(), SCENE.held()
-    with pytest.raises(KeyError), deformer.restoring():
-        deformer.solve(SCENE.turned(50))
-        raise KeyError
-    assert_array_equal(deformer.solve(SCENE.turned(20)).vertices, other.solve(SCENE.turned(20)).vertices)
+
+    def fail():
+        with deformer.restoring():
+            deformer.solve(SCENE.turned(50))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    again = deformer.solve(SCENE.turned(20))
+    assert_array_equal(again.vertices, other.solve(SCENE.turned(20)).vertices)
     with deformer.restoring():
         deformer.solve(SCENE.turned(30))
-    assert_allclose(deformer.carry(VERTICES[:1]), other.solve(SCENE.turned(30)).vertices[:1], atol=0.02)
+    assert_allclose(
+        deformer.carry(VERTICES[:1]), other.solve(SCENE.turned(30)).vertices[:1], atol=0.02
+    )
 
 
 def test_a_cache_that_is_no_path_is_refused_by_name():
-    with pytest.raises(ArgumentError, match="^cache must be"):
+    with pytest.raises(ArgumentError, match=r"^cache must be"):
         SCENE.deformer(cache=3.5)
 
 
@@ -589,3 +598,90 @@ def test_a_small_mesh_is_solved_once_for_its_targets(monkeypatch):
     assert len(solves) == 1
     SCENE.held(preserve_volume=False).solve(SCENE.turned(4))
     assert len(solves) == 2
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_pull_is_the_same_in_every_unit(scale):
+    d, vertex = SCENE.mesh.diagonal, int(VERTICES[:, 2].argmax())
+    scenes, poses = (SCENE, SCENE.transformed(scale=scale)), []
+    for scene, unit in zip(scenes, (1.0, scale), strict=True):
+        deformer = scene.held().hold(fixed=SCENE.fixed, handle=[vertex])
+        local = deformer.local(vertex, 0.25 * d * unit, 0.1 * d * unit, follows=1.0)
+        solution = local.solve(scene.mesh.vertices[[vertex]] + [0.0, 0.0, 0.05 * d * unit])
+        poses.append([each.vertices / unit for each in (solution, local.finish(solution))])
+    for here, there in zip(*poses, strict=True):
+        assert_allclose(there, here, atol=1e-6 * d)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0])
+def test_weights_of_the_finish_are_a_quarter_of_a_cage_vertex_over_its_region(scale):
+    scene = SCENE.transformed(scale=scale)
+    deformer, areas = scene.held(), scene.mesh.vertex_areas
+    found = deformer._cage_weights
+    assert found.sum() == pytest.approx(36 / 4)
+    alone = scene.regions.weights == 1.0
+    for own, weights in zip(alone, scene.regions.weights, strict=True):
+        density = 18 / (weights * areas).sum()
+        assert_allclose(found[own], 0.25 * density * areas[own])
+
+
+def test_a_pose_is_plausible_within_two_sizes_and_one_and_a_half_motions():
+    deformer = SCENE.held()
+    size, rest = deformer._frame.size, deformer._rest.vertices[SCENE.handle]
+    at_rest = deformer._rest_cages
+    for moved in (0.0, 1.0):
+        goal, limit = rest + [moved, 0.0, 0.0], 2.0 + 1.5 * moved
+        for share, ok in ((0.99, True), (1.01, False)):
+            x = VERTICES.copy()
+            x[7, 1] += share * limit * size
+            assert deformer._is_plausible(x, goal, at_rest) == ok
+            far = at_rest + [0.0, 5.0, 0.0]
+            assert deformer._is_plausible(x, goal, far)
+
+
+def test_a_pose_far_from_every_reasonable_one_is_replaced_by_the_last_one(monkeypatch):
+    deformer, targets = SCENE.held(), SCENE.turned(20)
+    before = deformer.solve(targets)
+    with monkeypatch.context() as wrong:
+        wrong.setattr(Deformer, "_is_plausible", lambda *_: False)
+        missed = deformer.solve(SCENE.turned(40))
+    assert missed.status is Status.MISSED
+    assert missed.remaining == np.inf
+    assert_allclose(missed.vertices, before.vertices, atol=1e-12)
+    for own, expected in zip(missed.cage_vertices, before.cage_vertices, strict=True):
+        assert_allclose(own, expected, atol=1e-12)
+    off = np.linalg.norm(missed.vertices[SCENE.handle] - SCENE.turned(40), axis=1).max()
+    assert missed.handle_error == pytest.approx(off / SCENE.mesh.diagonal)
+    assert missed.volume_change == pytest.approx(before.volume_change, abs=1e-14)
+    assert_allclose(deformer.solve(targets).vertices, before.vertices, atol=1e-5)
+
+
+def test_a_frame_of_a_drag_tells_what_remains_only_once_it_has_converged():
+    deformer, targets = SCENE.held(), SCENE.turned(5)
+    frame = deformer.solve(targets, max_steps=1)
+    assert (frame.status, frame.remaining) == (Status.STEP_LIMIT, np.inf)
+    for _ in range(20):
+        frame = deformer.solve(targets, max_steps=20)
+    assert (frame.status, frame.remaining) == (Status.CONVERGED, 0.0)
+    solution = deformer.solve(targets)
+    assert 0.0 < solution.remaining <= 1e-4
+
+
+def test_what_is_no_mesh_region_or_callback_is_refused_by_name():
+    with pytest.raises(MeshError, match=r"^mesh must be"):
+        Deformer(None, SCENE.regions, SCENE.cages)
+    with pytest.raises(RegionError, match=r"^regions must be"):
+        Deformer(SCENE.mesh, None, SCENE.cages)
+    with pytest.raises(ArgumentError, match=r"^cages"):
+        Deformer(SCENE.mesh, SCENE.regions, [SCENE.mesh] * 2)
+    with pytest.raises(ArgumentError, match=r"^progress must be"):
+        SCENE.held().solve(REST, progress=3)
+    with pytest.raises(ArgumentError, match=r"^solution must be"):
+        SCENE.held().finish(VERTICES)
+
+
+def test_binding_with_few_rotation_clusters_reports_every_stage_in_order():
+    seen = []
+    SCENE.deformer(rotation_groups=40, progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0

@@ -344,6 +344,7 @@ def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monk
         ({"reach": 0.0}, "reach must be a positive number"),
         ({"reach": np.nan}, "reach must be a positive number"),
         ({"spread": np.inf}, "spread must be a positive number"),
+        ({"spread": 0.0}, "spread must be a positive number"),
         ({"spread": "wide"}, "spread must be a positive number"),
         ({"follows": 1.5}, "follows must be a number from 0 to 1"),
         ({"follows": None}, "follows must be a number from 0 to 1"),
@@ -435,7 +436,12 @@ def two_sheets(gap: float, *, apart: float) -> SurfaceSamples:
 def test_the_sides_of_a_thin_wall_are_joined_if_the_cages_cannot_move_them_apart():
     """Nearer, and moved more alike, than the ends of an edge: 1/4, and 1/2 in rows."""
     point = SurfacePoint.at_vertex(12)
-    for gap, apart, joined in ((0.1, 0.0, True), (0.1, 0.2, True), (0.1, 0.6, False), (0.5, 0.0, False)):
+    for gap, apart, joined in (
+        (0.1, 0.0, True),
+        (0.1, 0.2, True),
+        (0.1, 0.6, False),
+        (0.5, 0.0, False),
+    ):
         away = two_sheets(gap, apart=apart).distances(point)
         assert away[12] == 0.0
         assert np.isfinite(away[:25]).all()
@@ -448,7 +454,9 @@ def test_the_sides_of_a_thin_wall_are_joined_if_the_cages_cannot_move_them_apart
 
 def test_sheets_that_face_the_same_way_are_joined_only_if_they_are_two_components():
     samples = two_sheets(0.1, apart=0.0)
-    same = replace(samples, faces=np.where(samples.faces < 25, samples.faces, samples.faces[:, ::-1]))
+    same = replace(
+        samples, faces=np.where(samples.faces < 25, samples.faces, samples.faces[:, ::-1])
+    )
     assert np.isfinite(same.distances(SurfacePoint.at_vertex(0))).all()
     edges = samples.edges.tolil()
     edges[24, 49] = edges[49, 24] = 0.1  # joined at a far corner
@@ -512,3 +520,16 @@ def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
     a, b = samples.cells[SCENE.mesh.edges].T
     joined = samples.edges.toarray() > 0.0
     assert joined[a, b][a != b].all()
+
+
+def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    samples = SCENE.deformer()._samples
+    surface, x = samples.contact_surface, SCENE.deformer()._rest.vertices
+    normals = surface.normals(samples.points)
+    for cell, normal in enumerate(normals):
+        over = (x[samples.cells == cell] - samples.points[cell]) @ normal
+        height = max(0.0, over.max())
+        expected = min(0.2 * surface.radii[cell] + height, surface.gaps[cell])
+        assert surface.margins[cell] == pytest.approx(expected)

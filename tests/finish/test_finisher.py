@@ -533,7 +533,9 @@ def test_the_factored_matrix_solves_as_the_dense_one(n, compiled, monkeypatch):
     monkeypatch.setattr(sizes, "COMPILED", 0 if compiled else 10**9)
     rng = np.random.default_rng(n)
     some = sparse.random_array((n, n), density=0.1, rng=rng)
-    matrix = sparse.csr_array(some @ some.T + sparse.eye_array(n)) if n else sparse.csr_array((0, 0))
+    matrix = (
+        sparse.csr_array(some @ some.T + sparse.eye_array(n)) if n else sparse.csr_array((0, 0))
+    )
     right = rng.normal(size=(n, 3))
     expected = np.linalg.solve(matrix.toarray(), right) if n else right
     assert_allclose(factored(matrix)(right), expected, atol=1e-12)

@@ -165,7 +165,9 @@ def test_two_triangles_cross_in_a_segment_of_known_length_and_slope():
 
 
 def test_the_gradient_is_bounded_where_an_edge_is_almost_in_the_plane():
-    points = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1e-6], [2, 1, -1e-6], [1.5, 2, 1e-6]])
+    points = np.array(
+        [[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1e-6], [2, 1, -1e-6], [1.5, 2, 1e-6]]
+    )
     length, slope = contour(points, np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]]))
     assert length > 0.1
     assert 1.0 < np.abs(slope).max() <= 2.0 * untangling._STEEPEST

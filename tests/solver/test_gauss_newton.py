@@ -219,7 +219,9 @@ def test_a_copy_continues_and_a_fresh_solver_begins():
     deformer.solve(SCENE.turned(10), max_steps=3)
     path, places = deformer._path, deformer._constraints.places(deformer._path.targets)
     begun, options = path.solver, SolverOptions(max_steps=3)
-    first, second = (each.minimise(path.p, places, options) for each in (begun.copy(), begun.copy()))
+    first, second = (
+        each.minimise(path.p, places, options) for each in (begun.copy(), begun.copy())
+    )
     assert np.array_equal(first.p, second.p)
     anew = [begun.fresh().minimise(path.p, places, options).p for _ in range(2)]
     assert np.array_equal(*anew)

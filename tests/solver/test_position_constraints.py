@@ -91,4 +91,6 @@ def test_every_set_has_the_same_weight_in_all_whatever_its_size(monkeypatch, sha
         assert (near.sum(axis=0) == 1).all()
     without = position_term(subspace, SCENE.mesh, [], 6.0)
     assert without.rows.shape == (0, subspace.n_columns)
-    assert without.toward(np.empty((0, 3))).value_and_slope(np.ones((subspace.n_columns, 3)))[0] == 0
+    assert (
+        without.toward(np.empty((0, 3))).value_and_slope(np.ones((subspace.n_columns, 3)))[0] == 0
+    )

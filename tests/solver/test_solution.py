@@ -33,7 +33,12 @@ def solution(**changes) -> Solution:
         "region_volumes": Counted(np.array([0.1, 0.2])), "crossed": Counted(np.array([3, 4])),
         "folded": Counted(np.array([5])),
     }  # fmt: skip
-    given = {"cage_vertices": (X[:2],), "steps": 7, "status": Status.CONVERGED, "merits": (2.0, 1.0)}
+    given = {
+        "cage_vertices": (X[:2],),
+        "steps": 7,
+        "status": Status.CONVERGED,
+        "merits": (2.0, 1.0),
+    }
     return Solution(**{"vertices": X, **given, **functions, **changes})
 
 
