@@ -189,6 +189,8 @@ def test_arguments_that_cannot_be_solved_are_refused():
         Deformer.as_printed(scene.mesh, scene.regions, scene.cages[:1], fixed=[0], handle=())
     with pytest.raises(ArgumentError, match=r"cages\[1\]"):
         Deformer.as_printed(scene.mesh, scene.regions, [scene.cages[0], None], fixed=[0], handle=())
+    with pytest.raises(ArgumentError, match=r"^cages must be"):
+        Deformer.as_printed(scene.mesh, scene.regions, 3, fixed=[0], handle=())
     sheet = Mesh(scene.mesh.vertices, scene.mesh.faces[1:])
     with pytest.raises(MeshError, match="closed"):
         Deformer.as_printed(sheet, Regions.single(sheet), scene.cages[:1], fixed=[0], handle=())

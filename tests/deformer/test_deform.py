@@ -14,7 +14,7 @@ from scenes import sausage
 from vtk_segdeform import sizes
 from vtk_segdeform.deformer import deform, pull
 from vtk_segdeform.deformer.deform import finished, is_finished, solved_along, stages_of
-from vtk_segdeform.errors import ArgumentError, Cancelled, ConstraintError, MeshError
+from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, ConstraintError, MeshError
 
 SCENE = sausage(2, is_coarse=True)
 X = SCENE.mesh.vertices
@@ -134,5 +134,7 @@ def test_wrong_options_are_refused_before_the_work(option):
     if option != "preserve_volume":
         with pytest.raises((ArgumentError, MeshError), match=rf"^{option} must be"):
             pull(vertex=1, to=X[1], **given)
+    with pytest.raises(CageError, match=r"^n_cage_vertices must be"):
+        pull(SCENE.mesh, 1, X[1], n_regions=1, n_cage_vertices=3)
     with pytest.raises(ConstraintError, match=r"1 vertex is both pins and handle"):
         pull(SCENE.mesh, 1, X[1], pins=[1], progress=work)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 from solids import TETRAHEDRON, exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import sizes
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deform import deform
@@ -31,6 +33,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.regions.segmentation import segment
+from vtk_segdeform.solver import Contact, waypoints
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2, is_coarse=True)
@@ -685,3 +688,45 @@ def test_binding_with_few_rotation_clusters_reports_every_stage_in_order():
     SCENE.deformer(rotation_groups=40, progress=lambda fraction, _: seen.append(fraction))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("degrees", [2, 40, 90])
+def test_legs_toward_a_contact_are_little_longer_than_the_clearance(
+    clearance, degrees, monkeypatch
+):
+    """By half a sample, but as long as one at least; without a contact they are of usual length."""
+    monkeypatch.setattr(Contact, "clearance", lambda _, p, most: min(clearance, most))
+    free, avoiding = SCENE.held(), SCENE.held(avoid_contact=True)
+    goal, start = free._frame.inward(SCENE.turned(degrees)), free._path.targets
+    usual = [start, *waypoints(start, goal, free._constraints.handles)]
+    assert_array_equal([start, *free._way_to(goal), goal], usual)
+    way = [start, *avoiding._way_to(goal), goal]
+    legs = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(way)]
+    spacing = avoiding._constraints.contact.surface.spacing
+    longest = max(clearance + 0.5 * spacing, spacing)
+    assert 0.05 < spacing < 0.06
+    if degrees == 2:  # shorter than a sample
+        assert len(legs) == 1
+    else:
+        assert 0.7 * longest < max(legs) <= longest
+
+
+def test_samples_of_a_body_are_held_where_half_of_their_vertices_are(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    deformer = SCENE.deformer(avoid_contact=True)
+    cells, is_held = deformer._samples.cells, deformer._constraints.contact.held
+    ids = np.concatenate([SCENE.fixed, SCENE.handle])
+    shares = [np.isin(np.flatnonzero(cells == k), ids).mean() for k in range(len(is_held))]
+    assert_array_equal(is_held, np.array(shares) >= 0.5)
+    assert any(0.0 < share < 0.5 for share in shares)
+
+
+def test_a_deformer_without_options_is_the_one_with_their_defaults():
+    plain = SCENE.deformer().solve(SCENE.turned(30))
+    same = SCENE.deformer(
+        preserve_volume=True, preserve_region_volumes=False, stretch=1.0, tolerance=1e-7,
+        max_steps=500, avoid_contact=False, rotation_groups=300, lids=None,
+    ).solve(SCENE.turned(30))  # fmt: skip
+    assert_array_equal(plain.vertices, same.vertices)

@@ -533,3 +533,30 @@ def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monk
         height = max(0.0, over.max())
         expected = min(0.2 * surface.radii[cell] + height, surface.gaps[cell])
         assert surface.margins[cell] == pytest.approx(expected)
+
+
+def test_a_ring_needs_three_neighbours_away_from_its_point():
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    ring = Ring.around(tetrahedron, x, SurfacePoint.at_vertex(0))
+    assert ring.edge == pytest.approx(1.0)
+    assert_allclose(ring.offsets[0], -np.full(3, 1.0 / 3.0), atol=1e-12)
+    assert_allclose(ring.weights, [1.0, *[0.1 / 3.0] * 3])
+    assert Ring.around(tetrahedron, 0.0 * x, SurfacePoint.at_vertex(0)) is None
+    triangle = Mesh(x[:3], [[0, 1, 2]])
+    assert Ring.around(triangle, x[:3], SurfacePoint.at_vertex(0)) is None
+    assert Ring.around(tetrahedron, x, SurfacePoint.of([0, 1], [0.5, 0.5])) is None
+
+
+def test_parts_beyond_the_reach_follow_by_their_area():
+    """Along a line of twelve samples seven lie beyond on one side, and two on the other."""
+    samples = chain(12)
+    point = SurfacePoint.at_vertex(8)
+    for follows, count in ((0.28, 0), (0.29, 2)):
+        weights = samples.weights(point, 1.0, follows)
+        assert np.count_nonzero(weights[:7]) == 7
+        assert np.count_nonzero(weights[10:]) == 2 - count
+    large = replace(samples, areas=np.where(np.arange(12) > 9, 10.0, 1.0) / 30.0)
+    weights = large.weights(point, 1.0, 0.9)
+    assert not weights[:7].any()
+    assert weights[10:].all()
