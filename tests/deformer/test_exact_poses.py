@@ -78,6 +78,9 @@ def test_a_scaled_pose_does_not_depend_on_the_poses_before():
         assert abs(deformer.solve(SCENE.turned(degrees), max_steps=2).volume_change) < 1e-13
     there = deformer.solve(TARGETS)
     deformer.resume(there.cage_vertices, TARGETS)
+    steps = deformer._path.solver.volumes  # which go on preserving the coarse volume of this pose
+    at = steps.surface.map(deformer._path.p)
+    assert max(abs(each.relative(at)) for each in steps.constraints) < 1e-12
     resumed = deformer.solve(TARGETS)
     for other in (there, resumed):
         away = np.linalg.norm(other.vertices - direct.vertices, axis=1).max()
