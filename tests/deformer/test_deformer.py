@@ -603,13 +603,19 @@ def test_a_small_mesh_is_solved_once_for_its_targets(monkeypatch):
     assert len(solves) == 2
 
 
+@pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
-def test_a_pull_is_the_same_in_every_unit(scale):
+def test_a_pull_is_the_same_in_every_unit(scale, beside):
+    """Also beside a fixed vertex, where the surface around the point is pulled."""
     d, vertex = SCENE.mesh.diagonal, int(VERTICES[:, 2].argmax())
+    near = np.setdiff1d(SCENE.mesh.adjacency[[vertex]].indices, [vertex])
+    fixed = np.append(SCENE.fixed, near[:1] if beside else [])
     scenes, poses = (SCENE, SCENE.transformed(scale=scale)), []
     for scene, unit in zip(scenes, (1.0, scale), strict=True):
-        deformer = scene.held().hold(fixed=SCENE.fixed, handle=[vertex])
+        deformer = scene.held().hold(fixed=fixed.astype(int), handle=[vertex])
         local = deformer.local(vertex, 0.25 * d * unit, 0.1 * d * unit, follows=1.0)
+        is_soft = local._constraints.solver.energy is deformer._binding.energy
+        assert is_soft == beside
         solution = local.solve(scene.mesh.vertices[[vertex]] + [0.0, 0.0, 0.05 * d * unit])
         poses.append([each.vertices / unit for each in (solution, local.finish(solution))])
     for here, there in zip(*poses, strict=True):

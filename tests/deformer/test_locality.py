@@ -564,12 +564,9 @@ def test_parts_beyond_the_reach_follow_by_their_area():
 
 def test_a_body_that_nothing_holds_follows_its_pulled_point():
     """All of it is within the reach; the drag, without which it might turn, is weak."""
-    ball = models.sphere(400)
-    regions = Regions.single(ball)
-    x, d = ball.vertices, ball.diagonal
+    x, d = coarse().mesh.vertices, coarse().mesh.diagonal
     top, low = int(x[:, 2].argmax()), int(x[:, 2].argmin())
-    deformer = Deformer(ball, regions, fit_cages(ball, regions, 40), handle=[top])
-    local = deformer.local(top, 10.0 * d, 0.1 * d)
+    local = coarse().hold(handle=[top]).local(top, 10.0 * d, 0.1 * d)
     solution = local.solve(x[[top]] + [0.0, 0.0, 0.3 * d])
     assert solution.vertices[low, 2] - x[low, 2] > 0.95 * 0.3 * d
     assert_allclose(solution.vertices.mean(axis=0)[:2], x.mean(axis=0)[:2], atol=0.02 * d)
