@@ -84,7 +84,7 @@ def test_a_drag_calls_the_session_as_the_widgets_do(monkeypatch, body, pulls):
         monkeypatch.setattr(Session, name, call)
     session = drags.ready(preparation, own, handle=not pulls)
     goals = drags.way_of_tip(session, own) if pulls else drags.way_of_handle(own)
-    pulled = own.tip if pulls else None
+    pulled = own.point if pulls else None
     frames = list(drags.frames(session, [*goals[:6], *6 * [goals[6]]], pulled))
     names = [name for name, _ in calls]
     assert names[:7] == 7 * ["pull" if pulls else "drag"]
@@ -94,7 +94,7 @@ def test_a_drag_calls_the_session_as_the_widgets_do(monkeypatch, body, pulls):
     assert calls[0][1] == 3
     assert all(3 <= most <= 8 for _, most in calls)
     if pulls:
-        np.testing.assert_allclose(session.vertices[own.tip], goals[6], atol=1e-4)
+        np.testing.assert_allclose(own.point.at(session.vertices), goals[6], atol=1e-4)
 
 
 def test_what_a_drag_feels_like_is_measured(monkeypatch, body):

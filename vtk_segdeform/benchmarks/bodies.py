@@ -14,7 +14,7 @@ from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, IntArray
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..models import Limb, implicit_surface, sphere, standing_body
 
 _HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
@@ -116,6 +116,12 @@ class Hand:
             mesh, np.flatnonzero(away > _FIXED), handle, tip, root, side / np.linalg.norm(side)
         )
 
+    @property
+    def point(self) -> SurfacePoint:
+        """The point that is pulled: in a face at the tip, as a pointer hits it."""
+        face = self.mesh.faces[np.flatnonzero((self.mesh.faces == self.tip).any(axis=1))[0]]
+        return SurfacePoint.of(face, np.where(face == self.tip, 0.6, 0.2))
+
     def targets(self, radians: float, aside: FloatArray | float = 0.0) -> FloatArray:
         """Return the targets (k, 3) of the handle, turned and moved *aside* (3,), in diagonals."""
         turn = Rotation.from_rotvec(radians * self.axis)
@@ -132,8 +138,8 @@ class Hand:
     def pulled_to(
         self, radians: float, aside: FloatArray | float = 0.0, *, start: FloatArray | None = None
     ) -> FloatArray:
-        """Return where the tip (3,) is pulled to from *start*, about as far as the handle moves."""
-        start = self.mesh.vertices[self.tip] if start is None else start
+        """Return where `point` is pulled to from *start* (3,), about as far as the handle moves."""
+        start = self.point.at(self.mesh.vertices) if start is None else start
         way = np.cross(self.axis, start - self.root)
         moved = _PULL * radians * way / np.linalg.norm(way) + np.asarray(aside)
         return np.asarray(start + self.mesh.diagonal * moved)

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..geometry import distortion, triangle_distortion
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..session import Preparation, Session
 from ..solver import Solution
 from ..widgets.handle_dragger import Pace
@@ -163,7 +163,7 @@ def dragged(session: Session, own: Hand, preparation: Preparation, *, pulls: boo
     """Drag the handle of *session*, or pull the tip, along the path of `hand`; see `Drag`."""
     record = Record(session, preparation)
     goals = way_of_tip(session, own) if pulls else way_of_handle(own)
-    for frame in frames(session, goals, own.tip if pulls else None):
+    for frame in frames(session, goals, own.point if pulls else None):
         record.add(frame)
     return record.drag
 
@@ -174,24 +174,27 @@ def way_of_handle(own: Hand, *, is_short: bool = False) -> list[FloatArray]:
 
 
 def way_of_tip(session: Session, own: Hand, *, is_short: bool = False) -> list[FloatArray]:
-    """Return where the tip (3,) is pulled to along the path of `hand`, from where it is."""
-    start, path = session.vertices[own.tip], hand(is_short=is_short)
+    """Return where the point at the tip is pulled to, (3,) each, along the path of `hand`."""
+    start, path = own.point.at(session.vertices), hand(is_short=is_short)
     return [own.pulled_to(turn, aside, start=start) for turn, aside in path]
 
 
 def frames(
-    session: Session, goals: Sequence[FloatArray], pulled: int | None, limit: int | None = None
+    session: Session,
+    goals: Sequence[FloatArray],
+    pulled: SurfacePoint | None,
+    limit: int | None = None,
 ) -> Iterator[Frame]:
-    """Drag the handle of *session* along its targets, or the vertex *pulled*, frame by frame.
+    """Drag the handle of *session* along its targets, or the point *pulled*, frame by frame.
 
     *limit* is the number of steps of a frame, at most; None: that of the widgets, which depends on
     the time that the last ones took.
     """
     x = session.vertices
     move: Callable[..., Solution] = session.drag
-    before = x[session.state.handle] if pulled is None else x[pulled]
+    before = x[session.state.handle] if pulled is None else pulled.at(x)
     if pulled is not None:
-        move = partial(session.pull, session.mesh.vertices[pulled])
+        move = partial(session.pull, pulled)
     pace, diagonal, last = Pace(), session.mesh.diagonal, x
     for goal in goals:
         moved = float(np.linalg.norm(goal - before, axis=-1).max())

@@ -24,7 +24,7 @@ from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..energy import Factor, full_factor
 from ..importing import imported
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
 from ..models import cactus
 from ..progress import Progress, tell
 from ..session import Preparation, Session
@@ -285,8 +285,8 @@ def compared(
 
 def begun(
     case: str, own: Hand, preparation: Preparation
-) -> tuple[Session, list[FloatArray], int | None]:
-    """Return a session in which a drag can begin, its goals, and the vertex that is pulled."""
+) -> tuple[Session, list[FloatArray], SurfacePoint | None]:
+    """Return a session in which a drag can begin, its goals, and the point that is pulled."""
     session = ready(preparation, own, handle=case not in _PULLS)
     if case == "twist":
         return session, [own.twisted(angle) for angle in _TWIST], None
@@ -294,12 +294,12 @@ def begun(
         return session, way_of_handle(own, is_short=True), None
     if case == "second":
         mesh = own.mesh
-        session.pull(mesh.vertices[own.tip], own.pulled_to(1.0))
+        session.pull(own.point, own.pulled_to(1.0))
         session.commit()
         away = np.linalg.norm(mesh.vertices - mesh.vertices[own.tip], axis=1)
         smallest = mesh.components == np.bincount(mesh.components).argmin()
         own = replace(own, tip=int(np.where(smallest, away, -1.0).argmax()))
-    return session, way_of_tip(session, own, is_short=True), own.tip
+    return session, way_of_tip(session, own, is_short=True), own.point
 
 
 def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
