@@ -103,7 +103,7 @@ class Hand:
         middle = np.where(largest, np.linalg.norm(x - x.mean(axis=0), axis=1), np.inf).argmin()
 
         def distances(start: int) -> FloatArray:
-            found = csgraph.dijkstra(graph, directed=False, indices=start)
+            found = csgraph.dijkstra(graph, directed=False, indices=np.array(start))
             return np.asarray(np.where(np.isfinite(found), found, -1.0))
 
         tip = int(distances(int(middle)).argmax())

@@ -29,7 +29,7 @@ from .drags import Drag, dragged, ready
 from .measuring import run_in
 from .programs import arap_iteration_seconds
 from .scale import Scale
-from .sections import Figure, Ratio, Section, Table
+from .sections import Cell, Figure, Ratio, Section, Table
 from .tasks import Task, warm_up
 
 SEED = 1
@@ -120,7 +120,8 @@ def felt(body: str, size: int, scale: Scale) -> Felt:
         arap = arap_iteration_seconds(task, scale.repeats)
     except MissingDependencyError as missing:
         fault = str(missing)
-    return Felt(body, mesh.n_vertices, *np.diff(times).tolist(), drags, arap, fault)
+    segment, cages, bind = np.diff(times).tolist()
+    return Felt(body, mesh.n_vertices, segment, cages, bind, drags, arap, fault)
 
 
 def _set_up_table(found: list[Felt]) -> Table:
@@ -138,7 +139,7 @@ def _frame_table(found: list[Felt]) -> Table:
         "ARAP iteration, ms", "median / ARAP", "95 % / ARAP", "longest / ARAP",
         "steps", "most", "away", "largest", "jump", "volume change",
     )  # fmt: skip
-    rows = [
+    rows: list[tuple[Cell, ...]] = [
         (
             f.body, f.vertices, name, 1e3 * d.first, *(1e3 * t for t in d.felt), 1e3 * f.arap,
             *(t / f.arap for t in d.felt), int(np.median(d.steps)), int(d.steps.max()),

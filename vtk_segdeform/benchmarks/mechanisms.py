@@ -13,6 +13,7 @@ machine slows both.
 from __future__ import annotations
 
 import contextlib
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -23,7 +24,6 @@ import numpy as np
 from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..energy import Factor, full_factor
-from ..importing import imported
 from ..mesh import Mesh, SurfacePoint
 from ..models import cactus
 from ..progress import Progress, tell
@@ -97,7 +97,7 @@ class Mechanism:
     def owner(self) -> Any:
         """The module or class."""
         module, _, cls = self.place.partition(":")
-        found = imported(f"{_PACKAGE}.{module}")
+        found = sys.modules[f"{_PACKAGE}.{module}"]
         return getattr(found, cls) if cls else found
 
 
@@ -256,6 +256,7 @@ def compared(
     mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
 ) -> Values:
     """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
+    ways: list[Callable[[], contextlib.AbstractContextManager[None]]]
     ways = [contextlib.nullcontext, mechanism.off]
     if case == "bend":
         bends: list[list[dict[str, float]]] = [[], []]
