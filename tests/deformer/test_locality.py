@@ -570,3 +570,29 @@ def test_a_body_that_nothing_holds_follows_its_pulled_point():
     solution = local.solve(x[[top]] + [0.0, 0.0, 0.3 * d])
     assert solution.vertices[low, 2] - x[low, 2] > 0.95 * 0.3 * d
     assert_allclose(solution.vertices.mean(axis=0)[:2], x.mean(axis=0)[:2], atol=0.02 * d)
+
+
+def test_a_drag_is_added_only_where_all_of_the_grabbed_part_is_free():
+    point, deformer = SurfacePoint.at_vertex(HIGH), held()
+    assert not deformer._drag_of(point, np.inf, 0.0).any()
+    assert not deformer._drag_of(point, 0.1, 0.0).any()
+    drag = deformer._drag_of(point, 5.0, 0.0)  # mesh sizes
+    assert np.linalg.eigvalsh(drag)[0] > -1e-12
+    assert 0.0 < np.trace(drag) < 1e-2 * np.trace(deformer._binding.energy.quadratic)
+
+
+@pytest.mark.parametrize("corners", [1, 2, 3])
+def test_the_surface_around_a_point_is_pulled_where_its_ring_may_not_resist(corners):
+    """A neighbour is fixed.  The point is that of the surface, not a mean of the corners alone."""
+    face = SCENE.mesh.faces[(SCENE.mesh.faces == HIGH).any(axis=1)][0]
+    face = [HIGH, *face[face != HIGH]]
+    shares = np.array([[1.0, 0.0, 0.0], [0.6, 0.4, 0.0], [0.5, 0.3, 0.2]][corners - 1])
+    point = SurfacePoint.of(face, shares)
+    near = np.setdiff1d(SCENE.mesh.adjacency[[HIGH]].indices, face)[0]
+    local = held().hold(fixed=[near], handle=[HIGH]).local(point, 0.3 * D, 0.2 * D)
+    solver, pulled = local._constraints.solver, local._constraints.pulled
+    assert solver.energy is local._binding.energy
+    assert pulled.points == (point,)
+    row, own = solver.positions.rows[pulled.places[0]], local._row_of(point)
+    assert np.abs(row - own).max() > 1e-3
+    assert_allclose(row @ local._rest_cages, own @ local._rest_cages, atol=2e-2)

@@ -493,3 +493,11 @@ def test_the_factored_matrix_solves_as_the_dense_one(n, compiled, monkeypatch):
 def test_a_singular_matrix_is_refused():
     with pytest.raises(MeshError, match="the pose cannot be finished on this mesh"):
         factored(sparse.csr_array(np.ones((2, 2))))
+
+
+def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
+    mesh, held = SCENE.mesh, SAUSAGE.held
+    places = mesh.vertices[held] + np.where(mesh.vertices[held, :1] > 0.0, 0.4, 0.0) * [1, 0, 0]
+    x = SAUSAGE.finisher()._at_places(mesh.vertices, places)
+    assert_array_equal(x[held], places)
+    assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13

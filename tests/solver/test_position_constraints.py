@@ -11,6 +11,7 @@ from solids import icosphere
 from vtk_segdeform import sizes
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.solver.position_constraints import (
+    Anchors,
     PositionTerm,
     connected_sets,
     errors_at,
@@ -94,3 +95,15 @@ def test_every_set_has_the_same_weight_in_all_whatever_its_size(monkeypatch, sha
     assert (
         without.toward(np.empty((0, 3))).value_and_slope(np.ones((subspace.n_columns, 3)))[0] == 0
     )
+
+
+def test_anchors_are_a_square_about_their_pose_beside_a_constant_load():
+    rng = np.random.default_rng(2)
+    root, p, load, q, way = rng.normal(size=(6, 5)), *rng.normal(size=(4, 5, 3))
+    anchors = Anchors(root.T @ root, p, load)
+    value, slope = anchors.value_and_slope(q)
+    expected = np.sum((root @ (q - p)) ** 2) - 2.0 * np.sum(load * (q - p))
+    assert value == pytest.approx(expected)
+    assert anchors.value_and_slope(p)[0] == 0.0
+    ahead, behind = (anchors.value_and_slope(q + t * way)[0] for t in (0.5, -0.5))
+    assert ahead - behind == pytest.approx(2.0 * np.vdot(slope, way))  # quadratic: exact
