@@ -159,10 +159,6 @@ MECHANISMS = (
         _DEFORMER, "_way_to", lambda *_: iter(()), _BEND,
     ),
     Mechanism(
-        "pulled surroundings", "a pull moves a weighted mean around the point",
-        "deformer.locality:SurfaceSamples", "soft_row", lambda *_: None, _PULLS,
-    ),
-    Mechanism(
         "flat rings", "the neighbours of a pulled point resist a spike",
         _DEFORMER, "_with_flat_rings", lambda self, *_: (self._binding.energy, {}), _PULLS,
     ),
