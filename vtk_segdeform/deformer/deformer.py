@@ -816,8 +816,6 @@ class Deformer:
         if contact is None or 0.0 < most <= contact.surface.spacing:
             return 1.0
         clearance = contact.clearance(self._path.end, most) if most else 0.0
-        if 0.0 < most <= clearance < _CLEARANCE:  # a motion by *most* meets nothing
-            return 1.0
         spacing = contact.surface.spacing
         return min(1.0, max(clearance + 0.5 * spacing, spacing) / LONGEST_MOVE)
 

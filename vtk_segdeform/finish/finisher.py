@@ -230,7 +230,8 @@ class Finisher:
 
     def moved(self, x: FloatArray, directions: Sequence[FloatArray]) -> _Evaluated:
         """Return *x* moved along *directions* onto the volumes, and the objective there."""
-        x = self._landed(x, directions)
+        if np.isfinite(x).all():  # others have no volume
+            x = self._landed(x, directions)
         return self._evaluated(x) if np.isfinite(x).all() else _Evaluated(x, math.inf, x)
 
     def residual(self, h: FloatArray) -> FloatArray:
