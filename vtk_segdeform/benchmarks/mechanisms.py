@@ -25,11 +25,11 @@ from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..energy import Factor, full_factor
 from ..mesh import Mesh, SurfacePoint
-from ..models import cactus
+from ..models import cactus, random_limbs
 from ..progress import Progress, tell
 from ..session import Preparation, Session
 from ..solver import Anderson
-from .bodies import Hand, random_body, with_loose_parts
+from .bodies import Hand, with_loose_parts
 from .drags import Record, Shape, frames, ready, way_of_handle, way_of_tip
 from .measuring import run_in
 from .scale import Scale
@@ -53,8 +53,8 @@ _MEASURED = "jump", "error", "distortion", "worst", "detail", "folds", "volume" 
 Values = dict[str, tuple[float, float]]  # by quantity, with a mechanism and without it
 BODIES: dict[str, Callable[[], Mesh]] = {
     "cactus": cactus,
-    "random limbs": lambda: random_body(22_000, 1),
-    "random limbs, loose parts": lambda: with_loose_parts(random_body(5000, 4), 4),
+    "random limbs": lambda: random_limbs(22_000, 1),
+    "random limbs, loose parts": lambda: with_loose_parts(random_limbs(5000, 4), 4),
 }
 
 
