@@ -122,8 +122,9 @@ clean:
 	rm -rf docs/build docs/figures docs/gallery
 
 # A stamp is older than setup.cfg when a dependency may have changed; then, and only then, pip runs.
+# Bytecode of all that is installed would take pip longer than the rest; Python makes what it needs.
 $(VENV)/installed: setup.cfg pyproject.toml | $(BIN)/python
-	$(PIP) install --editable .
+	$(PIP) install --no-compile --editable .
 	@touch $@
 
 $(VENV)/installed-test: setup.cfg pyproject.toml | $(BIN)/python

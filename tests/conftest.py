@@ -31,7 +31,6 @@ import pytest  # noqa: E402 - its plugins read the variables above
 # which would do so before it starts the workers.
 _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 _WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
-_KERNELS = "test_compiled.py"
 _PROGRAMS = {"app", "qt", "web"}
 
 
@@ -48,29 +47,17 @@ def pytest_collect_directory(path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give each worker a share of the tests of kernels first, to be compiled once.
+    """Let the last worker begin with the tests of programs.
 
-    The last worker then begins with the tests of programs, so that the tests at the end, which
-    workers take from each other, are short and start no browser.
+    So the tests at the end, which workers take from each other, are short and start no browser.
     """
     if _WORKERS == 1:
         return
     items.sort(key=lambda item: item.path)
-    kernels = [item for item in items if item.path.name == _KERNELS]
     programs = [item for item in items if item.path.parent.name in _PROGRAMS]
-    first = {*kernels, *programs}
-    others = [item for item in items if item not in first]
-    n, k = len(items) - len(kernels), len(kernels)
-    last = (_WORKERS - 1) * n // _WORKERS
-    others[last:last] = programs
-    items[:] = [
-        item
-        for w in range(_WORKERS)
-        for item in (
-            *kernels[w * k // _WORKERS : (w + 1) * k // _WORKERS],
-            *others[w * n // _WORKERS : (w + 1) * n // _WORKERS],
-        )
-    ]
+    others = [item for item in items if item.path.parent.name not in _PROGRAMS]
+    last = (_WORKERS - 1) * len(items) // _WORKERS
+    items[:] = [*others[:last], *programs, *others[last:]]
 
 
 gc.disable()  # until all tests are collected: imports create no garbage that is worth a search
@@ -105,10 +92,16 @@ def _no_flushing() -> Iterator[None]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def _no_first_run() -> None:
-    from vtk_segdeform.kernels import dispatch
+def _compiled_kernels() -> Iterator[None]:
+    """Compile the kernels first; after the tests, check that they cover all types that occurred."""
+    from vtk_segdeform.kernels import wait_until_compiled
 
-    dispatch._CACHED = "*.py[c]"  # which are there, whether kernels have been compiled or not
+    wait_until_compiled()
+    yield
+    if made := sys.modules.get("vtk_segdeform.kernels.compiled.kernels"):
+        for kernel, combinations in made.KERNELS:
+            others = set(kernel.signatures) - set(combinations)
+            assert not others, f"{kernel.__name__} is not compiled in advance for {others}"
 
 
 @pytest.fixture(scope="session", autouse=True)

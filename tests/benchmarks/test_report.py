@@ -24,11 +24,12 @@ from vtk_segdeform.benchmarks import (
     programs,
     report,
 )
-from vtk_segdeform.benchmarks.bodies import Hand, random_body
+from vtk_segdeform.benchmarks.bodies import Hand
 from vtk_segdeform.benchmarks.scale import Scale
 from vtk_segdeform.benchmarks.sections import Figure, Ratio, Section, Table
 from vtk_segdeform.benchmarks.tasks import bent_cactus
 from vtk_segdeform.errors import ArgumentError, MissingDependencyError
+from vtk_segdeform.models import random_limbs
 from vtk_segdeform.session import Session
 
 TINY = Scale(
@@ -55,7 +56,7 @@ def without_peers(monkeypatch):
 @pytest.fixture(scope="module")
 def body():
     """Return a hand on a small body, and a preparation of the body."""
-    mesh = random_body(600, 1)
+    mesh = random_limbs(600, 1)
     return Hand.on(mesh), Session(mesh).preparation()
 
 

@@ -189,6 +189,8 @@ def test_arguments_that_cannot_be_solved_are_refused():
         Deformer.as_printed(scene.mesh, scene.regions, scene.cages[:1], fixed=[0], handle=())
     with pytest.raises(ArgumentError, match=r"cages\[1\]"):
         Deformer.as_printed(scene.mesh, scene.regions, [scene.cages[0], None], fixed=[0], handle=())
+    with pytest.raises(ArgumentError, match=r"^cages must be"):
+        Deformer.as_printed(scene.mesh, scene.regions, 3, fixed=[0], handle=())
     sheet = Mesh(scene.mesh.vertices, scene.mesh.faces[1:])
     with pytest.raises(MeshError, match="closed"):
         Deformer.as_printed(sheet, Regions.single(sheet), scene.cages[:1], fixed=[0], handle=())
@@ -197,7 +199,29 @@ def test_arguments_that_cannot_be_solved_are_refused():
     with pytest.raises(CageError, match="influence"):
         Deformer.as_printed(ball, Regions.single(ball), [cage], fixed=[0], handle=())
     for option in ({"max_steps": 0}, {"tolerance": 0.0}, {"epsilon": -1.0}):
-        with pytest.raises(ArgumentError, match=next(iter(option))):
+        with pytest.raises(ArgumentError, match=f"^{next(iter(option))} must be"):
             printed().solve(scene.turned(10), **option)
     with pytest.raises(ConstraintError, match="targets"):
         printed().solve(scene.turned(10)[:1])
+
+
+def test_without_options_whole_steps_are_taken_to_a_ten_thousandth():
+    targets = COARSE.turned(10)
+    plain, same = printed().solve(targets), printed().solve(targets, tolerance=1e-4, epsilon=1.0)
+    assert_allclose(plain.vertices, same.vertices, rtol=0, atol=1e-12)
+    assert plain.step_lengths[-1] <= 1e-4 < plain.step_lengths[:-1].min()
+
+
+def test_its_energy_is_least_at_the_end_among_poses_of_the_same_volume():
+    """Where no step moves, |A x - b|^2 with b fixed rises along every other direction."""
+    deformer = printed()
+    targets = COARSE.turned(20)
+    deformer.solve(targets, tolerance=1e-10)
+    x = deformer.W @ deformer.p
+    u = np.concatenate([COARSE.mesh.vertices[COARSE.fixed], targets])
+    gap = deformer.A @ x - deformer.b(x, u)
+    slope = deformer.W.T @ (deformer.A.T @ gap)
+    row = deformer.W.T @ volume_gradient(x, deformer.mesh.faces)
+    share = np.vdot(slope, row) / np.vdot(row, row)
+    assert np.linalg.norm(slope - share * row) < 1e-6 * np.linalg.norm(slope)
+    assert abs(deformer.g(x)) < 1e-9 * deformer.volume

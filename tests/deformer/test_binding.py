@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from scenes import sausage
 from solids import icosphere, together
 
 from vtk_segdeform import Deformer, Mesh, Regions, Session, sizes
+from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cage
 from vtk_segdeform.deformer import binding, binding_cache
 from vtk_segdeform.errors import Cancelled
@@ -35,16 +37,18 @@ def counted(monkeypatch):
     return calls
 
 
-@pytest.mark.parametrize("large", [500, 10**9])
+@pytest.mark.parametrize("large", [250, 10**9])  # with a coarse volume, and without
 def test_a_cached_binding_gives_the_same_pose_bit_for_bit(tmp_path, counted, monkeypatch, large):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", large)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 300)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
     first = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     assert len(counted) == 1
     again = SCENE.deformer(cache=tmp_path).solve(TARGETS)
     assert len(counted) == 1
     assert_array_equal(again.vertices, first.vertices)
     assert len(list(tmp_path.iterdir())) == 1
+    coarse = SCENE.deformer(cache=tmp_path)._binding.coarse_volume
+    assert (coarse.cells is not None) == (large == 250)
 
 
 def with_a_vertex_moved():
@@ -272,3 +276,55 @@ def test_shares_of_clusters_follow_the_cage_vertices_of_regions_in_each_componen
         region = label[part == k][0]
         within = (part == k).sum() / (label == region).sum()
         assert inputs.shares[k] == pytest.approx((20, 60)[region] * within)
+
+
+def test_no_rotation_cluster_spans_two_bodies_or_regions(monkeypatch):
+    """Neither the first ones nor those to which they are joined."""
+    monkeypatch.setattr(sizes, "FIRST_CLUSTERS", 60)
+    monkeypatch.setattr(sizes, "FIRST_CLUSTERS_EACH", 1)
+    mesh = Mesh(*together(icosphere(2), (icosphere(2)[0] * 0.9 + [1.2, 0.0, 2.1], icosphere(2)[1])))
+    regions = Regions.from_labels(mesh, (mesh.vertices[:, 2] > 2.0).astype(int), overlap=2)
+    ball, cage_faces = icosphere(1)
+    cages = [
+        Cage(r * ball + at, cage_faces) for r, at in ((3.5, [0.6, 0, 0.9]), (2.5, [1.2, 0, 2.4]))
+    ]
+    rest_cages = np.concatenate([cage.vertices for cage in cages])
+    inputs = binding.BindingInputs(mesh, regions, cages, rest_cages, 1.0, 8)
+    assert len(np.unique(inputs.parts)) == 3
+    first = binding._first_clusters(inputs)
+    joined, join = [], binding.join_rotations
+
+    def joining(*arguments, **options):
+        found = join(*arguments, **options)
+        joined.append(found[1])
+        return found
+
+    monkeypatch.setattr(binding, "join_rotations", joining)
+    binding.Binding.compute(inputs)
+    assert len(joined[0]) == first.max() + 1 > 40
+    assert len(np.unique(joined[0])) == 8
+    for clusters in (first, joined[0][first]):
+        for k in range(clusters.max() + 1):
+            assert len(np.unique(inputs.parts[clusters == k])) == 1
+
+
+class Trap:
+    """Its unpickling would leave a trace."""
+
+    sprung: ClassVar[list[int]] = []
+
+    def __reduce__(self):
+        return Trap.sprung.append, (1,)
+
+
+def test_no_file_of_a_binding_is_unpickled(tmp_path, counted):
+    path = bound_in(tmp_path)
+    with np.load(path) as file:
+        arrays = dict(file)
+    arrays["quadratic"] = np.array([Trap()], dtype=object)
+    with open(path, "wb") as file:
+        np.savez(file, allow_pickle=True, **arrays)
+    counted.clear()
+    SCENE.deformer(cache=tmp_path)
+    assert len(counted) == 1
+    assert Trap.sprung == []

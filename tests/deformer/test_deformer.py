@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,15 +14,18 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 from solids import TETRAHEDRON, exact_volume_change, icosphere, rotation
 
+from vtk_segdeform import sizes
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.deformer.path import Path
 from vtk_segdeform.errors import (
     ArgumentError,
     CageError,
     Cancelled,
     ConstraintError,
+    MeshError,
     RegionError,
 )
 from vtk_segdeform.geometry.rotations import rigid_fit
@@ -28,6 +33,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.regions.segmentation import segment
+from vtk_segdeform.solver import Contact, waypoints
 from vtk_segdeform.solver.solution import Status
 
 SCENE = sausage(2, is_coarse=True)
@@ -486,3 +492,247 @@ def test_the_number_of_cage_vertices_is_named_if_it_is_none(number):
     mesh = SCENE.mesh
     with pytest.raises(ArgumentError, match="n_cage_vertices must be a whole number, 4 or more"):
         deform(mesh, [0], [9], mesh.vertices[[9]], n_cage_vertices=number)
+
+
+def test_the_mesh_moves_with_its_cages_by_affine_maps():
+    deformer, turn = SCENE.held(), rotation([1.0, 2.0, 3.0], 1.2)
+    rest = [cage.vertices for cage in SCENE.cages]
+    assert_allclose(deformer.surface(rest), VERTICES, atol=1e-15)
+    affine, shift = turn @ np.diag([1.1, 0.9, 1.3]), np.array([3.0, -1.0, 2.0])
+    moved = deformer.surface([p @ affine.T + shift for p in rest])
+    assert_allclose(moved, VERTICES @ affine.T + shift, atol=1e-9)
+    turned = deformer.rotations([p @ turn.T + shift for p in rest])
+    assert_allclose(turned, np.broadcast_to(turn, (len(VERTICES), 3, 3)), atol=1e-7)
+    with pytest.raises(CageError, match="cage by cage"):
+        deformer.rotations(rest[:1])
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e4])
+def test_other_points_are_carried_along(shift):
+    scene = SCENE.transformed(shift=np.full(3, shift))
+    deformer = scene.held()
+    x, points = scene.mesh.vertices, 0.5 * SCENE.mesh.vertices[::7] + shift
+    assert_allclose(deformer.carry(points), points, atol=1e-9 * (1.0 + shift))
+    solution = deformer.solve(scene.turned(30, about=np.full(3, shift)))
+    assert_allclose(deformer.carry(x[::9]), solution.vertices[::9], atol=0.02)
+    bound = deformer.passengers(points)
+    assert_array_equal(bound.moved(solution.cage_vertices), deformer.carry(points))
+
+
+def test_fixed_vertices_are_kept_where_they_are_wanted():
+    deformer = SCENE.held()
+    places = VERTICES[SCENE.fixed] + [-0.2, 0.1, 0.0]
+    other = deformer.hold(fixed=SCENE.fixed, handle=SCENE.handle, fixed_at=places)
+    solution = other.solve(REST)
+    assert solution.fixed_error < 1e-3
+    assert_allclose(solution.vertices[SCENE.fixed], places, atol=1e-3 * SCENE.mesh.diagonal)
+    assert other.finish(solution).fixed_error < 1e-12
+    says = f"fixed_at must give one point for each of the {len(places)} fixed vertices"
+    with pytest.raises(ConstraintError, match=says):
+        deformer.hold(fixed=SCENE.fixed, fixed_at=places[:-1])
+    with pytest.raises(ConstraintError, match="mesh sizes away"):
+        deformer.hold(fixed=SCENE.fixed, fixed_at=1e5 * places)
+
+
+def test_options_of_a_deformer_are_kept_unless_they_are_changed():
+    first = SCENE.deformer(preserve_volume=False, avoid_contact=True)
+    assert first.preserved_volumes == ()
+    same = first.hold(handle=[0])
+    assert same.preserved_volumes == ()
+    assert same._constraints.contact is not None
+    other = first.hold(handle=[0], preserve_volume=True, avoid_contact=False)
+    assert len(other.preserved_volumes) == 1
+    assert other._constraints.contact is None
+    regions = first.hold(handle=[0], preserve_region_volumes=True)
+    assert len(regions.preserved_volumes) == SCENE.regions.n_regions
+    assert len(regions.hold(handle=[1], preserve_volume=True).preserved_volumes) == 2
+    sheet = Mesh(VERTICES, SCENE.mesh.faces[1:])
+    open_mesh = Deformer(sheet, Regions(sheet, SCENE.regions.membership), SCENE.cages, lids=False)
+    assert not open_mesh.has_volume
+    assert not open_mesh.hold(handle=[0]).has_volume
+    assert open_mesh.hold(handle=[0], lids=True).has_volume
+    assert open_mesh.hold(handle=[0], lids=True).hold(handle=[1]).has_volume
+    for option in ("preserve_volume", "preserve_region_volumes", "avoid_contact", "lids"):
+        with pytest.raises(ArgumentError, match=option):
+            first.hold(**{option: "yes"})
+        with pytest.raises(ArgumentError, match=option):
+            SCENE.deformer(**{option: "yes"})
+
+
+def test_a_pickled_deformer_continues_like_the_deformer():
+    deformer = SCENE.held().copy()
+    deformer.solve(SCENE.turned(20), max_steps=3)
+    again = pickle.loads(pickle.dumps(deformer))
+    assert not again.fixed.flags.writeable
+    assert not again.handle.flags.writeable
+    targets = SCENE.turned(30)
+    assert_array_equal(again.solve(targets).vertices, deformer.solve(targets).vertices)
+
+
+def test_a_block_that_fails_leaves_the_deformer_as_it_was():
+    deformer, other = SCENE.held(), SCENE.held()
+
+    def fail():
+        with deformer.restoring():
+            deformer.solve(SCENE.turned(50))
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        fail()
+    again = deformer.solve(SCENE.turned(20))
+    assert_array_equal(again.vertices, other.solve(SCENE.turned(20)).vertices)
+    with deformer.restoring():
+        deformer.solve(SCENE.turned(30))
+    assert_allclose(
+        deformer.carry(VERTICES[:1]), other.solve(SCENE.turned(30)).vertices[:1], atol=0.02
+    )
+
+
+def test_a_cache_that_is_no_path_is_refused_by_name():
+    with pytest.raises(ArgumentError, match=r"^cache must be"):
+        SCENE.deformer(cache=3.5)
+
+
+def test_a_small_mesh_is_solved_once_for_its_targets(monkeypatch):
+    """Only scaling a large one to its volume, by much, takes further solves."""
+    solves, solve = [], Path.solve
+    monkeypatch.setattr(Path, "solve", lambda *given: solves.append(1) or solve(*given))
+    SCENE.held().solve(SCENE.turned(4))
+    assert len(solves) == 1
+    SCENE.held(preserve_volume=False).solve(SCENE.turned(4))
+    assert len(solves) == 2
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize("scale", [1e-3, 1e3])
+def test_a_pull_is_the_same_in_every_unit(scale, beside):
+    """Also beside a fixed vertex, where the surface around the point is pulled."""
+    d, vertex = SCENE.mesh.diagonal, int(VERTICES[:, 2].argmax())
+    near = np.setdiff1d(SCENE.mesh.adjacency[[vertex]].indices, [vertex])
+    fixed = np.append(SCENE.fixed, near[:1] if beside else [])
+    scenes, poses = (SCENE, SCENE.transformed(scale=scale)), []
+    for scene, unit in zip(scenes, (1.0, scale), strict=True):
+        deformer = scene.held().hold(fixed=fixed.astype(int), handle=[vertex])
+        local = deformer.local(vertex, 0.25 * d * unit, 0.1 * d * unit, follows=1.0)
+        is_soft = local._constraints.solver.energy is deformer._binding.energy
+        assert is_soft == beside
+        solution = local.solve(scene.mesh.vertices[[vertex]] + [0.0, 0.0, 0.05 * d * unit])
+        poses.append([each.vertices / unit for each in (solution, local.finish(solution))])
+    for here, there in zip(*poses, strict=True):
+        assert_allclose(there, here, atol=1e-6 * d)
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0])
+def test_weights_of_the_finish_are_a_quarter_of_a_cage_vertex_over_its_region(scale):
+    scene = SCENE.transformed(scale=scale)
+    deformer, areas = scene.held(), scene.mesh.vertex_areas
+    found = deformer._cage_weights
+    assert found.sum() == pytest.approx(36 / 4)
+    alone = scene.regions.weights == 1.0
+    for own, weights in zip(alone, scene.regions.weights, strict=True):
+        density = 18 / (weights * areas).sum()
+        assert_allclose(found[own], 0.25 * density * areas[own])
+
+
+def test_a_pose_is_plausible_within_two_sizes_and_one_and_a_half_motions():
+    deformer = SCENE.held()
+    size, rest = deformer._frame.size, deformer._rest.vertices[SCENE.handle]
+    at_rest = deformer._rest_cages
+    for moved in (0.0, 1.0):
+        goal, limit = rest + [moved, 0.0, 0.0], 2.0 + 1.5 * moved
+        for share, ok in ((0.99, True), (1.01, False)):
+            x = VERTICES.copy()
+            x[7, 1] += share * limit * size
+            assert deformer._is_plausible(x, goal, at_rest) == ok
+            far = at_rest + [0.0, 5.0, 0.0]
+            assert deformer._is_plausible(x, goal, far)
+
+
+def test_a_pose_far_from_every_reasonable_one_is_replaced_by_the_last_one(monkeypatch):
+    deformer, targets = SCENE.held(), SCENE.turned(20)
+    before = deformer.solve(targets)
+    with monkeypatch.context() as wrong:
+        wrong.setattr(Deformer, "_is_plausible", lambda *_: False)
+        missed = deformer.solve(SCENE.turned(40))
+    assert missed.status is Status.MISSED
+    assert missed.remaining == np.inf
+    assert_allclose(missed.vertices, before.vertices, atol=1e-12)
+    for own, expected in zip(missed.cage_vertices, before.cage_vertices, strict=True):
+        assert_allclose(own, expected, atol=1e-12)
+    off = np.linalg.norm(missed.vertices[SCENE.handle] - SCENE.turned(40), axis=1).max()
+    assert missed.handle_error == pytest.approx(off / SCENE.mesh.diagonal)
+    assert missed.volume_change == pytest.approx(before.volume_change, abs=1e-14)
+    assert_allclose(deformer.solve(targets).vertices, before.vertices, atol=1e-5)
+
+
+def test_a_frame_of_a_drag_tells_what_remains_only_once_it_has_converged():
+    deformer, targets = SCENE.held(), SCENE.turned(5)
+    frame = deformer.solve(targets, max_steps=1)
+    assert (frame.status, frame.remaining) == (Status.STEP_LIMIT, np.inf)
+    for _ in range(20):
+        frame = deformer.solve(targets, max_steps=20)
+    assert (frame.status, frame.remaining) == (Status.CONVERGED, 0.0)
+    solution = deformer.solve(targets)
+    assert 0.0 < solution.remaining <= 1e-4
+
+
+def test_what_is_no_mesh_region_or_callback_is_refused_by_name():
+    with pytest.raises(MeshError, match=r"^mesh must be"):
+        Deformer(None, SCENE.regions, SCENE.cages)
+    with pytest.raises(RegionError, match=r"^regions must be"):
+        Deformer(SCENE.mesh, None, SCENE.cages)
+    with pytest.raises(ArgumentError, match=r"^cages"):
+        Deformer(SCENE.mesh, SCENE.regions, [SCENE.mesh] * 2)
+    with pytest.raises(ArgumentError, match=r"^progress must be"):
+        SCENE.held().solve(REST, progress=3)
+    with pytest.raises(ArgumentError, match=r"^solution must be"):
+        SCENE.held().finish(VERTICES)
+
+
+def test_binding_with_few_rotation_clusters_reports_every_stage_in_order():
+    seen = []
+    SCENE.deformer(rotation_groups=40, progress=lambda fraction, _: seen.append(fraction))
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("degrees", [2, 40, 90])
+def test_legs_toward_a_contact_are_little_longer_than_the_clearance(
+    clearance, degrees, monkeypatch
+):
+    """By half a sample, but as long as one at least; without a contact they are of usual length."""
+    monkeypatch.setattr(Contact, "clearance", lambda _, p, most: min(clearance, most))
+    free, avoiding = SCENE.held(), SCENE.held(avoid_contact=True)
+    goal, start = free._frame.inward(SCENE.turned(degrees)), free._path.targets
+    usual = [start, *waypoints(start, goal, free._constraints.handles)]
+    assert_array_equal([start, *free._way_to(goal), goal], usual)
+    way = [start, *avoiding._way_to(goal), goal]
+    legs = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(way)]
+    spacing = avoiding._constraints.contact.surface.spacing
+    longest = max(clearance + 0.5 * spacing, spacing)
+    assert 0.05 < spacing < 0.06
+    if degrees == 2:  # shorter than a sample
+        assert len(legs) == 1
+    else:
+        assert 0.7 * longest < max(legs) <= longest
+
+
+def test_samples_of_a_body_are_held_where_half_of_their_vertices_are(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    deformer = SCENE.deformer(avoid_contact=True)
+    cells, is_held = deformer._samples.cells, deformer._constraints.contact.held
+    ids = np.concatenate([SCENE.fixed, SCENE.handle])
+    shares = [np.isin(np.flatnonzero(cells == k), ids).mean() for k in range(len(is_held))]
+    assert_array_equal(is_held, np.array(shares) >= 0.5)
+    assert any(0.0 < share < 0.5 for share in shares)
+
+
+def test_a_deformer_without_options_is_the_one_with_their_defaults():
+    plain = SCENE.deformer().solve(SCENE.turned(30))
+    same = SCENE.deformer(
+        preserve_volume=True, preserve_region_volumes=False, stretch=1.0, tolerance=1e-7,
+        max_steps=500, avoid_contact=False, rotation_groups=300, lids=None,
+    ).solve(SCENE.turned(30))  # fmt: skip
+    assert_array_equal(plain.vertices, same.vertices)

@@ -23,7 +23,8 @@ def test_in_solver_coordinates_the_mesh_fits_into_a_ball_of_diameter_one(shift):
 
 def test_near_the_origin_poses_are_computed_in_the_coordinates_of_the_scene():
     frame = Frame.of(POINTS + 0.5)
-    assert not frame.is_far
+    assert frame.is_far is False
+    assert_array_equal(frame.origin, np.zeros(3))
     assert frame.about_origin(POINTS) is frame.in_scene(POINTS) is POINTS
 
 

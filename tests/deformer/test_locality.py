@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 from real_meshes import path_of
 from scenes import sausage
 from scipy import linalg, sparse
+from scipy.sparse import csgraph
 
 from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import fit_cages
@@ -123,7 +124,7 @@ def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_on
     def slope(k, q):
         anchors = Anchors(k * solver.energy.mass, squeezed, np.zeros_like(p))
         position = solver.positions.local(solver.positions.rows, anchors)
-        return replace(solver, positions=position)._iterate_at(q, position.toward(places)).slope
+        return replace(solver, positions=position)._at(q, places).slope
 
     def least_curvature(k):
         steps = 1e-6 * np.eye(p.size).reshape(-1, *p.shape)
@@ -343,6 +344,7 @@ def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monk
         ({"reach": 0.0}, "reach must be a positive number"),
         ({"reach": np.nan}, "reach must be a positive number"),
         ({"spread": np.inf}, "spread must be a positive number"),
+        ({"spread": 0.0}, "spread must be a positive number"),
         ({"spread": "wide"}, "spread must be a positive number"),
         ({"follows": 1.5}, "follows must be a number from 0 to 1"),
         ({"follows": None}, "follows must be a number from 0 to 1"),
@@ -390,3 +392,207 @@ def bends(x, faces):
     across = np.cross(one, two)
     sine = np.einsum("ij,ij->i", across, along) / np.linalg.norm(along, axis=1)
     return np.arctan2(sine, np.einsum("ij,ij->i", one, two))
+
+
+def test_weights_grow_with_the_distance_to_the_largest_one():
+    samples, away = chain(25), np.arange(25.0)
+    for reach in (1.0, 2.5):
+        weights = samples.weights(SurfacePoint.at_vertex(0), reach, 0.0)
+        expected = np.minimum(np.maximum((away / reach) ** 2 - 1.0, 0.0) ** 2, 1e4)
+        assert_allclose(weights, expected)
+    assert samples.weights(SurfacePoint.at_vertex(0), np.inf, 0.0).tolist() == [0.0] * 25
+
+
+def test_a_point_of_an_edge_is_as_far_as_its_nearer_corner():
+    one = held()._samples
+    a, b = SCENE.mesh.edges[5]
+    point = SurfacePoint.of([a, b], [0.3, 0.7])
+    graph = one.edges
+    length = np.linalg.norm(one.points[a] - one.points[b])
+    from_corners = csgraph.dijkstra(graph, directed=False, indices=[a, b])
+    expected = np.minimum(from_corners[0] + 0.7 * length, from_corners[1] + 0.3 * length)
+    assert_allclose(one.distances(point), expected, atol=1e-12)
+
+
+def two_sheets(gap: float, *, apart: float) -> SurfaceSamples:
+    """Return two square sheets back to back, the other one moved by other cages by *apart*."""
+    u = np.arange(5) / 4.0
+    grid = np.stack(np.meshgrid(u, u, indexing="ij"), axis=-1).reshape(-1, 2)
+    a = (5 * np.arange(4)[:, None] + np.arange(4)).ravel()
+    faces = np.concatenate([np.stack([a, a + 5, a + 6], 1), np.stack([a, a + 6, a + 1], 1)])
+    faces = np.concatenate([faces, faces[:, ::-1] + 25])
+    low = np.column_stack([grid, np.zeros(25)])
+    points = np.concatenate([low, low - [0.0, 0.0, gap]])
+    rows = np.column_stack([points[:, :2], 1.0 - points[:, :2].sum(axis=1), np.zeros(50)])
+    rows[25:, 2] -= apart
+    rows[25:, 3] += apart
+    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
+    lengths = np.linalg.norm(points[i] - points[j], axis=1)
+    graph = sparse.coo_array((lengths, (i, j)), (50, 50)).tocsr()
+    areas = np.full(50, 1.0 / 50.0)
+    return SurfaceSamples(np.arange(50), rows, points, areas, faces, graph.maximum(graph.T).tocsr())
+
+
+def test_the_sides_of_a_thin_wall_are_joined_if_the_cages_cannot_move_them_apart():
+    """Nearer, and moved more alike, than the ends of an edge: 1/4, and 1/2 in rows."""
+    point = SurfacePoint.at_vertex(12)
+    for gap, apart, joined in (
+        (0.1, 0.0, True),
+        (0.1, 0.2, True),
+        (0.1, 0.6, False),
+        (0.5, 0.0, False),
+    ):
+        away = two_sheets(gap, apart=apart).distances(point)
+        assert away[12] == 0.0
+        assert np.isfinite(away[:25]).all()
+        if joined:
+            assert away[37] == pytest.approx(gap)
+            assert (np.abs(away[25:] - away[:25]) <= gap + 1e-12).all()
+        else:
+            assert np.isinf(away[25:]).all()
+
+
+def test_sheets_that_face_the_same_way_are_joined_only_if_they_are_two_components():
+    samples = two_sheets(0.1, apart=0.0)
+    same = replace(
+        samples, faces=np.where(samples.faces < 25, samples.faces, samples.faces[:, ::-1])
+    )
+    assert np.isfinite(same.distances(SurfacePoint.at_vertex(0))).all()
+    edges = samples.edges.tolil()
+    edges[24, 49] = edges[49, 24] = 0.1  # joined at a far corner
+    one = replace(same, edges=edges.tocsr())
+    path = csgraph.dijkstra(one.edges, directed=False, indices=0)
+    assert_allclose(one.distances(SurfacePoint.at_vertex(0)), path)
+    assert path[25] > 2.0
+    layered = replace(samples, edges=edges.tocsr())
+    assert layered.distances(SurfacePoint.at_vertex(0))[25] == pytest.approx(0.1)
+
+
+def test_a_soft_row_has_the_least_shares_that_reproduce_affine_maps():
+    """Of all psi with these moments, psi^2 weighted by (1 - d^2)^2 a is least: dense equations."""
+    own = held()._samples
+    samples = replace(own, rows=np.eye(len(own.points)))
+    at, spread = own.points[HIGH] + [0.001, 0.0, 0.0], 0.15
+    row = samples.soft_row(SurfacePoint.at_vertex(HIGH), at, spread)
+    away = samples.distances(SurfacePoint.at_vertex(HIGH)) / spread
+    near = np.flatnonzero(away < 1.0)
+    assert 4 < len(near) < 0.3 * len(row)
+    assert not np.delete(row, near).any()
+    weights = own.areas[near] * (1.0 - away[near] ** 2) ** 2
+    basis = np.column_stack([np.ones(len(near)), (own.points[near] - at) / spread])
+    full = np.block([[np.diag(1.0 / weights), basis], [basis.T, np.zeros((4, 4))]])
+    expected = np.linalg.solve(full, np.append(np.zeros(len(near)), [1.0, 0.0, 0.0, 0.0]))
+    assert_allclose(row[near], expected[:-4], atol=1e-6)
+
+
+def test_values_of_samples_are_smoothed_between_cells(monkeypatch):
+    own = held()._samples
+    values = np.sin(3.0 * own.points[:, 0])
+    assert_allclose(own.smooth_at_vertices(values), values)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    coarse = SCENE.deformer()._samples
+    assert_allclose(coarse.smooth_at_vertices(np.ones(len(coarse.points))), 1.0)
+    ids = np.arange(len(coarse.points)) % 2.0
+    raw, smooth = ids[coarse.cells], coarse.smooth_at_vertices(ids)
+    assert smooth.min() >= 0.0
+    assert smooth.max() <= 1.0
+    i, j = SCENE.mesh.edges.T
+    assert np.abs(smooth[i] - smooth[j]).max() < 0.5 * np.abs(raw[i] - raw[j]).max()
+    assert smooth.std() > 0.02
+
+
+def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    deformer = SCENE.deformer()
+    samples, rest = deformer._samples, deformer._rest
+    assert len(samples.points) < 100
+    for cell in range(0, len(samples.points), 7):
+        own = np.flatnonzero(samples.cells == cell)
+        areas = rest.vertex_areas[own]
+        assert_allclose(samples.points[cell], np.average(rest.vertices[own], axis=0, weights=areas))
+        assert samples.areas[cell] == pytest.approx(areas.sum() / rest.vertex_areas.sum())
+    assert_allclose(samples.rows @ deformer._rest_cages, samples.points, atol=1e-6)
+    near = samples.edges.tocoo()
+    expected = np.linalg.norm(samples.points[near.row] - samples.points[near.col], axis=1)
+    assert_allclose(near.data, expected)
+    a, b = samples.cells[SCENE.mesh.edges].T
+    joined = samples.edges.toarray() > 0.0
+    assert joined[a, b][a != b].all()
+
+
+def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
+    samples = SCENE.deformer()._samples
+    surface, x = samples.contact_surface, SCENE.deformer()._rest.vertices
+    normals = surface.normals(samples.points)
+    for cell, normal in enumerate(normals):
+        over = (x[samples.cells == cell] - samples.points[cell]) @ normal
+        height = max(0.0, over.max())
+        expected = min(0.2 * surface.radii[cell] + height, surface.gaps[cell])
+        assert surface.margins[cell] == pytest.approx(expected)
+
+
+def test_a_ring_needs_three_neighbours_away_from_its_point():
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    ring = Ring.around(tetrahedron, x, SurfacePoint.at_vertex(0))
+    assert ring.edge == pytest.approx(1.0)
+    assert_allclose(ring.offsets[0], -np.full(3, 1.0 / 3.0), atol=1e-12)
+    assert_allclose(ring.weights, [1.0, *[0.1 / 3.0] * 3])
+    assert Ring.around(tetrahedron, 0.0 * x, SurfacePoint.at_vertex(0)) is None
+    triangle = Mesh(x[:3], [[0, 1, 2]])
+    assert Ring.around(triangle, x[:3], SurfacePoint.at_vertex(0)) is None
+    assert Ring.around(tetrahedron, x, SurfacePoint.of([0, 1], [0.5, 0.5])) is None
+
+
+def test_parts_beyond_the_reach_follow_by_their_area():
+    """Along a line of twelve samples seven lie beyond on one side, and two on the other."""
+    samples = chain(12)
+    point = SurfacePoint.at_vertex(8)
+    for follows, count in ((0.28, 0), (0.29, 2)):
+        weights = samples.weights(point, 1.0, follows)
+        assert np.count_nonzero(weights[:7]) == 7
+        assert np.count_nonzero(weights[10:]) == 2 - count
+    large = replace(samples, areas=np.where(np.arange(12) > 9, 10.0, 1.0) / 30.0)
+    weights = large.weights(point, 1.0, 0.9)
+    assert not weights[:7].any()
+    assert weights[10:].all()
+
+
+def test_a_body_that_nothing_holds_follows_its_pulled_point():
+    """All of it is within the reach; the drag, without which it might turn, is weak."""
+    x, d = coarse().mesh.vertices, coarse().mesh.diagonal
+    top, low = int(x[:, 2].argmax()), int(x[:, 2].argmin())
+    local = coarse().hold(handle=[top]).local(top, 10.0 * d, 0.1 * d)
+    solution = local.solve(x[[top]] + [0.0, 0.0, 0.3 * d])
+    assert solution.vertices[low, 2] - x[low, 2] > 0.95 * 0.3 * d
+    assert_allclose(solution.vertices.mean(axis=0)[:2], x.mean(axis=0)[:2], atol=0.02 * d)
+
+
+def test_a_drag_is_added_only_where_all_of_the_grabbed_part_is_free():
+    point, deformer = SurfacePoint.at_vertex(HIGH), held()
+    assert not deformer._drag_of(point, np.inf, 0.0).any()
+    assert not deformer._drag_of(point, 0.1, 0.0).any()
+    drag = deformer._drag_of(point, 5.0, 0.0)  # mesh sizes
+    assert np.linalg.eigvalsh(drag)[0] > -1e-12
+    assert 0.0 < np.trace(drag) < 1e-2 * np.trace(deformer._binding.energy.quadratic)
+
+
+@pytest.mark.parametrize("corners", [1, 2, 3])
+def test_the_surface_around_a_point_is_pulled_where_its_ring_may_not_resist(corners):
+    """A neighbour is fixed.  The point is that of the surface, not a mean of the corners alone."""
+    face = SCENE.mesh.faces[(SCENE.mesh.faces == HIGH).any(axis=1)][0]
+    face = [HIGH, *face[face != HIGH]]
+    shares = np.array([[1.0, 0.0, 0.0], [0.6, 0.4, 0.0], [0.5, 0.3, 0.2]][corners - 1])
+    point = SurfacePoint.of(face, shares)
+    near = np.setdiff1d(SCENE.mesh.adjacency[[HIGH]].indices, face)[0]
+    local = held().hold(fixed=[near], handle=[HIGH]).local(point, 0.3 * D, 0.2 * D)
+    solver, pulled = local._constraints.solver, local._constraints.pulled
+    assert solver.energy is local._binding.energy
+    assert pulled.points == (point,)
+    row, own = solver.positions.rows[pulled.places[0]], local._row_of(point)
+    assert np.abs(row - own).max() > 1e-3
+    assert_allclose(row @ local._rest_cages, own @ local._rest_cages, atol=2e-2)

@@ -1,12 +1,13 @@
-"""A pose made in one call is finished on the mesh by default, unless the mesh is large."""
+"""The finish of poses: by default in one call, on request by a deformer; what it keeps."""
 
 from __future__ import annotations
 
+import itertools
 from threading import Event
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform import sizes
@@ -110,3 +111,54 @@ def test_a_finish_is_cancelled_even_while_its_matrix_is_factored(monkeypatch):
         assert not released.is_set()
     finally:
         released.set()
+
+
+def test_the_finish_of_a_pull_moves_its_reach_only():
+    mesh, tip = SCENE.mesh, int(np.argmax(SCENE.mesh.vertices[:, 0]))
+    deformer = SCENE.held().hold(handle=[tip])
+    x, size = mesh.vertices, mesh.diagonal
+    pulled = deformer.local(tip, 0.2 * size, 0.05 * size)
+    solution = pulled.solve(x[[tip]] + [0.0, 0.05 * size, 0.0])
+    found = pulled.finish(solution)
+    away = np.linalg.norm(x - x[tip], axis=1)
+    moved = np.linalg.norm(found.vertices - solution.vertices, axis=1)
+    assert moved[away > 0.23 * size].max() == 0.0
+    assert moved[away < 0.04 * size].max() < 1e-5 * size
+    assert moved.max() > 1e-4 * size
+    assert abs(found.volume_change) < 1e-13
+
+
+def test_a_pose_whose_volume_a_finish_would_lose_is_returned_as_it_is():
+    held = np.setdiff1d(np.arange(SCENE.mesh.n_vertices), SCENE.handle)
+    deformer = SCENE.held().hold(fixed=held, handle=SCENE.handle)
+    solution = deformer.solve(SCENE.mesh.vertices[SCENE.handle] + [0.02, 0.0, 0.0])
+    assert abs(solution.volume_change) < 1e-13
+    assert deformer.finish(solution) is solution
+
+
+def test_cancelling_at_any_step_changes_nothing_of_the_solution():
+    deformer = SCENE.held()
+    targets = SCENE.turned(40)
+    solution = deformer.solve(targets)
+    before, steps = solution.vertices.copy(), itertools.count()
+
+    def cancel(fraction, text):
+        assert 0.0 <= fraction <= 1.0
+        assert text
+        if next(steps) == 5:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        deformer.finish(solution, progress=cancel)
+    assert_array_equal(solution.vertices, before)
+    finished = deformer.finish(solution)
+    assert finished.handle_error < 1e-15
+    assert finished.fixed_error == 0.0
+    assert abs(finished.volume_change) < 1e-13
+    assert_array_equal(finished.cage_vertices, solution.cage_vertices)
+    assert finished.steps > solution.steps
+    assert finished.status is solution.status
+    assert_allclose(deformer.solve(targets).vertices, before, atol=1e-6)
+    deformer.solve(SCENE.turned(10))
+    with pytest.raises(ArgumentError, match="last solve"):
+        deformer.finish(solution)

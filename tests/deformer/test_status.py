@@ -15,12 +15,12 @@ from solids import rotation, torus
 from vtk_segdeform import models
 from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
-from vtk_segdeform.finish import Finisher, finisher
+from vtk_segdeform.finish import finisher
 from vtk_segdeform.geometry import turned_over
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.models.implicit import Limb, implicit_surface
 from vtk_segdeform.regions import Regions, segment
-from vtk_segdeform.solver import CONVERGED, Status
+from vtk_segdeform.solver import CONVERGED, Status, newton
 
 SCENE = sausage(2, is_coarse=True)
 D = SCENE.mesh.diagonal
@@ -141,7 +141,7 @@ def test_a_finish_that_cannot_move_the_pose_stalls(monkeypatch):
     deformer, (solution, _) = finished(bent_snake)
     monkeypatch.setattr(finisher, "_STEPS", 1)
     first = deformer.finish(solution)
-    monkeypatch.setattr(Finisher, "_improved", lambda *_: None)
+    monkeypatch.setattr(newton, "_lower", lambda *_: None)
     again = deformer.finish(first)
     assert_array_equal(again.vertices, first.vertices)
     assert again.status is Status.STALLED

@@ -12,16 +12,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from scipy import optimize
+from scipy import optimize, sparse
 from solids import exact_volume_change, icosphere, rotation
 
 from vtk_segdeform import deform, sizes
-from vtk_segdeform.errors import ArgumentError, Cancelled
+from vtk_segdeform.errors import MeshError
 from vtk_segdeform.finish import CellEnergy, Finish, Finisher, cell_energy
 from vtk_segdeform.finish import finisher as finishing
+from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
 from vtk_segdeform.mesh import Mesh, new_crossings
-from vtk_segdeform.solver import Bodies, total_volume
+from vtk_segdeform.solver import Bodies, Status, total_volume
 
 SCENE = sausage(2, is_coarse=True)
 PER_CAGE = 60.0  # vertices, so that the cells are larger than a ring
@@ -180,11 +181,11 @@ def test_the_gradient_of_the_objective_is_its_derivative():
     finisher, rng = SAUSAGE.finisher(), np.random.default_rng(0)
     finisher.run(SAUSAGE.start, SAUSAGE.places)  # which sets y
     x, way = (rng.normal(size=SAUSAGE.start.shape) for _ in range(2))
-    x = SAUSAGE.start + 0.02 * x
+    x, way[finisher._held] = SAUSAGE.start + 0.02 * x, 0.0
     exact = 2.0 * np.vdot(finisher._evaluated(x).slope, way)
     errors = []
     for h in (1e-3, 5e-4):
-        ahead, behind = (finisher._evaluated(x + s * h * way).value for s in (1.0, -1.0))
+        ahead, behind = (finisher._evaluated(x + s * h * way).merit for s in (1.0, -1.0))
         errors.append(abs((ahead - behind) / (2.0 * h) - exact))
     assert errors[0] < 1e-2 * abs(exact)
     assert 3.0 < errors[0] / errors[1] < 5.0
@@ -339,21 +340,6 @@ def test_far_from_what_moves_there_is_no_energy():
     assert_allclose(rows.toarray(), 0.0, atol=1e-12)
 
 
-def test_the_finish_of_a_pull_moves_its_reach_only():
-    mesh, tip = SCENE.mesh, int(np.argmax(SCENE.mesh.vertices[:, 0]))
-    deformer = SCENE.held().hold(handle=[tip])
-    x, size = mesh.vertices, mesh.diagonal
-    pulled = deformer.local(tip, 0.2 * size, 0.05 * size)
-    solution = pulled.solve(x[[tip]] + [0.0, 0.05 * size, 0.0])
-    found = pulled.finish(solution)
-    away = np.linalg.norm(x - x[tip], axis=1)
-    moved = np.linalg.norm(found.vertices - solution.vertices, axis=1)
-    assert moved[away > 0.23 * size].max() == 0.0
-    assert moved[away < 0.04 * size].max() < 1e-5 * size
-    assert moved.max() > 1e-4 * size
-    assert abs(found.volume_change) < 1e-13
-
-
 def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_other(monkeypatch):
     """Both threads have run each kernel before either of them continues with its result."""
     pytest.importorskip("numba")
@@ -384,14 +370,6 @@ def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_oth
         assert_array_equal(each, alone)
 
 
-def test_a_pose_whose_volume_a_finish_would_lose_is_returned_as_it_is():
-    held = np.setdiff1d(np.arange(SCENE.mesh.n_vertices), SCENE.handle)
-    deformer = SCENE.held().hold(fixed=held, handle=SCENE.handle)
-    solution = deformer.solve(SCENE.mesh.vertices[SCENE.handle] + [0.02, 0.0, 0.0])
-    assert abs(solution.volume_change) < 1e-13
-    assert deformer.finish(solution) is solution
-
-
 @pytest.mark.parametrize("scale", [2.0**200, 2.0**-200])
 def test_the_finish_of_a_huge_or_tiny_mesh_is_that_of_the_mesh(scale):
     mesh, ends = SCENE.mesh, (SCENE.fixed, SCENE.handle)
@@ -401,34 +379,6 @@ def test_the_finish_of_a_huge_or_tiny_mesh_is_that_of_the_mesh(scale):
     other = deform(scaled, *ends, scale * SCENE.turned(30), **options)
     assert one.steps == other.steps
     assert_allclose(other.vertices / scale, one.vertices, rtol=0, atol=1e-9)
-
-
-def test_cancelling_at_any_step_changes_nothing_of_the_solution():
-    deformer = SCENE.held()
-    targets = SCENE.turned(40)
-    solution = deformer.solve(targets)
-    before, steps = solution.vertices.copy(), itertools.count()
-
-    def cancel(fraction, text):
-        assert 0.0 <= fraction <= 1.0
-        assert text
-        if next(steps) == 5:
-            raise Cancelled
-
-    with pytest.raises(Cancelled):
-        deformer.finish(solution, progress=cancel)
-    assert_array_equal(solution.vertices, before)
-    finished = deformer.finish(solution)
-    assert finished.handle_error < 1e-15
-    assert finished.fixed_error == 0.0
-    assert abs(finished.volume_change) < 1e-13
-    assert_array_equal(finished.cage_vertices, solution.cage_vertices)
-    assert finished.steps > solution.steps
-    assert finished.status is solution.status
-    assert_allclose(deformer.solve(targets).vertices, before, atol=1e-6)
-    deformer.solve(SCENE.turned(10))
-    with pytest.raises(ArgumentError, match="last solve"):
-        deformer.finish(solution)
 
 
 def test_a_hat_lifted_off_a_head_leaves_both_as_they_are():
@@ -441,3 +391,113 @@ def test_a_hat_lifted_off_a_head_leaves_both_as_they_are():
     solution = deform(mesh, fixed, handle, x[handle] + [0.0, 0.0, 1.0])
     lifted = np.where(np.arange(len(x)) < len(head), 0.0, 1.0)[:, None] * [0.0, 0.0, 1.0]
     assert_allclose(solution.vertices, x + lifted, atol=1e-5)
+
+
+def test_with_all_vertices_held_no_step_is_taken():
+    mesh = SCENE.mesh
+    everything = np.ones(mesh.n_vertices, bool)
+    found = Problem(mesh, everything, mesh.vertices + 1.0, mesh.vertices).finish()
+    assert (found.steps, found.merits, found.remaining) == (0, (), 0.0)
+    assert found.status is Status.CONVERGED
+
+
+def test_a_pose_that_is_not_finite_is_lower_than_none():
+    problem = bent(sheet())  # without a volume
+    finisher = problem.finisher()
+    finisher.run(problem.start, problem.places)
+    assert finisher.moved(problem.start * np.nan, []).merit == np.inf
+    assert finisher.moved(problem.start, []).merit < np.inf
+
+
+def test_a_step_is_that_of_the_dense_equations():
+    """H is the Laplacian of the free vertices and w; the volume changes by its violation."""
+    finisher = SAUSAGE.finisher()
+    finisher.run(SAUSAGE.start, SAUSAGE.places)  # which sets y
+    free, mesh = ~SAUSAGE.held, SAUSAGE.mesh
+    x = SAUSAGE.start + np.where(free[:, None], 0.01 * np.cos(4.0 * SAUSAGE.start), 0.0)
+    here, volume = finisher._evaluated(x), total_volume(mesh)
+    weights = mesh.vertex_areas / (0.06 * mesh.diagonal) ** 2
+    matrix = CellEnergy.of(mesh).laplacian.toarray() + np.diag(weights)
+    h = np.kron(matrix[free][:, free], np.eye(3))
+    row = volume.gradient(x)[free].reshape(1, -1)
+    dense = np.block([[h, row.T], [row, np.zeros((1, 1))]])
+    right = -np.append(here.slope[free].ravel(), volume.violation(x))
+    step = finisher.step(here)
+    assert_allclose(step.h[free].ravel(), np.linalg.solve(dense, right)[:-1], atol=1e-9)
+    assert not step.h[SAUSAGE.held].any()
+    assert not here.slope[SAUSAGE.held].any()
+    assert step.length == pytest.approx(np.linalg.norm(step.h, axis=1).max())
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_uniform_growth_has_the_energy_of_its_area(compiled, monkeypatch):
+    """|s R - R|^2 is 2 (s - 1)^2 for a triangle, with whatever cells; a rigid motion has none."""
+    monkeypatch.setattr(sizes, "COMPILED", 0 if compiled else 10**9)
+    mesh, turn = SCENE.mesh, rotation([1.0, 2.0, 3.0], 2.0)
+    area = mesh.face_areas.sum()
+    for per_cage in (0.0, 40.0, 170.0):
+        energy = CellEnergy.of(mesh, per_cage)
+        for s in (1.0, 1.3, 0.6):
+            value, slope = energy.value_and_slope(s * mesh.vertices @ turn.T + [1.0, -2.0, 0.5])
+            assert value == pytest.approx(2.0 * (s - 1.0) ** 2 * area, abs=1e-9 * area)
+            expected = (s - 1.0) * (energy.laplacian @ mesh.vertices) @ turn.T
+            assert_allclose(slope, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("rounds", [0, 2])
+def test_with_and_without_compiled_kernels_energies_are_the_same(rounds, monkeypatch):
+    pytest.importorskip("numba")
+    energy, found = CellEnergy.of(SCENE.mesh, 40.0 * rounds), []
+    for size in (0, 10**9):
+        monkeypatch.setattr(sizes, "COMPILED", size)
+        found.append(energy.value_and_slope(SAUSAGE.start))
+    assert found[0][0] == pytest.approx(found[1][0], rel=1e-12)
+    assert_allclose(found[0][1], found[1][1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("per_cage", "rounds", "share"), [(0, 0, 0), (40, 1, 0.4), (60, 2, 0.3), (9000, 12, 0.5)]
+)
+def test_a_walk_is_a_hundredth_of_the_vertices_per_cage_vertex(per_cage, rounds, share):
+    """In rounds of one half at most, of which there are not more than twelve."""
+    energy = CellEnergy.of(SCENE.mesh, float(per_cage))
+    assert (energy._rounds, energy._share) == (rounds, pytest.approx(share))
+
+
+def test_where_almost_everything_moves_or_nothing_the_energy_is_all_of_it():
+    whole = CellEnergy.of(SCENE.mesh, PER_CAGE)
+    none, every = np.zeros(SCENE.mesh.n_vertices, bool), np.ones(SCENE.mesh.n_vertices, bool)
+    expected = whole.value_and_slope(SAUSAGE.start)
+    for moving in (none, every):
+        near = whole.near(moving)
+        assert near is not whole  # it has rooms of its own
+        value, slope = near.value_and_slope(SAUSAGE.start)
+        assert value == expected[0]
+        assert_array_equal(slope, expected[1])
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("n", [0, 1, 40])
+def test_the_factored_matrix_solves_as_the_dense_one(n, compiled, monkeypatch):
+    monkeypatch.setattr(sizes, "COMPILED", 0 if compiled else 10**9)
+    rng = np.random.default_rng(n)
+    some = sparse.random_array((n, n), density=0.1, rng=rng)
+    matrix = (
+        sparse.csr_array(some @ some.T + sparse.eye_array(n)) if n else sparse.csr_array((0, 0))
+    )
+    right = rng.normal(size=(n, 3))
+    expected = np.linalg.solve(matrix.toarray(), right) if n else right
+    assert_allclose(factored(matrix)(right), expected, atol=1e-12)
+
+
+def test_a_singular_matrix_is_refused():
+    with pytest.raises(MeshError, match="the pose cannot be finished on this mesh"):
+        factored(sparse.csr_array(np.ones((2, 2))))
+
+
+def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
+    mesh, held = SCENE.mesh, SAUSAGE.held
+    places = mesh.vertices[held] + np.where(mesh.vertices[held, :1] > 0.0, 0.4, 0.0) * [1, 0, 0]
+    x = SAUSAGE.finisher()._at_places(mesh.vertices, places)
+    assert_array_equal(x[held], places)
+    assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csgraph
 from solids import icosphere, rotation
 
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.finish import CellEnergy, Finisher, untangling
-from vtk_segdeform.finish.untangling import contour, untangled
+from vtk_segdeform.finish.untangling import around, contour, untangled
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.mesh import Crossings, Mesh
 from vtk_segdeform.solver import Bodies, total_volume
@@ -88,6 +89,16 @@ def test_parts_are_drawn_apart_alike_in_any_place_and_unit():
     assert_allclose(there, moved(untangled(REST, TOUCHING, FREE, crossings())), atol=1e-4)
 
 
+def test_a_vertex_of_a_tangle_moves_whatever_its_number():
+    crossing = np.unique(crossings().pairs(TOUCHING))
+    own = around(REST, crossing, 4)
+    middle = int(REST.faces[crossing[0], 0])
+    order = np.r_[np.setdiff1d(np.arange(len(own)), middle), middle]
+    mesh = Mesh(REST.vertices[order], np.argsort(order)[REST.faces])
+    apart = untangling._opened(mesh, TOUCHING[order], FREE[order], own[order])
+    assert (apart[-1] != TOUCHING[middle]).any()
+
+
 def test_a_pose_that_cannot_be_drawn_apart_stays_as_it_is():
     nothing = np.zeros(len(TOUCHING), dtype=bool)
     assert untangled(REST, TOUCHING, nothing, crossings()) is TOUCHING
@@ -131,3 +142,58 @@ def test_drawing_apart_can_be_cancelled():
 
     with pytest.raises(Cancelled, match="enough"):
         untangled(REST, TOUCHING, FREE, crossings(), progress=stop)
+
+
+def test_of_two_tangles_the_one_that_can_be_drawn_apart_is():
+    n, aside = len(TOUCHING), np.array([0.0, 9.0, 0.0])
+    mesh = Mesh(
+        np.concatenate([REST.vertices, REST.vertices + aside]),
+        np.concatenate([REST.faces, REST.faces + n]),
+    )
+    pose = np.concatenate([TOUCHING, TOUCHING + aside])
+    free, own = np.repeat([False, True], n), Crossings(mesh.vertices, mesh.faces)
+    before = len(own.pairs(pose))
+    apart = untangled(mesh, pose, free, own)
+    assert len(own.pairs(apart)) == before // 2
+    assert_array_equal(apart[~free], pose[~free])
+
+
+def test_two_triangles_cross_in_a_segment_of_known_length_and_slope():
+    """The second one stands upright on the first, its upper edge parallel to it."""
+    points = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1], [2, 1, 1], [1.5, 1, -1.0]])
+    faces, pairs = np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]])
+    length, slope = contour(points, faces, pairs)
+    assert length == pytest.approx(0.5)
+    assert contour(points, faces, pairs[:, ::-1])[0] == pytest.approx(0.5)
+    # Raised by dz it is shorter by dz / 2, and wider at the top by dx it is longer by dx / 2.
+    assert slope[3:, 2].sum() == pytest.approx(-0.5)
+    assert slope[:3, 2].sum() == pytest.approx(0.5)
+    assert_allclose(slope[3:5, 0], [-0.5, 0.5], atol=1e-12)
+    assert_allclose(slope[:, 1], 0.0, atol=1e-12)
+    apart = points + np.outer(np.arange(6) >= 3, [0.0, 0.0, 3.0])
+    assert contour(apart, faces, pairs)[0] == 0.0
+
+
+def test_the_gradient_is_bounded_where_an_edge_is_almost_in_the_plane():
+    points = np.array(
+        [[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1e-6], [2, 1, -1e-6], [1.5, 2, 1e-6]]
+    )
+    length, slope = contour(points, np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]]))
+    assert length > 0.1
+    assert 1.0 < np.abs(slope).max() <= 2.0 * untangling._STEEPEST
+
+
+@pytest.mark.parametrize("rings", [0, 1, 3])
+def test_so_many_rings_around_faces_are_what_is_within_so_many_edges(rings):
+    corners = REST.faces[[5, 700]].ravel()
+    away = csgraph.dijkstra(REST.adjacency, unweighted=True, indices=corners, min_only=True)
+    assert_array_equal(around(REST, np.array([5, 700]), rings), away <= rings)
+
+
+def test_lengths_of_segments_with_two_ends_and_with_a_common_corner_add_up():
+    crossing = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1], [2, 1, 1], [1.5, 1, -1.0]])
+    sharing = np.array([[0.0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0, 1.2]]) + 20.0
+    faces = np.array([[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 9, 10]])
+    points, pairs = np.concatenate([crossing, sharing]), np.array([[0, 1], [2, 3]])
+    assert contour(points, faces, pairs)[0] == pytest.approx(0.5 + 1.0)
+    assert contour(points, faces, pairs[::-1])[0] == pytest.approx(0.5 + 1.0)

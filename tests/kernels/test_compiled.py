@@ -92,7 +92,7 @@ def test_kernels_are_loaded_early_in_another_thread_and_only_once(monkeypatch):
     names = []
     kernels = functools.cache(lambda: names.append(threading.current_thread().name))
     started = []
-    monkeypatch.setattr(dispatch, "_kernels", kernels)
+    monkeypatch.setattr(dispatch, "_module", kernels)
     monkeypatch.setattr(dispatch, "Thread", lambda **k: started.append(k) or threading.Thread(**k))
     for _ in range(2):
         dispatch.load_early()
@@ -111,7 +111,7 @@ def test_small_arrays_do_not_wait_for_late_kernels(monkeypatch):
     monkeypatch.delitem(sys.modules, "vtk_segdeform.kernels.compiled", raising=False)
     monkeypatch.setattr(dispatch, "_checked", [sizes.COMPILED_CHECKS])
     kernels = functools.cache(lambda: loaded)
-    monkeypatch.setattr(dispatch, "_kernels", kernels)
+    monkeypatch.setattr(dispatch, "_module", kernels)
     monkeypatch.setattr(dispatch, "_is_late", [False])
     dispatch.load_late()
     assert dispatch.compiled_kernels(sizes.COMPILED_LATE - 1) is None
@@ -550,7 +550,7 @@ def test_kernels_are_compiled_without_a_cache_folder(monkeypatch):
     caching = pytest.importorskip("numba.core.caching")
     kernels = importlib.import_module("vtk_segdeform.kernels.compiled.kernels")
     monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
-    twice = kernels.kernel()(lambda x: x + x)
+    twice = kernels.kernel()()(lambda x: x + x)
     assert twice(1.5) == 3.0
     assert twice.signatures
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 from vtk_segdeform.solver.anderson import Anderson
@@ -41,3 +42,20 @@ def test_after_forget_the_next_step_is_the_plain_one():
     p = _steps(anderson, A, b, np.zeros_like(b), N)
     anderson.forget()
     assert_allclose(_steps(anderson, A, b, p, 1), p + 0.5 * A @ (b - p))
+
+
+@pytest.mark.parametrize("window", [1, 2])
+def test_a_step_combines_the_last_ones_so_that_their_residuals_cancel_best(window):
+    """In the form with weights of sum 1, the residuals measured in a norm of their own."""
+    A, b = _problem()
+    norm, anderson = np.diag([1.0, 2.0, 3.0, 4.0]), Anderson(window)
+    p, ps, hs = np.zeros_like(b), [], []
+    for _ in range(4):
+        ps, hs = [*ps, p], [*hs, 0.5 * A @ (b - p)]
+        p = anderson.extrapolate(p, hs[-1], norm @ hs[-1])
+    own = np.hstack([norm @ h for h in hs[-window - 1 :]])
+    ones = np.ones((window + 1, 1))  # min |own a| subject to sum a = 1, by its conditions
+    full = np.block([[own.T @ own, ones], [ones.T, np.zeros((1, 1))]])
+    shares = np.linalg.solve(full, np.append(np.zeros(window + 1), 1.0))[:-1]
+    ends = np.hstack([p + h for p, h in zip(ps, hs, strict=True)][-window - 1 :])
+    assert_allclose(p, ends @ shares[:, None], atol=1e-9)

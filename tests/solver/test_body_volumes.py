@@ -1,18 +1,12 @@
 """Volume constraints of meshes with several bodies: each body keeps its own volume."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from vtk_segdeform import models, sizes
-from vtk_segdeform.cages import fit_cages
-from vtk_segdeform.deformer import Deformer
+from vtk_segdeform import models
 from vtk_segdeform.geometry import lids_of, signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Bodies, total_volume
 
 BAR = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 10))
@@ -68,68 +62,3 @@ def test_splinters_share_the_constraint_of_the_largest_body():
     mesh = joined((BALL, 0.0, 1.0, 1), (BALL, 4.0, 0.01, 1), (BALL, 8.0, 0.02, 1))
     (only,) = constraints_of(mesh)
     assert_allclose(only.target, total_volume(mesh).target, rtol=1e-14)
-
-
-@pytest.mark.parametrize("separate", [True, False])
-def test_large_bodies_are_scaled_one_by_one_unless_a_cage_moves_two(separate, monkeypatch):
-    for size in ("COARSE_VOLUME", "SCALED_VOLUME"):
-        monkeypatch.setattr(sizes, size, 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 80)
-    ball = models.sphere(66)
-    mesh = joined((ball, 0.0, 1.0, 1), (ball, 5.0, 1.5, 1))
-    regions = Regions.from_labels(mesh, mesh.components) if separate else Regions.single(mesh)
-    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 30))
-    first, last = int(mesh.vertices[:, 0].argmin()), int(mesh.vertices[:, 0].argmax())
-    deformer = deformer.hold(fixed=[first], handle=[last])
-    solution = deformer.solve(mesh.vertices[[last]] + [0.5, 0.0, 0.7])
-    assert (deformer._constraints.preserved.scaled is not None) is separate
-    assert_allclose(
-        [c.relative(solution.vertices) for c in deformer.preserved_volumes], 0, atol=3e-15
-    )
-    assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
-    assert deformer.hold(handle=[first]).preserved_volumes is deformer.preserved_volumes
-    assert_allclose(solution.vertices[first], mesh.vertices[first], atol=5e-3)
-
-
-def test_pulling_one_body_changes_the_volume_of_none():
-    mesh = joined((BAR, 0.0, 1.0, 1), (BAR, 0.6, 1.0, 1))
-    labels = mesh.components
-    regions = Regions.from_labels(mesh, labels, overlap=0)
-    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 60))
-    height, first = mesh.vertices[:, 2], mesh.components == 0
-    foot = np.flatnonzero((height < height.min() + 0.1) & first)
-    tip = np.flatnonzero((height > height.max() - 0.1) & first)
-    targets = mesh.vertices[tip] + [0.1, 0.0, 0.3]
-    solution = deformer.hold(fixed=foot, handle=tip).solve(targets)
-    n = BAR.n_vertices
-    for x in (solution.vertices[:n], solution.vertices[n:]):
-        assert abs(signed_volume(x, BAR.faces) / signed_volume(BAR.vertices, BAR.faces) - 1) < 1e-13
-    session = Session(mesh)
-    session.set_regions(regions)
-    session.set_cages(deformer.cages)
-    session.set_fixed(foot)
-    session.add_handle(tip, "tip")
-    session.drag({"tip": targets}, max_steps=3)
-    session.drag({"tip": targets + [0.0, 0.1, 0.0]}, max_steps=3)
-    for x in (session.vertices[:n], session.vertices[n:]):
-        assert abs(signed_volume(x, BAR.faces) / signed_volume(BAR.vertices, BAR.faces) - 1) < 1e-13
-
-
-def test_a_direction_that_is_only_rounding_moves_nothing(monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 40)
-    mesh = joined((models.sphere(400), 0.0, 1.0, 1), (models.sphere(20), 1.3, 0.15, 1))
-    regions = Regions.single(mesh)
-    deformer = Deformer(mesh, regions, fit_cages(mesh, regions, 40))
-    low, high = int(mesh.vertices[:, 2].argmin()), int(mesh.vertices[:, 2].argmax())
-    deformer = deformer.hold(fixed=[low], handle=[high])
-    target = mesh.vertices[[high]] + [0.0, 0.0, 0.3]
-    expected = deformer.solve(target).vertices
-    places = deformer._constraints.places(deformer._frame.inward(target))
-    result = deformer._path.solve(places, deformer._options)
-    noise = 1e-20 * np.random.default_rng(1).normal(size=result.p.shape)  # of a vanishing volume
-    result = replace(result, directions=(result.directions[0], noise))
-    x = deformer._frame.in_scene(deformer._with_exact_volume(result)[0])
-    changes = [each.relative(x) for each in deformer.preserved_volumes]
-    assert_allclose(changes, [0.0, 0.0], atol=1e-12)
-    assert_allclose(x, expected, atol=1e-3)

@@ -174,3 +174,92 @@ def test_no_two_samples_pass_through_each_other_in_a_step(fork):
         share = contact.share(step)
         assert share * 2.0 * far <= 1.5 * 2.0 * np.median(radii) * (1.0 + 1e-12)
         assert (share == 1.0) == (size < 1.0)
+
+
+def sheets(gap: float):
+    """Return two square sheets of 36 samples a side, facing each other, as a surface at rest."""
+    u = np.arange(6) / 5.0
+    grid = np.stack(np.meshgrid(u, u, indexing="ij"), axis=-1).reshape(-1, 2)
+    a = (6 * np.arange(5)[:, None] + np.arange(5)).ravel()
+    faces = np.concatenate([np.stack([a, a + 6, a + 7], 1), np.stack([a, a + 7, a + 1], 1)])
+    low = np.column_stack([grid, np.zeros(36)])
+    points = np.concatenate([low, low + [0.0, 0.0, gap]])
+    faces = np.concatenate([faces, faces[:, ::-1] + 36])  # the lower one faces up
+    areas = np.bincount(faces.ravel(), minlength=72) / faces.size
+    i, j = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).T
+    length = np.linalg.norm(points[i] - points[j], axis=1)
+    graph = sparse.coo_array((length, (i, j)), (72, 72)).tocsr()
+    edges = graph.maximum(graph.T).tocsr()
+    surface = ContactSurface.of(np.eye(72), points, faces, areas=areas, edges=edges)
+    return surface, points, areas
+
+
+@pytest.mark.parametrize("degrees", [0.0, 60.0, 75.0])
+@pytest.mark.parametrize("gap", [0.03, -0.1, -0.3, -1.0])
+def test_its_value_is_that_of_the_formula(gap, degrees):
+    """Summed over all pairs of two sheets, one of them tilted, vertex by vertex."""
+    surface, points, areas = sheets(3.0)
+    h = np.sqrt(2.0 * areas / np.pi)
+    h = np.minimum(h, 2.0 * np.median(h))
+    assert surface.radii == pytest.approx(h)
+    turn = Rotation.from_euler("x", degrees, degrees=True)
+    upper = turn.apply(points[36:] - [0.0, 0.0, 3.0]) + [0.02, 0.01, gap]
+    y = np.concatenate([points[:36], upper])
+    up, down = np.array([0.0, 0.0, 1.0]), turn.apply([0.0, 0.0, -1.0])
+
+    def step(t):
+        return np.clip(t, 0, 1) ** 2 * (3 - 2 * np.clip(t, 0, 1))
+
+    total = 0.0
+    for a in range(36):
+        for b in range(36, 72):
+            e, r, depth = y[a] - y[b], 1.1 * (h[a] + h[b]), 1.5 * (h[a] + h[b])
+            g = (down - up) @ e / 2.0
+            facing = step((-(up @ down) - 0.1) / 0.5)
+            opposite = max(0.0, 1.0 - (e @ e - g * g) / r**2) ** 2
+            into = max(0.0, 0.2 * (h[a] + h[b]) - g)
+            shallow = step((g + depth) / (0.5 * depth))
+            total += min(areas[a], areas[b]) * facing * opposite * into**2 * shallow
+    contact = Contact(surface, np.zeros(72, dtype=bool), 7.0)
+    assert contact.value_and_slope(y)[0] == pytest.approx(7.0 * total, rel=1e-9, abs=1e-15)
+    assert contact.is_active(y) == (total > 0.0)
+    if degrees == 0.0 and gap > -1.0:
+        assert total > 1e-6
+
+
+def test_its_margin_is_that_of_the_true_surface_but_less_than_the_gap_at_rest():
+    far, near = sheets(3.0)[0], sheets(0.12)[0]
+    assert far.margins == pytest.approx(0.2 * far.radii)
+    assert far.with_heights(np.full(72, 0.1)).margins == pytest.approx(0.2 * far.radii + 0.1)
+    assert near.with_heights(np.full(72, 9.0)).margins == pytest.approx(0.45 * 0.12)
+    surface, points, _ = sheets(0.12)
+    contact = Contact(surface.with_heights(np.full(72, 9.0)), np.zeros(72, dtype=bool), 1.0)
+    closer = points - np.outer(np.arange(72) >= 36, [0.0, 0.0, 0.2 * 0.12])
+    assert contact.value_and_slope(points)[0] == 0.0
+    assert contact.hessian(points) is None
+    assert contact.value_and_slope(closer)[0] > 0.0
+
+
+def test_the_clearance_is_the_least_distance_of_samples_that_face_each_other():
+    surface, points, _ = sheets(0.5)
+    contact = Contact(surface, np.zeros(72, dtype=bool), 1.0)
+    assert contact.clearance(points, 2.0) == pytest.approx(0.5)
+    assert contact.clearance(points, 0.3) == 0.3
+    crossed = points - np.outer(np.arange(72) >= 36, [0.0, 0.0, 0.7])
+    assert contact.clearance(crossed, 0.4) == 0.4  # they have passed each other
+    held = Contact(surface, np.ones(72, dtype=bool), 1.0)
+    assert held.clearance(points, 2.0) == 2.0
+
+
+def test_with_and_without_compiled_kernels_the_same_pairs_are_listed(fork, through, monkeypatch):
+    contact, p = fork[0]._constraints.contact, 0.9 * through[1] + 0.1 * fork[0]._rest_cages
+    y, slack = contact.surface.rows @ p, 2.5 * contact.surface.spacing
+    listed = []
+    for _ in range(2):
+        pairs, beyond = contact._list(y, slack)
+        order = np.lexsort(np.sort(pairs, axis=1).T)
+        listed.append((np.sort(pairs, axis=1)[order], beyond[order]))
+        monkeypatch.setattr("vtk_segdeform.solver.contact.compiled_kernels", lambda: None)
+    assert len(listed[0][0]) > 100
+    assert np.array_equal(listed[0][0], listed[1][0])
+    assert listed[0][1] == pytest.approx(listed[1][1], abs=1e-12)

@@ -76,3 +76,42 @@ def test_no_start_is_farther_than_two_ways_ahead_or_a_long_motion():
     assert_allclose(ahead(way, 9e-3), path(4e-3, 1), atol=1e-12)
     assert way.ahead(PLACES + [0.03, 0.0, 0.0]) is None
     assert along([0.0], 1).ahead(PLACES + [1e-3, 0.0, 0.0]) is None
+
+
+def test_an_end_is_beside_the_last_one_by_the_last_way_alone():
+    """A fifth of it: of an earlier, longer way a fifth would be longer."""
+    for last, count in ((5.19e-3, 3), (5.21e-3, 4), (5.9e-3, 4)):
+        way = along([0.0, 4e-3, 5e-3, last], 1)
+        assert len(way.ends) == count
+        assert way.ends[-1].targets[0, 0] == last
+    way = along([0.0, 1e-3, 6e-3, 6.9e-3], 1)
+    assert len(way.ends) == 3  # of an earlier, shorter one it would be less
+
+
+@pytest.mark.parametrize(("degrees", "count"), [(0, 4), (59, 4), (61, 2), (180, 2)])
+def test_a_turn_by_more_than_60_degrees_begins_a_new_way(degrees, count):
+    way = along([0.0, 4e-3, 5e-3], 1)
+    turn = 1e-3 * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees)), 0.0])
+    way = way.on_to(End(path(7e-3, 1), PLACES + [5e-3, 0.0, 0.0] + turn, ()))
+    assert len(way.ends) == count
+    assert way.ends[-2].targets[0, 0] == 5e-3
+
+
+def test_as_many_ends_are_kept_as_the_highest_degree_needs():
+    """Four determine a cubic, and a fifth tells whether it would have been right."""
+    assert len(along(1e-3 * np.arange(9), 3).ends) == 5
+
+
+def test_the_start_has_the_directions_of_the_last_end():
+    z = (np.ones((5, 3)), np.zeros((5, 3)))
+    way = along([0.0, 1e-3], 1).on_to(End(path(2e-3, 1), PLACES + [2e-3, 0.0, 0.0], z))
+    assert way.ahead(PLACES + [3e-3, 0.0, 0.0])[1] is z
+
+
+def test_targets_that_do_not_move_or_move_aside_have_no_start():
+    way = along([0.0, 1e-3, 2e-3], 1)
+    assert way.ahead(PLACES + [2e-3, 0.0, 0.0]) is None
+    assert way.ahead(PLACES + [2e-3, 1e-3, 0.0]) is None
+    assert way.ahead(PLACES + [2e-3, 0.0201, 0.0]) is None
+    shift = [2e-3 + 0.0199, 0.0, 0.0]
+    assert_allclose(ahead(way, shift[0]), path(4e-3, 1), atol=1e-12)

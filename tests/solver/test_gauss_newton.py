@@ -9,8 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scenes import sausage
 
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.solver.extrapolation import Way
-from vtk_segdeform.solver.gauss_newton import GaussNewton
+from vtk_segdeform.solver.gauss_newton import GaussNewton, SolverOptions
 from vtk_segdeform.solver.solution import Status
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -107,8 +108,8 @@ def test_a_strong_pull_against_the_volume_neither_diverges_nor_breaks():
 
 
 def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
-    """Its steps are too long at any of their shares, so the paper's steps replace them."""
-    of_h, asked = GaussNewton._full_factor, []
+    """Its steps are too long at any of their shares, so those of the paper replace them."""
+    of_h, asked = GaussNewton._factor_at, []
 
     def almost_singular(self, *args):
         factor = of_h(self, *args)
@@ -118,7 +119,7 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
     deformer = SCENE.held()
     expected = deformer.solve(SCENE.turned(10))
     with monkeypatch.context() as wrong:
-        wrong.setattr(GaussNewton, "_full_factor", almost_singular)
+        wrong.setattr(GaussNewton, "_factor_at", almost_singular)
         found = SCENE.held().solve(SCENE.turned(10), max_steps=20)
     assert asked
     assert found.status is Status.STEP_LIMIT
@@ -137,3 +138,107 @@ def test_the_compliance_is_how_far_points_move_under_unit_forces():
     rows = solver.energy.subspace.at(np.array([100, 400]))
     h, compliance = solver._hessian, solver.compliance(rows)
     assert_allclose(compliance, rows @ np.linalg.solve(h, rows.T), rtol=1e-6)
+
+
+@pytest.fixture(scope="module")
+def on_its_way():
+    """Return a solver without contact, cages and places, far from a minimum."""
+    deformer = SCENE.held().copy()
+    deformer.solve(SCENE.turned(40), max_steps=1)
+    path = deformer._path
+    return path.solver, path.p, deformer._constraints.places(path.targets)
+
+
+def objective(solver, p, targets):
+    return solver.energy.value_and_slope(p)[0] + solver.positions.value_and_slope(p, targets)[0]
+
+
+def test_the_unbalanced_force_is_the_slope_beside_the_volume(on_its_way):
+    solver, p, targets = on_its_way
+    force = solver.unbalanced(p, targets)
+    x = solver.volumes.surface.map(p)
+    row = solver.volumes.surface.adjoint(solver.volumes.constraints[0].gradient(x))
+    assert abs(np.vdot(force, row)) < 1e-9 * np.linalg.norm(force) * np.linalg.norm(row)
+    way = np.random.default_rng(1).normal(size=p.shape)
+    way -= np.vdot(way, row) / np.vdot(row, row) * row  # which keeps the volume
+    t = 1e-5
+    slope = (objective(solver, p + t * way, targets) - objective(solver, p - t * way, targets)) / t
+    assert 4.0 * np.vdot(force, way) == pytest.approx(slope, rel=1e-5)
+
+
+def test_a_response_is_the_step_of_the_dense_equations(on_its_way):
+    """With the derivative of the slope, by differences, in place of the Hessian."""
+    solver, p, targets = on_its_way
+    free = solver.fresh()
+    x = solver.volumes.surface.map(p)
+    row = solver.volumes.surface.adjoint(solver.volumes.constraints[0].gradient(x)).ravel()
+
+    def slope(q):
+        own = solver.energy.value_and_slope(q)[1] + solver.positions.value_and_slope(q, targets)[1]
+        return own.ravel()
+
+    units = 1e-6 * np.eye(p.size).reshape(-1, *p.shape)
+    hessian = np.array([(slope(p + unit) - slope(p - unit)) / 2e-6 for unit in units])
+    least = np.linalg.eigvalsh(0.5 * (hessian + hessian.T))[0]
+    assert least > 0.0  # else the response has less of the rotations' derivatives
+    force = np.random.default_rng(2).normal(size=p.shape)
+    dense = np.block([[hessian, row[:, None]], [row[None], np.zeros((1, 1))]])
+    expected = np.linalg.solve(dense, np.append(-force.ravel(), 0.0))[:-1]
+    found = free.response(p, force, [row.reshape(p.shape)])
+    assert abs(found.ravel() @ row) < 1e-9 * np.linalg.norm(found) * np.linalg.norm(row)
+    assert_allclose(found.ravel(), expected, rtol=0, atol=1e-3 * np.abs(expected).max())
+
+
+def test_what_remains_is_about_as_far_as_the_minimum():
+    deformer = SCENE.held().copy()
+    deformer.solve(SCENE.turned(20), max_steps=4)
+    path = deformer._path
+    targets = deformer._constraints.places(path.targets)
+    p, told = path.p, path.solver.remaining(path.p, targets)
+    end = path.solver.fresh().minimise(p, targets, SolverOptions(tolerance=1e-10))
+    moves = path.solver.volumes.surface.map(end.p - p)
+    far = np.linalg.norm(moves, axis=1).max()
+    assert path.solver.farthest(end.p - p) == pytest.approx(far)
+    assert 0.3 * far < told < 3.0 * far
+
+
+def test_without_positions_the_mesh_stays_where_its_mean_is():
+    nothing = np.array([], dtype=int)
+    deformer = replace(SCENE, fixed=nothing, handle=nothing).held().copy()
+    solver, p = deformer._path.solver, deformer._path.p
+    bent = p + 0.05 * np.sin(5.0 * p[:, [1, 2, 0]])
+    x = solver.energy.subspace.map(bent)
+    result = solver.minimise(bent, np.empty((0, 3)), SolverOptions())
+    there = solver.energy.subspace.map(result.p)
+    assert np.abs(there - x).max() > 1e-3
+    assert_allclose(there.mean(axis=0), x.mean(axis=0), atol=1e-9)
+
+
+def test_a_copy_continues_and_a_fresh_solver_begins():
+    deformer = SCENE.held().copy()
+    deformer.solve(SCENE.turned(10), max_steps=3)
+    path, places = deformer._path, deformer._constraints.places(deformer._path.targets)
+    begun, options = path.solver, SolverOptions(max_steps=3)
+    first, second = (
+        each.minimise(path.p, places, options) for each in (begun.copy(), begun.copy())
+    )
+    assert np.array_equal(first.p, second.p)
+    anew = [begun.fresh().minimise(path.p, places, options).p for _ in range(2)]
+    assert np.array_equal(*anew)
+    assert not np.array_equal(anew[0], first.p)
+    assert np.array_equal(begun.minimise(path.p, places, options).p, first.p)
+
+
+@pytest.mark.parametrize(
+    ("option", "says"),
+    [
+        ({"tolerance": 0.0}, "tolerance must be a positive number; got 0.0"),
+        ({"tolerance": "fine"}, "tolerance must be a positive number; got 'fine'"),
+        ({"max_steps": 0}, "max_steps must be a whole number, 1 or more; got 0"),
+        ({"max_steps": 2.5}, "max_steps must be a whole number"),
+    ],
+)
+def test_options_are_checked(option, says):
+    with pytest.raises(ArgumentError, match=says):
+        SolverOptions(**option)
+    assert SolverOptions(tolerance=1e-9, max_steps=1).max_steps == 1

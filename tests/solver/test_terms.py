@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 
 from vtk_segdeform.solver import SolverOptions
+from vtk_segdeform.solver.terms import hessian_of, share_of_step, with_terms
 
 SCENE = sausage(2, is_coarse=True)
 
@@ -100,3 +101,36 @@ def test_a_term_limits_every_step():
     assert far > 4.0 * limit
     assert 0.9 * limit < max(moves) < 1.1 * limit  # and a little to restore the volume
     assert_allclose(p, expected.p, atol=1e-5)
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A square about a place, times a constant; it limits steps to a share."""
+
+    weight: float
+    most: float
+
+    def value_and_slope(self, p, x=None):
+        return self.weight * float(np.vdot(p, p)), self.weight * p
+
+    def hessian(self, p, x=None):
+        return self.weight * np.eye(p.size) if self.weight else None
+
+    def share(self, step):
+        return self.most
+
+
+def test_terms_are_added_and_the_smallest_share_counts():
+    p, slope = np.arange(6.0).reshape(2, 3), np.ones((2, 3))
+    springs = [Spring(2.0, 0.7), Spring(0.0, 0.5), Spring(3.0, 2.0)]
+    value, steeper = with_terms(springs, p, p, value=1.0, slope=slope)
+    assert value == 1.0 + 5.0 * 55.0
+    assert_allclose(steeper, slope + 5.0 * p)
+    assert_allclose(hessian_of(springs, p, p), 5.0 * np.eye(6))
+    assert share_of_step(springs, p) == 0.5
+    assert hessian_of(springs[1:2], p, p) is None
+    assert hessian_of([], p, p) is None
+    assert share_of_step([], p) == share_of_step(springs[2:], p) == 1.0
+    same = with_terms(springs[1:2], p, p, value=1.0, slope=slope)
+    assert same[0] == 1.0
+    assert same[1] is slope

@@ -76,3 +76,62 @@ def test_a_change_of_shape_is_spread_evenly_over_the_waypoints():
     assert len(way) >= 4
     for leg, targets in enumerate(way, 1):
         assert_allclose(targets, start + leg / len(way) * (end - start), atol=1e-9)
+
+
+@pytest.mark.parametrize(("degrees", "legs"), [(29.0, 1), (31.0, 2), (89.0, 3), (121.0, 5)])
+def test_a_leg_turns_by_30_degrees_at_most(degrees, legs):
+    """Also about the axis along which the handle is long, where its points hardly move."""
+    start = somewhere(size=0.01) * [10.0, 1.0, 1.0] + [0.2, 0.3, 0.1]
+    middle = start.mean(axis=0)
+    for axis in ([1.0, 0.0, 0.0], [0.0, 0.3, 1.0]):
+        for shift in (np.zeros(3), np.array([0.05, -0.02, 0.1])):
+            turn = rotation(axis, np.radians(degrees))
+            end = (start - middle) @ turn.T + middle + shift
+            assert len(waypoints(start, end, ALL)) == legs
+
+
+def test_a_leg_is_a_fifth_of_the_mesh_at_most_or_a_share_of_that():
+    start = somewhere(size=0.1)
+    for length, share, legs in ((0.199, 1.0, 1), (0.201, 1.0, 2), (0.201, 0.5, 3), (0.6, 0.25, 12)):
+        end = start + np.array([0.0, length, 0.0])
+        way = waypoints(start, end, ALL, share)
+        assert len(way) == legs
+        assert way[-1] is end
+    turn = rotation([0.0, 0.0, 1.0], np.radians(20.0))
+    assert len(waypoints(start, start @ turn.T, ALL, 0.5)) == 2
+
+
+def test_there_are_at_most_50_legs():
+    start = somewhere(size=0.1)
+    assert len(waypoints(start, start + [9.9, 0.0, 0.0], ALL)) == 50
+    assert len(waypoints(start, start + [99.0, 0.0, 0.0], ALL)) == 50
+
+
+@pytest.mark.parametrize("s", [1, 2, 3])
+def test_a_screw_motion_turns_and_slides_evenly(s):
+    start, axis = somewhere(size=0.1), np.array([2.0, -1.0, 2.0]) / 3.0
+    centre, slide = np.array([0.3, -0.1, 0.2]), 0.3 * axis
+    angle = np.radians(115.0)
+    end = (start - centre) @ rotation(axis, angle).T + centre + slide
+    way = waypoints(start, end, ALL)
+    assert len(way) == 4
+    turn = rotation(axis, s / 4 * angle)
+    assert_allclose(way[s - 1], (start - centre) @ turn.T + centre + s / 4 * slide, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_half_a_turn_is_about_the_axis_toward_the_farthest_point_of_the_handle(side):
+    arms = np.array([[0.0, 0.1, 0.3], [0.1, -0.1, -0.1], [-0.1, 0.0, -0.1], [0.1, 0.1, -0.1]])
+    start = arms * [1.0, 1.0, side] + [0.4, 0.0, 0.0]
+    end = start @ rotation([0.0, 0.0, 1.0], np.pi).T
+    way = waypoints(start, end, [np.arange(4)])
+    turn = rotation([0.0, 0.0, side], np.pi / len(way))
+    assert_allclose(way[0], start @ turn.T, atol=1e-6)
+
+
+def test_a_far_motion_of_few_points_of_a_large_handle_has_waypoints():
+    start = somewhere(n=1600, size=0.05)
+    end = start + 0.0
+    end[800:] += [0.0, 0.0, 0.5]
+    assert len(waypoints(start, end, [np.arange(1600)])) > 2
+    assert len(waypoints(start, start + 0.01, [np.arange(1600)])) == 1

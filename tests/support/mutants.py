@@ -60,20 +60,16 @@ def chosen_tests(path: Path, left_out: Iterable[str] = ()) -> list[str]:
 class Bench:
     """Copies of the tree in which mutants are tested, each in a fork of this process."""
 
-    def __init__(self, folder: Path, n_copies: int, *, of_kernels: bool = False) -> None:
+    def __init__(self, folder: Path, n_copies: int) -> None:
         ignored = shutil.ignore_patterns(".git", ".venv", "build", "*_cache", "*-output")
         self._free = [folder / str(i) for i in range(n_copies)]
         for tree in self._free:
             shutil.copytree(ROOT, tree, ignore=ignored)  # with times: kernels stay compiled
-        self._of_kernels = of_kernels
         self._running: dict[int, tuple[Path, float, Mutant | None]] = {}
 
     def start(self, mutant: Mutant | None, tests: list[str], seconds: int) -> None:
         """Start *tests* of a mutant, or of the code as it is, with a limit of processor time."""
         tree = self._free.pop()
-        if self._of_kernels:  # numba does not see that a kernel calls a changed one
-            for file in tree.glob("**/kernels/compiled/__pycache__/*.nb*"):
-                file.unlink()
         if mutant is not None:
             (tree / mutant.path.relative_to(ROOT)).write_text(mutant.source(), "utf-8")
         sys.stdout.flush()
@@ -138,8 +134,7 @@ def results_of(chosen: list[Mutant], n_processes: int, left_out: Iterable[str] =
     """Return "killed", "timeout" or "survived" for each of the mutants of a folder."""
     results = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as place:
-        of_kernels = any("compiled" in mutant.path.parts for mutant in chosen)
-        bench = Bench(Path(place), n_processes, of_kernels=of_kernels)
+        bench = Bench(Path(place), n_processes)
         every = [test for mutant in chosen for test in chosen_tests(mutant.path, left_out)]
         bench.start(None, list(dict.fromkeys(every)), 3600)
         _, status, usual, tree = bench.wait()

@@ -44,7 +44,7 @@ def bound_once_in_memory() -> Iterator[None]:
     bind = deformer.cached_binding
 
     def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
-        if folder is not None or progress is not None or not inputs.is_reduced:
+        if folder is not None or progress is not None:
             return bind(inputs, folder, progress)
         key = inputs.digest()
         if key not in known:

@@ -411,7 +411,7 @@ def test_scipy_starts_no_threads():
 # A browser, git, ldd, and a command from `interpreter`; io.confined sets its child's path itself.
 START_PROCESSES = {
     "interpreter", "benchmarks.chromium", "benchmarks.history", "cli.application", "io.confined",
-    "pictures.canvas",
+    "kernels.compilation", "pictures.canvas",
     "widgets.web.serving.client",
 }  # fmt: skip
 

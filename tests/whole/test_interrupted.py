@@ -185,7 +185,7 @@ def test_each_kernel_is_compiled_completely(monkeypatch):
         return completed(work)
 
     monkeypatch.setattr(kernels, "completed", recorded)
-    add = kernels.kernel()(lambda a, b: a + b)
+    add = kernels.kernel()()(lambda a, b: a + b)
     assert [add(1, 2), add(3, 4)] == [3, 7]
     assert len(compiled) == 1
 

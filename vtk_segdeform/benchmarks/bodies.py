@@ -1,6 +1,6 @@
-"""Bodies of the benchmarks that are not sample meshes, and what a hand does with a body.
+"""What a hand does with a body, and bodies with loose parts.
 
-`random_body` is a solid of random limbs.  A `Hand` moves the end of the limb whose tip is farthest
+A `Hand` moves the end of the limb whose tip is farthest
 from everything else along the surface, so that it needs no choice for a body.
 """
 
@@ -15,31 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, IntArray
 from ..mesh import Mesh, SurfacePoint
-from ..models import Limb, implicit_surface, sphere, standing_body
+from ..models import sphere
 
 _HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
 _RING = 0.03  # half the width of the ring around the root
-_RADIUS, _WALL = 0.5, 0.07  # of the bowl
 _PULL = 0.25  # diagonals that a pull moves while a handle would turn by a radian
-
-
-def random_body(n_vertices: int, seed: int) -> Mesh:
-    """Return a standing trunk with four to six bent limbs, all random."""
-    rng = np.random.default_rng(seed)
-    lean = rng.uniform(-0.15, 0.15, 2)
-    trunk = [(s * lean[0], s * lean[1], 0.9 * s) for s in (-0.1, 0.35, 0.7, 1.0)]
-    limbs = [Limb(trunk, rng.uniform(0.09, 0.15, 4).tolist())]
-    for around in rng.permutation(6)[: rng.integers(4, 7)]:
-        height, turn = rng.uniform(0.2, 0.9), np.pi / 3.0 * (around + rng.uniform(-0.3, 0.3))
-        way = np.array([np.cos(turn), np.sin(turn), rng.uniform(-0.4, 0.6)])
-        points = [np.array([*height * lean, 0.9 * height])]
-        for _ in range(3):
-            points.append(points[-1] + rng.uniform(0.1, 0.18) * way / np.linalg.norm(way))
-            way = way + rng.uniform(-0.6, 0.6, 3)
-        points = [np.array([x, y, max(z, 0.08)]) for x, y, z in points]
-        radii = np.linspace(rng.uniform(0.05, 0.08), rng.uniform(0.03, 0.05), 4)
-        limbs.append(Limb([tuple(p.tolist()) for p in points], radii.tolist()))
-    return standing_body(limbs, n_vertices, blend=0.04)
 
 
 def with_loose_parts(body: Mesh, seed: int, count: int = 4) -> Mesh:
@@ -54,17 +34,6 @@ def with_loose_parts(body: Mesh, seed: int, count: int = 4) -> Mesh:
         faces.append(ball.faces + sum(map(len, vertices)))
         vertices.append(0.02 * body.diagonal * ball.vertices + centre)
     return Mesh(np.concatenate(vertices), np.concatenate(faces))
-
-
-def bowl(n_vertices: int) -> Mesh:
-    """Return half a sphere with a thin wall."""
-
-    def field(x: FloatArray) -> FloatArray:
-        wall = np.abs(np.linalg.norm(x, axis=1) - _RADIUS) - 0.5 * _WALL
-        return np.asarray(np.maximum(wall, x[:, 2]))
-
-    reach = _RADIUS + _WALL
-    return implicit_surface(field, np.array([[-reach] * 3, [reach, reach, _WALL]]), n_vertices)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +72,7 @@ class Hand:
         middle = np.where(largest, np.linalg.norm(x - x.mean(axis=0), axis=1), np.inf).argmin()
 
         def distances(start: int) -> FloatArray:
-            found = csgraph.dijkstra(graph, directed=False, indices=[start])[0]
+            found = csgraph.dijkstra(graph, directed=False, indices=np.array(start))
             return np.asarray(np.where(np.isfinite(found), found, -1.0))
 
         tip = int(distances(int(middle)).argmax())

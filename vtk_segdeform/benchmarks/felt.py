@@ -20,11 +20,11 @@ import numpy as np
 from ..deformer import Deformer
 from ..errors import MissingDependencyError
 from ..mesh import Mesh
-from ..models import cactus
+from ..models import cactus, random_limbs
 from ..progress import Progress, tell
 from ..session import Preparation, Session
 from . import charts
-from .bodies import Hand, random_body
+from .bodies import Hand
 from .drags import Drag, dragged, ready
 from .measuring import run_in
 from .programs import arap_iteration_seconds
@@ -35,7 +35,7 @@ from .tasks import Task, warm_up
 SEED = 1
 BODIES: dict[str, Callable[[int], Mesh]] = {
     "cactus": cactus,
-    "random limbs": partial(random_body, seed=SEED),
+    "random limbs": partial(random_limbs, seed=SEED),
 }
 # Vertices: median, 95 % and longest of frames, in iterations of ARAP.
 _MOST = {5430: (1.0, 2.0, 4.0), 50_000: (0.33, 0.6, 1.0), 500_000: (0.1, 0.15, 0.25)}

@@ -13,6 +13,7 @@ machine slows both.
 from __future__ import annotations
 
 import contextlib
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,13 +24,12 @@ import numpy as np
 from ..arrays import FloatArray
 from ..deformer import Deformer
 from ..energy import Factor, full_factor
-from ..importing import imported
 from ..mesh import Mesh, SurfacePoint
-from ..models import cactus
+from ..models import cactus, random_limbs
 from ..progress import Progress, tell
 from ..session import Preparation, Session
 from ..solver import Anderson
-from .bodies import Hand, random_body, with_loose_parts
+from .bodies import Hand, with_loose_parts
 from .drags import Record, Shape, frames, ready, way_of_handle, way_of_tip
 from .measuring import run_in
 from .scale import Scale
@@ -53,8 +53,8 @@ _MEASURED = "jump", "error", "distortion", "worst", "detail", "folds", "volume" 
 Values = dict[str, tuple[float, float]]  # by quantity, with a mechanism and without it
 BODIES: dict[str, Callable[[], Mesh]] = {
     "cactus": cactus,
-    "random limbs": lambda: random_body(22_000, 1),
-    "random limbs, loose parts": lambda: with_loose_parts(random_body(5000, 4), 4),
+    "random limbs": lambda: random_limbs(22_000, 1),
+    "random limbs, loose parts": lambda: with_loose_parts(random_limbs(5000, 4), 4),
 }
 
 
@@ -97,7 +97,7 @@ class Mechanism:
     def owner(self) -> Any:
         """The module or class."""
         module, _, cls = self.place.partition(":")
-        found = imported(f"{_PACKAGE}.{module}")
+        found = sys.modules[f"{_PACKAGE}.{module}"]
         return getattr(found, cls) if cls else found
 
 
@@ -128,7 +128,7 @@ MECHANISMS = (
     ),
     Mechanism(
         "exact Hessian", "steps with the derivatives of rotations, not only the paper's matrix",
-        _SOLVER, "_full_factor", lambda *_: None, _EVERY,
+        _SOLVER, "_factor_at", lambda solver, _: solver._factor, _EVERY,
     ),
     Mechanism(
         "Hessian of volumes", "the second derivatives of volumes in it",
@@ -157,10 +157,6 @@ MECHANISMS = (
     Mechanism(
         "waypoints", "a far motion goes through intermediate targets",
         _DEFORMER, "_way_to", lambda *_: iter(()), _BEND,
-    ),
-    Mechanism(
-        "pulled surroundings", "a pull moves a weighted mean around the point",
-        "deformer.locality:SurfaceSamples", "soft_row", lambda *_: None, _PULLS,
     ),
     Mechanism(
         "flat rings", "the neighbours of a pulled point resist a spike",
@@ -256,10 +252,8 @@ def compared(
     mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
 ) -> Values:
     """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
-    ways: list[Callable[[], contextlib.AbstractContextManager[None]]] = [
-        contextlib.nullcontext,
-        mechanism.off,
-    ]
+    ways: list[Callable[[], contextlib.AbstractContextManager[None]]]
+    ways = [contextlib.nullcontext, mechanism.off]
     if case == "bend":
         bends: list[list[dict[str, float]]] = [[], []]
         for _ in range(_REPEATS):

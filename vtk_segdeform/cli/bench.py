@@ -16,6 +16,7 @@ from ..benchmarks import (
     write_report,
 )
 from ..errors import ArgumentError
+from ..kernels import wait_until_compiled
 from ..progress import Progress
 from .interactive import interactive_table
 from .opening import DRAWN_SIZES, opening_table
@@ -35,6 +36,7 @@ def bench(options: Namespace, say: Say, progress: Progress) -> bool:
         read_history(options.record)  # report errors before the measurements
     if options.open and not options.interactive:
         raise ArgumentError("--open requires --interactive")
+    wait_until_compiled()
     if options.open:
         sizes = DRAWN_SIZES if options.full else DRAWN_SIZES[:2]
         sizes = sizes if options.size is None else (options.size,)

@@ -48,7 +48,7 @@ from ..errors import ArgumentError, ConstraintError
 from ..finish import CellEnergy, Finisher
 from ..freezing import read_only
 from ..geometry import Lids, lids_of, turned_over
-from ..kernels import compiled_kernels, one_blas_thread
+from ..kernels import compiled_kernels, load_for, one_blas_thread
 from ..mesh import Mesh, SurfacePoint, connected, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
@@ -121,7 +121,6 @@ _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contact
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
-_UNMOVED = 0.1 * CONVERGED  # diagonals: a finish that moves less has come to its end
 # l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
 # four bodies is 1.5 times that of as-rigid-as-possible, with 2, 1.3 times; poses of a dog are 2 %
 # farther from the true ones.
@@ -215,6 +214,7 @@ class Deformer:
         require_regions(regions, mesh)
         cages = all_of(cages, Cage, "cages")
         check_options(stretch, rotation_groups)
+        load_for(mesh.n_vertices)
         self._options = SolverOptions(tolerance, max_steps)
         self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
         self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
@@ -633,10 +633,6 @@ class Deformer:
         if is_start and not solution.is_finished:
             return solution
         remaining = found.remaining / self.mesh.diagonal
-        status = Status.CONVERGED if remaining <= CONVERGED else Status.STEP_LIMIT
-        moved = _largest(found.vertices - start) / self.mesh.diagonal
-        if status is Status.STEP_LIMIT and moved <= _UNMOVED:
-            status = Status.STALLED
         finished = replace(
             solution,
             vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
@@ -649,7 +645,7 @@ class Deformer:
             unfinished=unfinished,
             unmoved=self._constraints.unmoved,
         )
-        return replace(finished, status=self._missed_status if _is_off(finished) else status)
+        return replace(finished, status=self._missed_status if _is_off(finished) else found.status)
 
     def _is_near_pulled_points(self) -> BoolArray:
         """Return which vertices are within the spread of pulled points, or next to these, (n,).
@@ -820,8 +816,6 @@ class Deformer:
         if contact is None or 0.0 < most <= contact.surface.spacing:
             return 1.0
         clearance = contact.clearance(self._path.end, most) if most else 0.0
-        if 0.0 < most <= clearance < _CLEARANCE:  # a motion by *most* meets nothing
-            return 1.0
         spacing = contact.surface.spacing
         return min(1.0, max(clearance + 0.5 * spacing, spacing) / LONGEST_MOVE)
 

@@ -62,6 +62,8 @@ class Factor:
 
     def solve_all(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
         """Return H^-1 y for each y (m, 3)."""
+        if not ys:
+            return []
         n = len(self.triangle)
         solved = np.ascontiguousarray(np.concatenate([y.T for y in ys])).reshape(-1, n)
         kernels = compiled_kernels(n * n // _PER_FACE) if len(solved) <= _MOST_SIDES else None

@@ -11,16 +11,11 @@ found them, and shorter ones, which cages hardly represent, relax.  How limbs be
 cages: their energy has the detail term (5), and the minimum of E alone is farther from where real
 bodies are.
 
-The equations are those of `solver.gauss_newton`, with the rows of the free vertices of C + diag(w)
-in place of H, which is factored once; fixed vertices and handles are eliminated, so they are exact:
-
-    h = -H^-1 (d + G^T lambda),   lambda = (G H^-1 G^T)^-1 (g - G H^-1 d)                    (21)
-
-E is a minimum over rotations of quadratics with the Laplacian C, so the plain step minimises an
-upper bound of the objective.  Every step ends on the volumes, moved along Z = H^-1 G^T
-(`solver.exact_volume`).  Anderson acceleration proposes steps, and where the objective does not
-fall the plain step is taken instead.  Mostly 5 to 40 steps are taken until one moves no vertex by
-more than 3e-6 of the diagonal: 15 of 16 poses were then within 1.1e-4 of the converged one.
+The iteration is that of the cages (`solver.newton`).  H is the rows of the free vertices of
+C + diag(w), factored once; fixed vertices and handles are eliminated, so they are exact.  E is a
+minimum over rotations of quadratics with the Laplacian C, so the plain step minimises an upper
+bound of the objective.  Mostly 10 to 70 steps are taken until one moves no vertex by more than 3e-6
+of the diagonal: 15 of 16 poses were then within 1.1e-4 of the converged one.
 
 A finish that avoids contact untangles y (`untangling`), and where faces come to cross that do not
 in y, it continues with ten times the weights w: they stay about as far apart as they are there.
@@ -34,6 +29,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -42,12 +38,22 @@ from ..arrays import BoolArray, FloatArray
 from ..kernels import one_blas_thread
 from ..mesh import Crossings, Mesh
 from ..progress import Progress, tell
-from ..solver import CONVERGED, Anderson, VolumeConstraint, moved_along, steps_to_volume
+from ..solver import (
+    CONVERGED,
+    Anderson,
+    Status,
+    Step,
+    VolumeConstraint,
+    constrained_step,
+    minimise,
+    moved_along,
+    steps_to_volume,
+)
 from .cell_energy import CellEnergy
 from .factor import factored
 from .untangling import around, untangled
 
-_STEPS = 100  # at most
+_STEPS = 200  # at most
 _TOLERANCE = 0.03 * CONVERGED  # diagonals; a step that moves less is the last
 # Where something comes to cross: rounds, factor of w, and rings around the faces, of a hold.
 _HOLDS, _FIRMER, _RINGS = 8, 10.0, 2
@@ -62,14 +68,14 @@ class Finish:
     merits: tuple[float, ...]  # the objective before and after each step
     steps: int
     remaining: float  # the largest motion of a vertex in the next step
+    status: Status
 
 
-@dataclass(frozen=True, eq=False)
-class _Evaluated:
-    """A pose, with its objective and half the gradient of it."""
+class _Evaluated(NamedTuple):
+    """A pose, with its objective and half the gradient of it, which is 0 at held vertices."""
 
-    x: FloatArray
-    value: float
+    at: FloatArray  # x, (n, 3)
+    merit: float
     slope: FloatArray
 
 
@@ -147,7 +153,7 @@ class Finisher:
         self._y = y = self._untangled(self._at_places(pose, places), progress)
         begin = y if start is None or start is pose else self._at_places(start, places)
         if not len(self._free):
-            return Finish(begin, (), 0, 0.0)
+            return Finish(begin, (), 0, 0.0, Status.CONVERGED)
         found = self._apart(self._descend(begin, progress), progress)
         tell(progress, 1.0, "finished")
         return found
@@ -165,7 +171,7 @@ class Finisher:
             self._factor(weights, progress)
             again = self._descend(found.vertices, progress)
             found = replace(again, steps=found.steps + again.steps)
-        return Finish(self._y, (), found.steps, 0.0)
+        return Finish(self._y, (), found.steps, 0.0, Status.STALLED)
 
     def _untangled(self, x: FloatArray, progress: Progress | None) -> FloatArray:
         """Return the start *x* (n, 3) with fewer crossings, on the volumes; or as it is."""
@@ -195,81 +201,76 @@ class Finisher:
 
     def _descend(self, begin: FloatArray, progress: Progress | None) -> Finish:
         """Return *begin* after as many steps as it takes, at most `_STEPS`."""
-        here, free, anderson = self._evaluated(begin), self._free, Anderson(_WINDOW)
-        merits, stride = [here.value], slice(None, None, 1 + len(free) // _ROWS)
-        for count in range(_STEPS + 1):
-            tell(progress, count / (_STEPS + 1), "finishing on the mesh")
-            directions = self._directions(here.x)
-            h = self._step(here, directions)
-            remaining = math.sqrt(float(np.einsum("ij,ij->i", h, h).max()))
-            if remaining <= _TOLERANCE * self._diagonal or count == _STEPS:
-                break
-            guess = anderson.extrapolate(here.x[free], h, h[stride])
-            ahead = self._improved(here, guess, directions)
-            if ahead is None:
-                anderson.forget()
-                ahead = self._improved(here, here.x[free] + h, directions)
-            if ahead is None:  # but for volumes, and rounding, the plain step always improves
-                break
-            here = ahead
-            merits.append(here.value)
-        return Finish(here.x, tuple(merits), len(merits) - 1, remaining)
+        end = minimise(
+            self,
+            self._evaluated(begin),
+            Anderson(_WINDOW),
+            tolerance=_TOLERANCE * self._diagonal,
+            max_steps=_STEPS,
+            progress=progress,
+            message="finishing on the mesh",
+        )
+        last = self.step(end.pose) if end.step is None else end.step
+        return Finish(end.pose.at, end.merits, len(end.merits) - 1, last.length, end.status)
+
+    @property
+    def constant(self) -> float:
+        """The size of the terms of the energy."""
+        return self._energy.constant
+
+    def step(self, here: _Evaluated) -> Step:
+        """Return the step (21)."""
+        rows = [self._at_free(each.gradient(here.at)) for each in self._constraints]
+        g = np.array([each.violation(here.at) for each in self._constraints])
+        h, _, directions = constrained_step(self._solved, here.slope, rows, g)
+        return Step(h, directions, math.sqrt(float(np.einsum("ij,ij->i", h, h).max())))
+
+    def another(self, _: _Evaluated) -> None:
+        """Return no other step: there is one Hessian."""
+
+    def moved(self, x: FloatArray, directions: Sequence[FloatArray]) -> _Evaluated:
+        """Return *x* moved along *directions* onto the volumes, and the objective there."""
+        if np.isfinite(x).all():  # others have no volume
+            x = self._landed(x, directions)
+        return self._evaluated(x) if np.isfinite(x).all() else _Evaluated(x, math.inf, x)
+
+    def residual(self, h: FloatArray) -> FloatArray:
+        """Return some rows of *h*."""
+        return h[self._free[:: 1 + len(self._free) // _ROWS]]
 
     def _directions(self, x: FloatArray) -> list[FloatArray]:
-        """Return Z = H^-1 G^T at *x*, (n, 3) for each constraint, up to a power of two.
+        """Return Z at *x*, (n, 3) for each constraint."""
+        return self._solved([self._at_free(each.gradient(x)) for each in self._constraints])
 
-        They are about as long as the mesh, so that cubics along them overflow no sooner than
-        volumes; a power of two changes no digit of a step.
-        """
-        directions = []
-        for constraint in self._constraints:
-            direction = np.zeros_like(x)
-            direction[self._free] = self._solve(constraint.gradient(x)[self._free])
-            exponent = math.frexp(np.abs(direction).max() / self._diagonal)[1]
-            direction = np.ldexp(direction, -exponent)
-            directions.append(direction)
-        return directions
+    def _solved(self, rights: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return H^-1 of *rights*, (n, 3) each: 0 at held vertices."""
+        found = []
+        for right in rights:
+            solved = np.zeros_like(right)
+            solved[self._free] = self._solve(right[self._free])
+            found.append(solved)
+        return found
 
-    def _step(self, here: _Evaluated, directions: Sequence[FloatArray]) -> FloatArray:
-        """Return h of (21) for the free vertices, (f, 3)."""
-        free = self._free
-        h: FloatArray = -self._solve(here.slope[free])
-        if not directions:
-            return h
-        z = [each[free] for each in directions]
-        rows = [each.gradient(here.x)[free] for each in self._constraints]
-        g = np.array([each.violation(here.x) for each in self._constraints])
-        gh = np.array([np.vdot(row, h) for row in rows])
-        gz = np.array([[np.vdot(row, each) for each in z] for row in rows])
-        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]
-        for multiplier, each in zip(multipliers, z, strict=True):
-            h -= multiplier * each
-        return h
-
-    def _improved(
-        self,
-        here: _Evaluated,
-        free: FloatArray,
-        directions: Sequence[FloatArray],
-    ) -> _Evaluated | None:
-        """Return the pose with the *free* vertices (f, 3) on the volumes, if that is better."""
-        x = here.x.copy()
-        x[self._free] = free
-        x = self._landed(x, directions)
-        if not np.isfinite(x).all():
-            return None
-        ahead = self._evaluated(x)
-        return ahead if ahead.value < here.value else None
+    def _at_free(self, values: FloatArray) -> FloatArray:
+        """Return *values* (n, 3) with 0 at held vertices."""
+        found = np.zeros_like(values)
+        found[self._free] = values[self._free]
+        return found
 
     def _evaluated(self, x: FloatArray) -> _Evaluated:
         value, slope = self._energy.value_and_slope(x)
         away = x - self._y
         pull = self._weights * away
-        return _Evaluated(x, value + float(np.vdot(pull, away)), slope + pull)
+        return _Evaluated(x, value + float(np.vdot(pull, away)), self._at_free(slope + pull))
 
     def _landed(self, x: FloatArray, directions: Sequence[FloatArray]) -> FloatArray:
-        """Return *x* moved along *directions* onto the volumes."""
+        """Return *x* moved along *directions* onto the volumes.
+
+        They are scaled to the size of the mesh, so that cubics along them overflow no sooner than
+        volumes; a power of two changes no digit of a step.
+        """
         if not directions:
             return x
-        paths = np.hstack([x, *directions])
+        scales = [-math.frexp(np.abs(each).max() / self._diagonal)[1] for each in directions]
+        paths = np.hstack([x, *map(np.ldexp, directions, scales)])
         return moved_along(paths, steps_to_volume(self._constraints, paths))

@@ -88,7 +88,8 @@ def _opened(mesh: Mesh, x: FloatArray, free: BoolArray, own: BoolArray) -> Float
     number[ids] = np.arange(len(ids))
     inside = own[mesh.faces]
     moving = free[ids]
-    moving[number[mesh.faces[inside.any(axis=1) & ~inside.all(axis=1)]]] = False
+    corners = mesh.faces[inside.any(axis=1) & ~inside.all(axis=1)]
+    moving[number[corners[own[corners]]]] = False
     faces = number[mesh.faces[inside.all(axis=1)]]
     joined = (mesh.adjacency[ids][:, ids] > 0.0).astype(float)
     average = sparse.diags_array(1.0 / np.maximum(joined.sum(axis=1), 1.0)) @ joined

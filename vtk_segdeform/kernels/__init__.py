@@ -2,6 +2,7 @@
 
 The files, in reading order:
 
+    compilation compilation of the kernels in the background, once
     dispatch    compiled kernels if numba is available and the arrays are large enough
     threads     parallel loops over rows
     compiled    the kernels, compiled by numba
@@ -12,11 +13,12 @@ from .dispatch import (
     compiled_checks,
     compiled_kernels,
     inputs,
-    is_first_run,
+    is_compiling,
     load_early,
     load_for,
     load_late,
     scratch,
+    wait_until_compiled,
     writable,
 )
 from .threads import in_parallel, n_threads, nearest, one_blas_thread, quick_turns
@@ -27,7 +29,7 @@ __all__ = [
     "compiled_kernels",
     "in_parallel",
     "inputs",
-    "is_first_run",
+    "is_compiling",
     "load_early",
     "load_for",
     "load_late",
@@ -36,5 +38,6 @@ __all__ = [
     "one_blas_thread",
     "quick_turns",
     "scratch",
+    "wait_until_compiled",
     "writable",
 ]

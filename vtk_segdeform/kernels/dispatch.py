@@ -5,10 +5,15 @@
     load_for(n_vertices)                import them now, if they pay for such a mesh
     load_early()                        import them before they are needed
     load_late()                         do without them for small arrays until then
+    wait_until_compiled()               use them from now on, even if they must be compiled first
 
 numba is installed with the package on platforms that have wheels of it.  Importing it takes half a
 second, so it is imported for the first array that is large enough.  Without it everything works,
 but more slowly, and `advice` says so; ``SEGDEFORM_NUMBA=0`` disables it.
+
+As long as the kernels are being compiled (`compilation`), their equivalents serve.  Both agree up
+to rounding, not bit for bit, so a process changes over only once, and never within a drag or a
+solve: when a mesh is prepared, and in an editor when the hand has rested.
 """
 
 from __future__ import annotations
@@ -17,7 +22,6 @@ import functools
 import importlib.util
 import os
 import sys
-from pathlib import Path
 from threading import Thread
 from typing import Any
 
@@ -26,14 +30,15 @@ from numpy.typing import NDArray
 
 from .. import sizes
 from ..importing import imported
+from . import compilation
 from .threads import quick_turns
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
 _HUGE = 1 << 24  # bytes; only the pages that are used take memory
 _LARGE = 1 << 17  # bytes; a process has less than that at hand, without new pages
-_CACHED = "*.nbi"  # files of compiled kernels
 _checked = [0]  # faces processed so far by equivalents in numpy
 _is_late = [False]  # whether small arrays are processed in numpy until the kernels are loaded
+_does_without: list[bool | None] = [None]  # whether they are being compiled; None: to be found out
 
 
 def compiled_kernels(size: int | None = None) -> Any:
@@ -41,7 +46,8 @@ def compiled_kernels(size: int | None = None) -> Any:
     if size is not None and size < (sizes.COMPILED_LATE if _is_late[0] else sizes.COMPILED):
         return None
     kernels = _kernels()
-    _is_late[0] = False
+    if kernels is not None:
+        _is_late[0] = False
     return kernels
 
 
@@ -63,17 +69,23 @@ def compiled_checks(size: int) -> Any:
 
 def load_for(n_vertices: int) -> None:
     """Load the compiled kernels now if preparing a mesh of so many vertices would use them."""
+    _catch_up()
     if n_vertices > sizes.COMPILED_PREPARATION:
         _load()
 
 
-def load_early() -> None:
+def load_early() -> bool:
     """Begin to load the compiled kernels in another thread, if they are not loaded yet.
 
-    Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.
+    Until the thread has ended, `compiled_kernels` waits for it, except after `load_late`.  Return
+    True if it is too early, because they are being compiled.
     """
-    if not _kernels.cache_info().currsize:
+    _catch_up()
+    if is_compiling():
+        return True
+    if not _module.cache_info().currsize:
         Thread(target=quick_turns()(_load), name="segdeform kernels").start()
+    return False
 
 
 def load_late() -> None:
@@ -82,7 +94,19 @@ def load_late() -> None:
     An editor calls this for its first mesh, `load_for` before work that takes longer than the
     import, and `load_early` after the first drag.
     """
-    _is_late[0] = not _kernels.cache_info().currsize
+    _is_late[0] = not _module.cache_info().currsize
+
+
+def is_compiling() -> bool:
+    """Tell whether kernels are not used yet because they are being compiled in the background."""
+    return _is_enabled() and _waits() and compilation.is_pending()
+
+
+def wait_until_compiled() -> None:
+    """Return when the kernels have been compiled, to be used from now on."""
+    if _is_enabled():
+        compilation.wait()
+        _catch_up()
 
 
 def _missing() -> list[str]:
@@ -101,18 +125,6 @@ def advice() -> str:
         f"{' and '.join(missing)} {verb} not installed: frames take {times}. "
         f"pip install {' '.join(missing)}"
     )
-
-
-def is_first_run() -> bool:
-    """Tell whether kernels will be compiled, once for all later runs, which takes half a minute.
-
-    False if that is unknown, because numba does not cache them beside the source.
-    """
-    folder = Path(__file__).parent / "compiled"
-    if _LIBRARIES[0] in _missing() or os.environ.get("SEGDEFORM_NUMBA", "1") == "0":
-        return False
-    is_beside = "NUMBA_CACHE_DIR" not in os.environ and os.access(folder, os.W_OK)
-    return is_beside and not any((folder / "__pycache__").glob(_CACHED))
 
 
 def inputs(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
@@ -151,13 +163,35 @@ def _load() -> None:
         if kernels is not None:
             kernels.number_trees(np.arange(1))  # the first call of a kernel sets up the compiler
     finally:
-        _is_late[0] = False
+        _is_late[0] = _is_late[0] and bool(_does_without[0])
+
+
+def _is_enabled() -> bool:
+    return os.environ.get("SEGDEFORM_NUMBA", "1") != "0"
+
+
+def _waits() -> bool:
+    """Return whether this process does without kernels until they have been compiled."""
+    without = _does_without[0]
+    if without is None:
+        compilation.begin()
+        without = _does_without[0] = compilation.is_pending()
+    return without
+
+
+def _catch_up() -> None:
+    """Use the kernels from now on if they have been compiled since they were needed first."""
+    if _does_without[0]:
+        _does_without[0] = None
+
+
+def _kernels() -> Any:
+    """Return the compiled kernels; None without numba, or while they are being compiled."""
+    return _module() if _is_enabled() and not _waits() else None
 
 
 @functools.cache
-def _kernels() -> Any:
-    if os.environ.get("SEGDEFORM_NUMBA", "1") == "0":
-        return None
+def _module() -> Any:
     try:
         return imported(f"{__package__}.compiled")
     except ImportError:  # numba is missing, or incompatible with this numpy

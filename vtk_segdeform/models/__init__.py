@@ -7,16 +7,13 @@ The files, in reading order:
     remeshing    edge splits, edge flips, relaxation and refinement
 """
 
-from .implicit import Limb, implicit_surface, standing_body
-from .shapes import bar, cactus, dinosaur, sphere, torus
+from .shapes import bar, cactus, dinosaur, random_limbs, sphere, torus
 
 __all__ = [
-    "Limb",
     "bar",
     "cactus",
     "dinosaur",
-    "implicit_surface",
+    "random_limbs",
     "sphere",
-    "standing_body",
     "torus",
 ]

@@ -209,3 +209,38 @@ def _chequered(p: int, q: int) -> IntArray:
     one = np.where(odd, np.stack([a, b, d], axis=-1), np.stack([a, b, c], axis=-1))
     two = np.where(odd, np.stack([b, c, d], axis=-1), np.stack([a, c, d], axis=-1))
     return np.concatenate([one, two])
+
+
+def random_limbs(n_vertices: int = 5430, seed: int = 0) -> Mesh:
+    """Return a standing trunk, about one unit tall, with four to six bent limbs, all random.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Exact number of vertices, 500 or more.
+    seed : int
+        Of the random numbers, 0 or more; equal seeds give equal bodies.
+
+    Raises
+    ------
+    ArgumentError
+        If a number is out of range.
+    """
+    _require(n_vertices, 500)
+    if not is_whole(seed, 0):
+        raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
+    rng = np.random.default_rng(int(seed))
+    lean = rng.uniform(-0.15, 0.15, 2)
+    trunk = [(s * lean[0], s * lean[1], 0.9 * s) for s in (-0.1, 0.35, 0.7, 1.0)]
+    limbs = [Limb(trunk, rng.uniform(0.09, 0.15, 4).tolist())]
+    for around in rng.permutation(6)[: rng.integers(4, 7)]:
+        height, turn = rng.uniform(0.2, 0.9), np.pi / 3.0 * (around + rng.uniform(-0.3, 0.3))
+        way = np.array([np.cos(turn), np.sin(turn), rng.uniform(-0.4, 0.6)])
+        points = [np.array([*height * lean, 0.9 * height])]
+        for _ in range(3):
+            points.append(points[-1] + rng.uniform(0.1, 0.18) * way / np.linalg.norm(way))
+            way = way + rng.uniform(-0.6, 0.6, 3)
+        points = [np.array([x, y, max(z, 0.08)]) for x, y, z in points]
+        radii = np.linspace(rng.uniform(0.05, 0.08), rng.uniform(0.03, 0.05), 4)
+        limbs.append(Limb([tuple(p.tolist()) for p in points], radii.tolist()))
+    return standing_body(limbs, int(n_vertices), blend=0.04)

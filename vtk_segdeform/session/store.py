@@ -315,7 +315,7 @@ def _checked_header(header: dict[str, Any]) -> dict[str, Any]:
 def _options(values: Mapping[str, Any]) -> Options:
     """Return options of these *values*, which `Options` checks.
 
-    Versions up to 0.9 could also avoid folds, and have a rotation for each vertex.
+    Older files may also avoid folds, and have a rotation for each vertex.
     """
     values = {name: value for name, value in values.items() if name != "avoid_folds"}
     if values.get("rotation_groups", 0) is None:

@@ -2,7 +2,8 @@
 
 The files, in reading order:
 
-    gauss_newton            the iteration, eqs. (11) to (14) and (21)
+    newton                  the iteration of both levels, eqs. (11) to (14) and (21)
+    gauss_newton            its problem over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
@@ -26,6 +27,7 @@ from .exact_volume import (
     steps_to_volume,
 )
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
+from .newton import Step, constrained_step, minimise
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .solution import CONVERGED, Solution, Status
 from .terms import Term
@@ -53,12 +55,15 @@ __all__ = [
     "SolverOptions",
     "SolverResult",
     "Status",
+    "Step",
     "Term",
     "VolumeConstraint",
     "Volumes",
     "are_met",
     "connected_sets",
+    "constrained_step",
     "errors_at",
+    "minimise",
     "moved_along",
     "position_term",
     "region_volumes",

@@ -14,12 +14,12 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
 
 (The paper prints a minus before its lambda; then G h = -g would not hold.)
 
-    `GaussNewton._evaluate`   the rotations R, and with them E, d and G at a pose
-    `GaussNewton._step`       h, lambda and Z = H^-1 G^T: eq. (21), line by line
-    `GaussNewton._retract`    p + h, moved along Z onto g = 0
-    `GaussNewton.minimise`    the iteration
+    `GaussNewton.evaluate`    the rotations R, and with them E, d and G at a pose
+    `GaussNewton.step`        h, lambda and Z = H^-1 G^T: eq. (21), line by line
+    `GaussNewton.moved`       p + h, moved along Z onto g = 0
+    `newton.minimise`         the iteration
 
-Six things are added to the paper's iteration, which `deformer.as_printed` is:
+This is added to the paper's iteration, which `deformer.as_printed` has:
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
    of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
@@ -28,21 +28,22 @@ Six things are added to the paper's iteration, which `deformer.as_printed` is:
 2. *Exact Hessian* (`hessian`).  The paper's H is constant, W~^T A^T A W~ plus the position weights,
    and rotations follow one step behind: hundreds of steps are needed, and a small step does not
    mean that the minimum is near.  With the derivatives of the rotations and of the volumes in H, h
-   is Newton's step, about as long as the remaining distance.  H is computed again after 6 steps.
-   If it is not convex, it contains a share of the rotations' derivatives only, and h is shorter.
+   is Newton's step, about as long as the remaining distance.  H is computed again after 6 steps,
+   before and after a long step, and if a step with an earlier one lowers nothing.  If it is not
+   convex, it contains a share of the rotations' derivatives only, and h is shorter.  If it is
+   almost singular, so that no share of h lowers the objective, the paper's H takes its place.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  In pulls of soft
-   bodies, with 8 steps a frame, poses are 2 to 10 times nearer to converged ones with it.
-4. *Line search.*  All iterates meet the constraints, so the objective itself is the merit: where it
-   rises, the plain step replaces the accelerated one, and is shortened (epsilon, section 3.3).  If
-   that does not help, H is almost singular, and the step with the paper's H is taken.
+   bodies, with 8 steps a frame, poses are 2 to 5 times nearer to converged ones with it.
+4. *Line search* (`newton`).
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
 6. *Further terms* (`terms`), such as contact.  While one of them is active, its Hessian is in H.
 
+Long because the formulas of the iteration are explained here, and its problem is one class.
+
 Source
 ------
-Section 3.3 of the paper.  Y. Peng, B. Deng, J. Zhang, F. Geng, W. Qin, L. Liu, "Anderson
-acceleration for geometry optimization and physics simulation", SIGGRAPH 2018 (the safeguard).
+Section 3.3 of the paper.
 """
 
 from __future__ import annotations
@@ -59,23 +60,21 @@ from ..arrays import FloatArray, is_number, is_whole
 from ..checks import shown
 from ..energy import Energy, Factor, full_factor, quadratic_factor, rotation_term
 from ..errors import ArgumentError, CageError
-from ..progress import Progress, tell
+from ..progress import Progress
 from .anderson import Anderson
 from .exact_volume import moved_along, steps_to_volume
 from .extrapolation import End, Way
+from .newton import Step, constrained_step, minimise
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
 from .terms import NO_SURFACE, Term, hessian_of, share_of_step, with_terms
 from .volume_constraints import Volumes, gradients, violations
 
-_RISE = 1e-13  # relative rise of the merit that counts as rounding
-_EPSILON = 2.0**-52  # relative gain that is less than rounding
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
-_SHORTEST = 1.0 / 64.0  # least epsilon of section 3.3
 # Step lengths, root mean square over the surface of a mesh of size 1:
 _LONG = 1e-2  # a longer step is computed again with H at the present pose
-_CLOSE = 1e-2  # of the paper's step: below it multipliers are accurate enough for volume Hessians
+_CLOSE = 3e-3  # of the paper's step: below it multipliers are accurate enough for volume Hessians
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _OLD = 6  # steps after which H is computed again
@@ -105,7 +104,6 @@ class SolverResult:
     """The last iterate, and how it was reached."""
 
     p: FloatArray  # (m, 3), cage vertices
-    multipliers: FloatArray
     directions: tuple[FloatArray, ...]  # Z with the H of (21), (m, 3) for each constraint
     status: Status
     steps: int
@@ -116,8 +114,8 @@ class SolverResult:
 class _Iterate:
     """A pose, with the objective and the constraints there."""
 
-    p: FloatArray
-    x: FloatArray  # the surface of the volumes; empty if no term needs it
+    at: FloatArray  # p, the cage vertices
+    x: FloatArray  # the surface of the volumes; empty without volumes
     shape: float  # E and the further terms
     shape_slope: FloatArray  # half its gradient
     rows: tuple[FloatArray, ...]  # of G, one (m, 3) for each constraint
@@ -127,7 +125,7 @@ class _Iterate:
 
     def toward(self, term: TargetTerm) -> _Iterate:
         """Return the same pose for other targets."""
-        value, slope = term.value_and_slope(self.p)
+        value, slope = term.value_and_slope(self.at)
         return replace(self, merit=self.shape + value, slope=self.shape_slope + slope)
 
 
@@ -150,6 +148,10 @@ class _State:
         if self.end is None or self.end[0] is not p or not np.array_equal(targets, self.end[1]):
             self.acceleration.forget()
 
+    def took(self, step: Step) -> None:
+        """Count a step; after a long one H is out of date."""
+        self.age = _OLD if step.length > _LONG else self.age + 1
+
     def copy(self) -> _State:
         """Return a state from which another solver continues."""
         return replace(self, acceleration=copy.deepcopy(self.acceleration))
@@ -166,7 +168,8 @@ class GaussNewton:
     terms: tuple[Term, ...] = ()
     _hessian: FloatArray = field(init=False, repr=False)
     _factor: Factor = field(init=False, repr=False)
-    _state: _State | None = field(init=False, repr=False, default=None)
+    _term: TargetTerm = field(init=False, repr=False)  # of the present targets
+    _state: _State = field(init=False, repr=False)
     _last: _Iterate | None = field(init=False, repr=False, default=None)
     _way: Way = field(init=False, repr=False, default=Way())
 
@@ -190,18 +193,18 @@ class GaussNewton:
             raise CageError(
                 "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
-        self._factor = factor
+        self._factor, self._state = factor, _State(factor)
 
     def copy(self) -> GaussNewton:
         """Return a solver that continues from here independently."""
         other = copy.copy(self)
-        other._state = None if self._state is None else self._state.copy()
+        other._state = self._state.copy()
         return other
 
     def fresh(self) -> GaussNewton:
         """Return a solver of the same problem that has not begun."""
         other = copy.copy(self)
-        other._state, other._last, other._way = None, None, Way()
+        other._state, other._last, other._way = _State(self._factor), None, Way()
         return other
 
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
@@ -209,66 +212,77 @@ class GaussNewton:
 
         Called again with the last p and targets, it continues as if it had never returned.
         """
-        state, self._state = self._state or _State(self._factor), None
+        state, self._term = self._state, self.positions.toward(targets)
         state.begin(p, targets)
-        term = self.positions.toward(targets)
-        here = self._ahead(self._iterate_at(p, term), targets, term)
-        merits = [here.merit]
-        multipliers = np.zeros(len(self.volumes.constraints))
-        directions: list[FloatArray] = []
-        step = np.zeros_like(p)
-        status = Status.STEP_LIMIT
-        while len(merits) <= options.max_steps:
-            tell(options.progress, (len(merits) - 1) / options.max_steps, "solving")
-            if not state.is_usable(here):
-                factor = self._full_factor(here) or self._factor
-                state.factor, state.age, state.has_terms = factor, 0, here.is_active
-            step, multipliers, directions = self._step(here, state.factor)
-            length = self._length(step)
-            if state.age > 0 and length > _LONG:
-                state.age = _OLD
-                continue
-            gain = -float(np.vdot(here.slope, step))  # twice what a quadratic model would gain
-            if length <= options.tolerance or abs(gain) <= _EPSILON * self._size(here):
-                status = Status.CONVERGED
-                break
-            ahead = None
-            if here.is_active:
-                step *= share_of_step(self.terms, step)
-            else:
-                residual = self._factor.triangle.T @ step
-                guess = state.acceleration.extrapolate(here.p, step, residual)
-                ahead = self._retract(guess, directions, term)
-            if ahead is None or not self._improves(ahead, here):
-                state.acceleration.forget()
-                ahead = self._shortened(here, step, directions, term)
-            if ahead is None and state.age > 0:  # H is of an earlier pose
-                state.age = _OLD
-                continue
-            if ahead is None and state.factor.coupled:  # H may be almost singular
-                step, multipliers, directions = self._step(here, self._factor)
-                ahead = self._shortened(here, step, directions, term)
-                if ahead is not None and ahead.merit >= here.merit - self._rounding(here):
-                    ahead = None
-            if ahead is None:
-                status, step = Status.STALLED, np.zeros_like(step)
-                break
-            here, step = ahead, np.zeros_like(step)
-            merits.append(here.merit)
-            state.age = _OLD if length > _LONG else state.age + 1
-        if directions:  # not those of a factor from another pose: the result would depend on it
-            directions = self._factor.solve_all([np.zeros_like(here.p), *here.rows])[1:]
-        state.end = here.p, targets
-        self._state, self._last = state, here
-        self._way = self._way.on_to(End(here.p + step, targets, tuple(directions)))
-        return SolverResult(
-            p=here.p,
-            multipliers=multipliers,
-            directions=tuple(directions),
-            status=status,
-            steps=len(merits) - 1,
-            merits=tuple(merits),
+        end = minimise(
+            self,
+            self._ahead(self._iterate_at(p), targets),
+            state.acceleration,
+            tolerance=options.tolerance,
+            max_steps=options.max_steps,
+            progress=options.progress,
+            took=state.took,
         )
+        here, left = end.pose, 0.0 if end.step is None else end.step.h
+        # Not those of a factor from another pose: the result would depend on it.
+        directions = tuple(self.directions(here.rows))
+        state.end, self._last = (here.at, targets), here
+        self._way = self._way.on_to(End(here.at + left, targets, directions))
+        return SolverResult(here.at, directions, end.status, len(end.merits) - 1, end.merits)
+
+    @property
+    def constant(self) -> float:
+        """The size of the terms of the energy."""
+        return self.energy.constant
+
+    def step(self, here: _Iterate) -> Step:
+        """Return the step (21), with H of this pose or of one not far from it."""
+        state = self._state
+        if not state.is_usable(here):
+            self._renew(here)
+        step = self._step(here, state.factor)
+        if state.age and step.length > _LONG:
+            self._renew(here)
+            step = self._step(here, state.factor)
+        share = share_of_step(self.terms, step.h) if here.is_active else 1.0
+        return step if share == 1.0 else step._replace(h=share * step.h, is_whole=False)
+
+    def another(self, here: _Iterate) -> Step | None:
+        """Return the step with H of this pose, then with the H of the paper, then None."""
+        state = self._state
+        if state.age:
+            self._renew(here)
+        elif state.factor.coupled:
+            state.factor = self._factor
+        else:
+            return None
+        return self._step(here, state.factor)
+
+    def moved(self, p: FloatArray, directions: Sequence[FloatArray]) -> _Iterate:
+        """Return *p* moved along *directions* onto the constraints, and the objective there."""
+        if not np.isfinite(p).all():
+            return _Iterate(p, p, math.inf, p, (), math.inf, p)
+        if not directions:
+            return self.evaluate(p, self._surface(p))
+        paths = self.volumes.surface.map(np.hstack([p, *directions]))
+        t = steps_to_volume(self.volumes.constraints, paths)
+        p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
+        return self.evaluate(p, moved_along(paths, t))
+
+    def residual(self, h: FloatArray) -> FloatArray:
+        """Return *h* in the norm of the constant H of the paper.
+
+        Plain distances between cage vertices also count vertices that hardly move the mesh.
+        """
+        return np.asarray(self._factor.triangle.T @ h)
+
+    def evaluate(self, p: FloatArray, x: FloatArray) -> _Iterate:
+        """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
+        rows = self.volumes.surface.adjoints(gradients(self.volumes.constraints, x))
+        energy, slope = self.energy.value_and_slope(p)
+        value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
+        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
+        return here.toward(self._term)
 
     def compliance(self, rows: FloatArray) -> FloatArray:
         """Return rows H^-1 rows^T, (k, k): how far points of *rows* (k, m) yield to unit forces.
@@ -311,7 +325,7 @@ class GaussNewton:
 
         It is zero at a minimum: the rest, which is orthogonal to it, changes the volumes only.
         """
-        here = self._iterate_at(p, self.positions.toward(targets))
+        here = self._at(p, targets)
         rows = np.reshape(here.rows, (len(here.rows), p.size))
         slope = here.slope.ravel()
         share = np.linalg.lstsq(rows.T, slope, rcond=None)[0] if len(rows) else np.zeros(0)
@@ -322,7 +336,7 @@ class GaussNewton:
 
         An estimate of the distance to the minimum for *targets*; the step is not taken.
         """
-        here = self._iterate_at(p, self.positions.toward(targets))
+        here = self._at(p, targets)
         return self.farthest(self.response(p, here.slope, here.rows))
 
     def response(self, p: FloatArray, slope: FloatArray, rows: Sequence[FloatArray]) -> FloatArray:
@@ -331,96 +345,61 @@ class GaussNewton:
         To first order it keeps the volumes whose gradients are *rows*, (m, 3) each.  The Hessian is
         that of the last step, if this was Newton's.  Where it is not convex, the step is longer.
         """
-        factor = None if self._state is None else self._state.factor
-        if factor is None or factor.share < _EXACT:
+        factor = self._state.factor
+        if factor.share < _EXACT:
             of_terms = hessian_of(self.terms, p, self._surface(p)) if self.terms else None
-            factor = full_factor(self._hessian, rotation_term(self.energy, p), added=of_terms)
-        is_exact, factor = factor is not None and factor.share >= _EXACT, factor or self._factor
-        step, _, _ = _constrained_step(factor, slope, rows, np.zeros(len(rows)))
-        return step if is_exact else _SHORT * step
+            rotations = rotation_term(self.energy, p)
+            factor = full_factor(self._hessian, rotations, added=of_terms) or self._factor
+        step, _, _ = constrained_step(factor.solve_all, slope, rows, np.zeros(len(rows)))
+        return step if factor.share >= _EXACT else _SHORT * step
 
-    def _step(
-        self, here: _Iterate, factor: Factor
-    ) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
-        """Return h and lambda of (21), and Z = H^-1 G^T, one direction for each constraint."""
+    def _step(self, here: _Iterate, factor: Factor) -> Step:
+        """Return the step (21) with the *factor* of H."""
         g = violations(self.volumes.constraints, here.x)
-        return _constrained_step(factor, here.slope, here.rows, g)
+        h, _, directions = constrained_step(factor.solve_all, here.slope, here.rows, g)
+        return Step(h, directions, self._length(h))
 
-    def _retract(
-        self, p: FloatArray, directions: Sequence[FloatArray], term: TargetTerm
-    ) -> _Iterate:
-        """Return *p* moved along *directions* onto the constraints, and the objective there."""
-        if not np.isfinite(p).all():
-            return _Iterate(p, p, math.inf, p, (), math.inf, p)
-        if not directions:
-            return self._evaluate(p, self._surface(p), term)
-        paths = self.volumes.surface.map(np.hstack([p, *directions]))
-        t = steps_to_volume(self.volumes.constraints, paths)
-        p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return self._evaluate(p, moved_along(paths, t), term)
+    def _renew(self, here: _Iterate) -> None:
+        """Let H be that of this pose; the paper's if it is not convex."""
+        state = self._state
+        state.factor, state.age, state.has_terms = self._factor_at(here), 0, here.is_active
 
-    def _full_factor(self, here: _Iterate) -> Factor | None:
-        """Return the factor of the exact Hessian; None if it is not convex."""
-        of_terms = hessian_of(self.terms, here.p, here.x) if here.is_active else None
+    def _factor_at(self, here: _Iterate) -> Factor:
+        """Return the factor of the exact Hessian; of the paper's if it is not convex."""
+        of_terms = hessian_of(self.terms, here.at, here.x) if here.is_active else None
         of_volumes = None
-        step, multipliers, _ = self._step(here, self._factor)
-        if self.volumes.hessian and self._length(step) < _CLOSE:
-            of_volumes = self.volumes.hessian(here.p, multipliers)
-        rotations = rotation_term(self.energy, here.p)
-        return full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
+        if self.volumes.hessian:
+            g = violations(self.volumes.constraints, here.x)
+            solve = self._factor.solve_all
+            step, multipliers, _ = constrained_step(solve, here.slope, here.rows, g)
+            if self._length(step) < _CLOSE:
+                of_volumes = self.volumes.hessian(here.at, multipliers)
+        rotations = rotation_term(self.energy, here.at)
+        exact = full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
+        return exact or self._factor
 
     def _surface(self, p: FloatArray) -> FloatArray:
         return self.volumes.surface.map(p) if self.volumes.constraints else NO_SURFACE
 
-    def _evaluate(self, p: FloatArray, x: FloatArray, term: TargetTerm) -> _Iterate:
-        """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
-        rows = self.volumes.surface.adjoints(gradients(self.volumes.constraints, x))
-        energy, slope = self.energy.value_and_slope(p)
-        value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
-        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
-        return here.toward(term)
-
-    def _iterate_at(self, p: FloatArray, term: TargetTerm) -> _Iterate:
+    def _iterate_at(self, p: FloatArray) -> _Iterate:
         """Return the iterate at *p*; where the last call ended only the targets have changed."""
         last = self._last
-        if last is not None and last.p is p:
-            return last.toward(term)
-        return self._evaluate(p, self._surface(p), term)
+        if last is not None and last.at is p:
+            return last.toward(self._term)
+        return self.evaluate(p, self._surface(p))
 
-    def _ahead(self, here: _Iterate, targets: FloatArray, term: TargetTerm) -> _Iterate:
+    def _ahead(self, here: _Iterate, targets: FloatArray) -> _Iterate:
         """Return the start for *targets*: *here*, or on along the way if it is better there."""
         found = self._way.ahead(targets)
         if found is None or len(found[1]) != len(self.volumes.constraints):
             return here
-        ahead = self._retract(*found, term)
+        ahead = self.moved(*found)
         return ahead if ahead.merit < here.merit else here
 
-    def _shortened(
-        self,
-        here: _Iterate,
-        step: FloatArray,
-        directions: Sequence[FloatArray],
-        term: TargetTerm,
-    ) -> _Iterate | None:
-        """Return the first of the steps h, h/2, h/4 ... that lowers the objective, or None."""
-        epsilon = 1.0
-        while epsilon >= _SHORTEST:
-            ahead = self._retract(here.p + epsilon * step, directions, term)
-            if self._improves(ahead, here):
-                return ahead
-            epsilon *= 0.5
-        return None
-
-    def _improves(self, ahead: _Iterate, here: _Iterate) -> bool:
-        return ahead.merit <= here.merit + self._rounding(here)
-
-    def _rounding(self, here: _Iterate) -> float:
-        """Return the difference of merits that counts as rounding."""
-        return _RISE * self._size(here)
-
-    def _size(self, here: _Iterate) -> float:
-        """Return the size of the terms of which the merit is the sum."""
-        return self.energy.constant + abs(here.merit)
+    def _at(self, p: FloatArray, targets: FloatArray) -> _Iterate:
+        """Return the iterate at *p* for *targets*, outside of an iteration."""
+        self._term = self.positions.toward(targets)
+        return self._iterate_at(p)
 
     def farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
@@ -430,18 +409,3 @@ class GaussNewton:
     def _length(self, step: FloatArray) -> float:
         """Return the root mean square of a *step* over the surface."""
         return math.sqrt(max(0.0, float(np.vdot(step, self.energy.mass @ step))))
-
-
-def _constrained_step(
-    factor: Factor, slope: FloatArray, rows: Sequence[FloatArray], g: FloatArray
-) -> tuple[FloatArray, FloatArray, list[FloatArray]]:
-    """Return h, lambda and Z of (21), for d = *slope* and the *rows* of G."""
-    h, *z = factor.solve_all([-slope, *rows])  # -H^-1 d, and Z
-    if not rows:
-        return h, np.zeros(0), []
-    gh = np.array([np.vdot(row, h) for row in rows])  # -G H^-1 d
-    gz = np.array([[np.vdot(row, direction) for direction in z] for row in rows])
-    multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
-    for multiplier, direction in zip(multipliers, z, strict=True):
-        h -= multiplier * direction
-    return h, multipliers, z

@@ -17,7 +17,7 @@ from typing import TypeVar
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.errors import SessionError
-from vtk_segdeform.kernels import advice, is_first_run, load_early, load_for, load_late
+from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, saved_view
 
@@ -39,7 +39,7 @@ from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
 from .settling import Settling
 from .widget_set import Mode, WidgetSet
 
-_FIRST_RUN = "First run: compiling takes about half a minute, once"
+_FIRST_RUN = "First run: compiling in the background, once"
 _REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
 T = TypeVar("T")
 
@@ -85,8 +85,7 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
         self.messages = Messages(view)
-        self._compiles = is_first_run()
-        self.messages.note(advice() or (_FIRST_RUN if self._compiles else ""))
+        self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
         self.neighbours = Neighbours()
         self.recordings = Recordings(view)
@@ -354,8 +353,8 @@ class Controller:
         self.settling.flush()
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
-        if self._compiles and self.is_preparing:
-            self.messages.note(_FIRST_RUN)  # again, as the pull waits for it
+        if is_compiling():
+            self.messages.note(_FIRST_RUN)  # again, as frames take longer
         if self._mode is Mode.PULL:
             self._prepare_pulls(again=True)
         self.refresh()

@@ -19,8 +19,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.kernels import dispatch
-from vtk_segdeform.widgets.editor import actions
+from vtk_segdeform.widgets.editor import actions, controller
 from vtk_segdeform.widgets.editor import panel_actions as actions_of_panel
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
@@ -643,7 +642,7 @@ def test_a_file_that_is_neither_a_mesh_nor_a_session_is_told_the_formats(tmp_pat
 
 
 def test_the_first_run_says_that_it_compiles(monkeypatch):
-    monkeypatch.setattr(dispatch, "_CACHED", "*.none")
+    monkeypatch.setattr(controller, "is_compiling", lambda: True)
     made = Bench(plain_view((500, 400)), sausage(is_coarse=True).mesh, mode=None)
     assert made.editor.status.startswith("First run: compiling")
     made.editor.remove()

@@ -318,21 +318,14 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     assert hand.failures == []
 
 
-def test_a_pull_that_waits_for_the_compiler_says_so(monkeypatch, request):
-    monkeypatch.setattr(controller, "is_first_run", lambda: True)
-    bench = request.getfixturevalue("bench")
-    bench.until(bench.gate.has_begun.is_set)
-    bench.editor.controller.messages.clear()
-    bench.hand.press(bench.place)
-    bench.hand.move(bench.place + [30.0, 0.0])
-    assert "First run" in bench.editor.status
+def test_drags_during_the_first_compilation_say_so(bench, monkeypatch):
     bench.finish()
-    bench.until(lambda: bench.session.is_dragging)
-    bench.hand.release()
-    bench.hand.press(bench.place)
-    bench.hand.move(bench.place + [30.0, 0.0])
-    assert "First run" not in bench.editor.status
-    bench.hand.release()
+    for is_compiling in (True, False):
+        monkeypatch.setattr(controller, "is_compiling", lambda seen=is_compiling: seen)
+        bench.hand.press(bench.place)
+        bench.hand.move(bench.place + [30.0, 0.0])
+        assert ("First run" in bench.editor.status) == is_compiling
+        bench.hand.release()
 
 
 def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):

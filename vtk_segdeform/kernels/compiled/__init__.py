@@ -1,7 +1,7 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
     volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`,
-                    `barrier.Barrier`, `local_volume.LocalVolume`
+                    `local_volume.LocalVolume`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`

@@ -9,7 +9,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("i8[:], const f8[:,:], const i8[:,:], const f8[:], const f8[:,:], f8")
 def faces_in_beam(met, points, faces, origin, axes, width):
     """Put into *met* (m,) the faces of which no side of a beam has all corners beyond it.
 

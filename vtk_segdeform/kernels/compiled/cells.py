@@ -7,7 +7,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("f8[:,:], f8[:,:], const f8[:,:], const i8[:], const i8[:], const f8[:,:], i8, i8")
 def cell_sums(sums, product, x, indptr, indices, weights, start, stop):
     """Put sum_j k_ij x_j^T into *sums* (n, 9), and sum_j C_ij x_j into *product* (n, 3).
 
@@ -30,7 +30,7 @@ def cell_sums(sums, product, x, indptr, indices, weights, start, stop):
             product[i, 2] += weights[at, 0] * c
 
 
-@_compile
+@_compile("f8[:,:], const f8[:,:], const i4[:], const i4[:], const f8[:], const f8[:], f8, i8, i8")
 def spread_cells(out, values, indptr, indices, given, taken, share, start, stop):
     """Put (1 - share) v_i + share taken_i sum_j given_j v_j into *out* (n, 9), v being *values*."""
     for i in range(start, stop):
@@ -51,7 +51,9 @@ def spread_cells(out, values, indptr, indices, given, taken, share, start, stop)
             out[i, at] = (1.0 - share) * values[i, at] + share * taken[i] * total
 
 
-@_compile
+@_compile(
+    "f8[:,:], f8[:], const f8[:,:], const f8[:,:], const i8[:], const i8[:], const f8[:,:], i8, i8"
+)
 def cell_forces(forces, terms, x, rotations, indptr, indices, transposed, start, stop):
     """Subtract l_j = sum_i R_i^T k_ij from *forces* (n, 3), which are C x.
 

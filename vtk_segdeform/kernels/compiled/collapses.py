@@ -15,7 +15,7 @@ _TINY = np.finfo(float).tiny
 _ROUND = 2.0 * np.sqrt(3.0)
 
 
-@_compile
+@_compile("i8[:], i8[:], i8[:,:], i8[:], i8[:], i8[:], const i8[:,:]")
 def sorted_edges(i, j, ends, starts, upper, apex, faces):
     """Put the edges *i* < *j* (e,) of a closed surface into lexicographic order.
 
@@ -57,7 +57,10 @@ def sorted_edges(i, j, ends, starts, upper, apex, faces):
             first = last
 
 
-@_compile
+@_compile(
+    "f8[:], f8[:,:], const i8[:], const i8[:], const i8[:], const i8[:], const f8[:], "
+    "const f8[:,:], const b1[:], f8, f8, const f8[:,:], const f8[:,:]"
+)
 def collapse_costs(
     cost, place, i, j, old_i, old_j, old_cost, old_place, is_moved, stiff, square, points, sums
 ):
@@ -124,7 +127,7 @@ def collapse_costs(
         place[e, 0], place[e, 1], place[e, 2] = x, y, z
 
 
-@_compile
+@_compile("i8[:], i8[:], i8, i8[:], i8[:], b1[:], b1[:], const i8[:], const i8[:]")
 def independent_edges(chosen, cheap, passes, least, near, reach, beyond, i, j):
     """Put edges of *cheap* (c,), in ascending order of cost, into *chosen*; return how many.
 
@@ -172,7 +175,10 @@ def independent_edges(chosen, cheap, passes, least, near, reach, beyond, i, j):
     return count
 
 
-@_compile
+@_compile(
+    "b1[:], const i8[:], i8[:], i8[:], i8[:], f8[:], f8[:], f8, const f8[:,:], const f8[:,:], "
+    "const i8[:,:]"
+)
 def valid_collapses(good, owner, count, of, common, sharp, blunt, turn, place, points, faces):
     """Put into *good* (k,) which collapses of the edges *owner* (n,), -1 if none, are valid.
 
@@ -215,7 +221,7 @@ def valid_collapses(good, owner, count, of, common, sharp, blunt, turn, place, p
             good[e] = False
 
 
-@_compile
+@_compile()
 def _normal(p):
     """Return the unit normal of a triangle (3, 3), and its roundness."""
     ux, uy, uz = p[1, 0] - p[0, 0], p[1, 1] - p[0, 1], p[1, 2] - p[0, 2]

@@ -19,7 +19,7 @@ _DEEPEST = 64  # levels of a tree
 _NEXT = 1, 2, 0
 
 
-@_compile
+@_compile("f8[:,:], f8[:,:], f8[:,:], const f8[:,:], const i8[:,:]")
 def grow_tree(boxes, tree, planes, points, faces):
     """Put the boxes (m, 6) of *faces*, those of a binary tree over them, and their planes in place.
 
@@ -52,7 +52,7 @@ def grow_tree(boxes, tree, planes, points, faces):
             tree[i, 3 + axis] = max(tree[2 * i, 3 + axis], tree[2 * i + 1, 3 + axis])
 
 
-@_compile
+@_compile("i8[:,:], const f8[:,:], const f8[:,:], const b1[:], i8, i8")
 def touching_boxes(pairs, boxes, tree, asked, start, stop):
     """Put the pairs of faces whose boxes touch into *pairs* (k, 2); return their number.
 
@@ -90,7 +90,7 @@ def touching_boxes(pairs, boxes, tree, asked, start, stop):
     return count
 
 
-@_compile
+@_compile("b1[:], const i8[:,:], const f8[:,:], const f8[:,:], const i8[:,:]")
 def may_meet(found, pairs, planes, points, faces):
     """Put into *found* (k,) bool which *pairs* (k, 2) of faces may meet outside common corners."""
     corners, d = np.empty((6, 3)), np.empty(6)  # a common one first, and distances from the other
@@ -165,12 +165,12 @@ def may_meet(found, pairs, planes, points, faces):
                 found[pair] |= inside
 
 
-@_inline
+@_inline()
 def _between(points, a, b):
     return points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
 
 
-@_inline
+@_inline()
 def _are_apart(some, i, others, j):
     """Return whether box i of *some* and box j of *others* do not touch."""
     x = some[i, 0] > others[j, 3] or others[j, 0] > some[i, 3]

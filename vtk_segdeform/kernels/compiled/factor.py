@@ -12,7 +12,7 @@ from .kernels import kernel
 _compile = kernel(fastmath={"reassoc", "contract"})
 
 
-@_compile
+@_compile("f8[:,:], f8[:,:]")
 def solve_factored(columns, y):
     """Replace each row of *y* (k, n) by (L L^T)^-1 y; *columns* (n, n) are the columns of L.
 
@@ -39,7 +39,7 @@ def solve_factored(columns, y):
             b[i] = (b[i] - t) / column[0]
 
 
-@_compile
+@_compile("f8[:,:], const i4[:], const i4[:], const f8[:], const f8[:]")
 def solve_sparse(y, indptr, indices, values, d):
     """Replace *y* (n, 3) by (L D L^T)^-1 y; the sparse columns of L begin with 1."""
     n = len(d)

@@ -14,7 +14,7 @@ _compile = kernel()
 _LOW = 0xFFFFFFFF
 
 
-@_compile
+@_compile("i4[:], i4[:], i4[:], i4[:], i8[:], const i8[:,:]")
 def one_fan_each(border, starts, onward, backward, links, faces):
     """Return the number of half-edges without a twin, or -1 unless every vertex has one fan.
 
@@ -77,7 +77,7 @@ def one_fan_each(border, starts, onward, backward, links, faces):
     return n_alone
 
 
-@_compile
+@_compile("i8[:], i4[:], const i8[:,:]")
 def border_half_edges(alone, border, faces):
     """Put the half-edges that run to the *border* (n,) of their first vertex into *alone*."""
     k = 0
@@ -88,7 +88,7 @@ def border_half_edges(alone, border, faces):
                 k += 1
 
 
-@_compile
+@_compile("i8[:], i8[:], i8[:], i8[:], const i8[:,:]")
 def pair_half_edges(opposite, starts, edges, bucket, faces):
     """Put the other half-edge of each pair into *opposite* (3m,); -1 if alone, -2 if several.
 
@@ -140,7 +140,7 @@ def pair_half_edges(opposite, starts, edges, bucket, faces):
     return n_alone, n_several, n_parallel
 
 
-@_compile
+@_compile("b1[:], const i8[:]")
 def same_across(same, opposite):
     """Mark the faces without an edge alone that have one face, or several, across two edges.
 
@@ -154,7 +154,7 @@ def same_across(same, opposite):
         same[f] = (a == b or b == c or c == a) and a != -1 and b != -1 and c != -1
 
 
-@_compile
+@_compile("i8[:], b1[:], b1[:], i8[:], const i8[:], const i8[:,:]")
 def face_sides(patch, flip, one_sided, pending, opposite, faces):
     """Put the patch of each face into *patch* (m,), and whether to flip it into *flip* (m,) bool.
 
@@ -190,7 +190,7 @@ def face_sides(patch, flip, one_sided, pending, opposite, faces):
     return count
 
 
-@_compile
+@_compile("i8[:], const i8[:], const i8[:]")
 def link(parent, one, other):
     """Join the trees of items one[i] and other[i]; *parent* (n,) of each is at most itself."""
     for i in range(len(one)):
@@ -207,7 +207,7 @@ def link(parent, one, other):
             parent[a] = b
 
 
-@_compile
+@_compile("i8[:], const i8[:,:]")
 def link_corners(parent, faces):
     """Join the trees of the vertices of each face; see `link`.  Return how many trees are left."""
     for f in range(len(faces)):
@@ -238,7 +238,7 @@ def link_corners(parent, faces):
     return left
 
 
-@_compile
+@_compile("i8[:]")
 def number_trees(parent):
     """Replace the *parent* (n,) of each item by the number of its tree, by first members."""
     count = 0
@@ -250,14 +250,14 @@ def number_trees(parent):
             parent[i] = parent[parent[i]]  # which has its number already
 
 
-@_compile
+@_compile("i8[:], const i8[:]")
 def first_members(first, labels):
     """Put the first item with each of *labels* (n,) into *first* (k,)."""
     for i in range(len(labels) - 1, -1, -1):
         first[labels[i]] = i
 
 
-@_compile
+@_compile("b1[:], const i8[:,:]")
 def used_vertices(used, faces):
     """Mark the vertices of faces in *used* (n,) and return how many faces repeat a vertex.
 
@@ -273,7 +273,7 @@ def used_vertices(used, faces):
     return n_repeating
 
 
-@_compile
+@_compile("i4[:], i4[:], i4[:], const i8[:,:]")
 def edge_rows(starts, ends, numbers, edges):
     """Put the neighbours of each vertex into *ends* (2e,), and 1 + the edge to each into *numbers*.
 
@@ -298,7 +298,7 @@ def edge_rows(starts, ends, numbers, edges):
     starts[0] = 0
 
 
-@_compile
+@_compile("f8[:], f8, const i4[:], const i4[:], const f8[:,:]")
 def edge_lengths(lengths, least, starts, ends, points):
     """Put the lengths of these edges, at least *least*, into *lengths* (2e,); see `edge_rows`."""
     for i in range(len(starts) - 1):

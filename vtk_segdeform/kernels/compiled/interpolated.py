@@ -9,7 +9,7 @@ from .kernels import kernel
 _compile = kernel(fastmath={"reassoc", "contract"})
 
 
-@_compile
+@_compile()
 def _splines(out, t, factor):
     """Put the three quadratic B-splines at *t*, times *factor*, into *out* (3,)."""
     out[0] = factor * 0.5 * (0.5 - t) * (0.5 - t)
@@ -17,7 +17,9 @@ def _splines(out, t, factor):
     out[2] = factor * 0.5 * (0.5 + t) * (0.5 + t)
 
 
-@_compile
+@_compile(
+    "f8[:,:], const i8[:], const f8[:], const f4[:,:], const i4[:], const i4[:,:], const f8[:,:]"
+)
 def add_interpolated(x, rows, blend, offsets, cells, lines, values):
     """Add the interpolated *values* (nodes, k), k a multiple of 3, to *rows* of *x*."""
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -40,7 +42,9 @@ def add_interpolated(x, rows, blend, offsets, cells, lines, values):
             x[r, c + 2] += x2
 
 
-@_compile
+@_compile(
+    "f8[:,:], const f8[:,:], const f8[:], const f4[:,:], const i4[:], const i4[:,:]",
+)
 def add_interpolated_adjoint(values, y, blend, offsets, cells, lines):
     """Add the transpose of the interpolation times *y* (n, k) to *values* (nodes, k)."""
     u, v, w = np.empty(3), np.empty(3), np.empty(3)
@@ -56,7 +60,7 @@ def add_interpolated_adjoint(values, y, blend, offsets, cells, lines):
                     values[n + d, c] += weight * w[d] * y[i, c]
 
 
-@_compile
+@_compile("f8[:,:], const f8[:], const f4[:,:], const i4[:], const i4[:,:], const f8[:,:]")
 def interpolated_rows(out, blend, offsets, cells, lines, values):
     """Put the interpolated *values* (nodes, m) into *out* (k, m)."""
     u, v, w = np.empty(3), np.empty(3), np.empty(3)

@@ -11,7 +11,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile()
 def _sum_near_plane(a, h, t1, length):
     """Return S h by psi_i, for *a*, *t1* and *length* (3,) of the edges of a face at height *h*."""
     total = 0.0
@@ -26,7 +26,10 @@ def _sum_near_plane(a, h, t1, length):
     return total
 
 
-@_compile
+@_compile(
+    "const f8[:,:], const f8[:,:], const i8[:,:], const i8[:,:], const i8[:,:], const f8[:,:,:], "
+    "const f8[:,:,:,:], const f8[:,:,:], const f8[:], f8[:,:]"
+)
 def weights(points, vertices, edges, edge_of, faces, planes, starts, numbers, limits, out):
     """Put the coordinates of *points* (n, 3) into *out* (n, m).
 

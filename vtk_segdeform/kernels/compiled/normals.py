@@ -9,7 +9,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("i4[:], const i8[:,:], const i8[:]")
 def rings(ring, faces, starts):
     """Put the neighbours of each vertex into *ring* (3m,), in cyclic order.
 
@@ -42,7 +42,7 @@ def rings(ring, faces, starts):
             ring[t] = j
 
 
-@_compile
+@_compile("f4[:,:], const f8[:,:], const i4[:], const i8[:], f8, i8, i8")
 def ring_normals(out, x, ring, starts, scale, first, last):
     """Put the unit normals of vertices first..last into *out* (n, 3); *x* is scaled by *scale*."""
     for i in range(first, last):

@@ -11,7 +11,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("const f8[:,:], const b1[:], const i8[:], const b1[:,:], const f8[:], i8[:,:], f8[:]")
 def facing_pairs(samples, held, ids, excluded, limits, pairs, beyond):
     """Put the pairs that are, or may soon be, within reach into *pairs*; return their number.
 
@@ -54,7 +54,7 @@ def facing_pairs(samples, held, ids, excluded, limits, pairs, beyond):
     return count
 
 
-@_compile
+@_compile()
 def _beyond(samples, i, j, share):
     """Return how far two samples are beyond the reach of a pair, in distance or by their gap."""
     squared = gap = 0.0
@@ -66,7 +66,10 @@ def _beyond(samples, i, j, share):
     return max(away, share * (gap - samples[7, i] - samples[7, j]))
 
 
-@_compile
+@_compile(
+    "const f8[:,:], const f8[:,:], const i8[:,:], const i8[:], const i8[:], const f8[:], "
+    "const f8[:], const f8[:], const i8[:,:], const i8[:], i8[:]"
+)
 def opposite_pairs(y, before, faces, starts, places, radii, margins, limits, pairs, ends, found):
     """Put the numbers of the *pairs* (k, 2) that face each other within reach into *found* (k,).
 

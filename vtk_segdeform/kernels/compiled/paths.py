@@ -9,7 +9,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("f8[:], const b1[:], const i8[:], const i4[:], const i4[:], const f8[:], const i8[:]")
 def distances_inside(distance, inside, sources, starts, ends, lengths, wanted):
     """Put into *distance* (n,) the length of the shortest path from *sources* (s,) to each vertex.
 

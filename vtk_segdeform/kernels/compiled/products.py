@@ -13,7 +13,10 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 _IN_A_ROW = 1 << 14  # numbers that are read in forward order, for prefetching
 
 
-@_compile
+@_compile(
+    "f8[:,:], const i8[:], const f8[:,:], f8[:,:], i8, i8",
+    "f8[:,:], const i8[:], const f4[:,:], f8[:,:], i8, i8",
+)
 def add_product(x, rows, block, p, start, stop):
     """Add block @ p.T to *rows* start..stop of *x*, for *p* (k, m), k a multiple of 3."""
     if len(p) == 6:
@@ -53,7 +56,7 @@ def add_product(x, rows, block, p, start, stop):
         _add_row(x, rows[i], block[i], p)
 
 
-@_compile
+@_compile()
 def _add_six(x, rows, block, p, start, stop):
     """Do `add_product` for six columns, reading the block once: all sums fit into registers."""
     p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
@@ -90,7 +93,7 @@ def _add_six(x, rows, block, p, start, stop):
         _add_row(x, rows[i], block[i], p)
 
 
-@_compile
+@_compile()
 def _add_row(x, row, b, p):
     for c in range(len(p)):
         q, s = p[c], 0.0
@@ -99,7 +102,9 @@ def _add_row(x, row, b, p):
         x[row, c] += s
 
 
-@_compile
+@_compile(
+    "f8[:,:], const i8[:], const f8[:,:], f8[:,:]", "f8[:,:], const i8[:], const f4[:,:], f8[:,:]"
+)
 def add_adjoint(p, rows, block, y):
     """Add (block.T @ y[rows]).T to *p* (3, m), for *y* (n, 3)."""
     m = block.shape[1]
@@ -128,7 +133,7 @@ def add_adjoint(p, rows, block, y):
             pz[j] += t * z0
 
 
-@_compile
+@_compile()
 def _add_adjoints(p, rows, block, y, z):
     """Do `add_adjoint` for both *y* and *z*, to *p* (6, m), reading the block once."""
     m = block.shape[1]
@@ -151,7 +156,7 @@ def _add_adjoints(p, rows, block, y, z):
         add_adjoint(p[3:], rows[two:], block[two:], z)
 
 
-@_compile
+@_compile("f8[:,:], const f8[:,:], f8[:,:], const i8[:], const i8[:], const f8[:], const i8[:,:]")
 def map_packed(x, base, p, rows, columns, weights, starts):
     """Put W~ @ p into *x* for all packed blocks of `subspace.Subspace`; *p* is (m, k), k by threes.
 
@@ -174,7 +179,7 @@ def map_packed(x, base, p, rows, columns, weights, starts):
         add_product(x, ids, block, some, first, n)
 
 
-@_compile
+@_compile("f8[:,:], f8[:,:], f8[:,:], const i8[:], const i8[:], const f8[:], const i8[:,:]")
 def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
     """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
 

@@ -21,7 +21,7 @@ _SWEEPS, _ROUNDS = 12, 40  # most iterations of Jacobi's and Newton's methods
 _CLEAR = 4e-3  # least slope, the sum of four cofactors, relative to the cube of the eigenvalue
 
 
-@_inline
+@_inline()
 def _largest(m, scale):
     """Return whether it is found, and the largest eigenvector of N of *m* (3, 3) times *scale*.
 
@@ -83,7 +83,7 @@ def _largest(m, scale):
     return True, c03, n02 * p23 - n22 * p03 + n23 * p02, c23, c33
 
 
-@_compile
+@_compile()
 def _jacobi(n, v):
     """Put the eigenvector into the first row of *v*, by Jacobi's method, to the last digit."""
     scale = 0.0
@@ -124,7 +124,7 @@ def _jacobi(n, v):
         v[0, k], v[best, k] = v[best, k], v[0, k]
 
 
-@_compile
+@_compile("const f8[:,:,:], f8[:,:,:]")
 def rotations(s, out):
     """Put the rotations R that maximise tr(R S) into *out* (k, 3, 3), for *s* (k, 3, 3).
 

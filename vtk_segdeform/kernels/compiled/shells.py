@@ -14,7 +14,7 @@ _compile = kernel()
 _UNSURE = 1 << 40  # a count that no surface has
 
 
-@_compile
+@_compile("f8[:], f8[:], f8[:], const f8[:,:], const f8[:,:], const i8[:,:], const i8[:]")
 def shell_sums(volume, area, size, origins, points, faces, shells):
     """Add to *volume* and *area* (k,) of each shell six times and twice those of its faces.
 
@@ -38,7 +38,7 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
         size[s] = max(size[s], np.sqrt((ax * ax + ay * ay) + az * az))
 
 
-@_compile
+@_compile("f8[:,:], f8[:,:], i4[:], const f8[:,:], const i8[:,:], const i8[:]")
 def shell_boxes(low, high, last, points, faces, shells):
     """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices.
 
@@ -59,7 +59,7 @@ def shell_boxes(low, high, last, points, faces, shells):
                     high[s, axis] = x
 
 
-@_compile
+@_compile("i8[:,:], const i8[:], const f8[:,:], const i8[:,:], const i8[:], const i8[:]")
 def shell_extremes(extremes, some, points, faces, starts, stops):
     """Put the vertices with the least and the largest x, y, z of *some* shells into their rows.
 
@@ -77,7 +77,7 @@ def shell_extremes(extremes, some, points, faces, starts, stops):
                         extremes[s, 3 + axis] = v
 
 
-@_compile
+@_compile()
 def _side(points, tail, head, x, y):
     """Return twice the area of tail, head and a column at x, y, as `inside._side`."""
     a, b = min(tail, head), max(tail, head)
@@ -89,7 +89,7 @@ def _side(points, tail, head, x, y):
     return area if tail < head else -area
 
 
-@_compile
+@_compile()
 def _faces_below(points, faces, start, stop, x, y, z, near):
     """Return how many of faces start..stop are below, +1 looking down, -1 looking up.
 
@@ -122,7 +122,7 @@ def _faces_below(points, faces, start, stop, x, y, z, near):
     return count
 
 
-@_compile
+@_compile()
 def _winding(points, faces, start, stop, x, y, z, near):
     """Return the winding number of faces start..stop around a point, as `inside`."""
     number = 0.0
@@ -147,9 +147,25 @@ def _winding(points, faces, start, stop, x, y, z, near):
     return number / (2.0 * np.pi)
 
 
-@_compile
+@_compile(
+    "b1[:], const i8[:,:], const i8[:,:], f8, const f8[:], const f8[:,:], const i8[:,:], "
+    "const i8[:], const i8[:], const i8[:,:], const i8[:], const i8[:], i8, i8"
+)
 def shells_around(
-    found, pairs, extremes, inside, near, points, faces, starts, stops, cones, firsts, lasts, *rows
+    found,
+    pairs,
+    extremes,
+    inside,
+    near,
+    points,
+    faces,
+    starts,
+    stops,
+    cones,
+    firsts,
+    lasts,
+    start,
+    stop,
 ):
     """Put into *found* (p,) of *pairs* start..stop whether the first shell is around the second.
 
@@ -158,7 +174,6 @@ def shells_around(
     counted along columns, see `inside`, and that of the cones is subtracted.  If a face is so
     *near* (k,) that the count depends on rounding, the winding number is computed instead.
     """
-    start, stop = rows
     for p in range(start, stop):
         outer, inner = pairs[p, 0], pairs[p, 1]
         begin, end, first, last = starts[outer], stops[outer], firsts[outer], lasts[outer]

@@ -32,7 +32,7 @@ _VERTEX, _FACET = np.frombuffer(b"vertex", "u1"), np.frombuffer(b"facet", "u1")
 _END_FACET, _END_SOLID = np.frombuffer(b"endfacet", "u1"), np.frombuffer(b"endsolid", "u1")
 
 
-@_compile
+@_compile()
 def _product(a, b):
     """Return a b as the sum of two doubles, exactly."""
     x, y = _SPLIT * a, _SPLIT * b
@@ -42,7 +42,7 @@ def _product(a, b):
     return high, a_low * b_low - (((high - a_high * b_high) - a_low * b_high) - a_high * b_low)
 
 
-@_compile
+@_compile()
 def _scaled(mantissa, power):
     """Return mantissa 10^power, correctly rounded; NaN if that is undecided."""
     high = np.float64(mantissa)
@@ -64,7 +64,7 @@ def _scaled(mantissa, power):
     return value + rest if value + (rest - margin) == value + (rest + margin) else np.nan
 
 
-@_compile
+@_compile()
 def _number(text, at, whole):
     """Return the number at text[at], and the index after it; -1 as the index if it is not plain.
 
@@ -115,7 +115,7 @@ def _number(text, at, whole):
     return -value if negative else value, at
 
 
-@_compile
+@_compile("const u1[:], b1, f8[:]")
 def plain_numbers(text, whole, result):
     """Put the numbers of *text* (b,) uint8, between blanks, into *result* (n,); return how many.
 
@@ -135,7 +135,7 @@ def plain_numbers(text, whole, result):
     return count
 
 
-@_compile
+@_compile("const u1[:], const i8[:], const i8[:], i8, f8[:,:]")
 def numbers_of_lines(text, starts, lines, skip, values):
     """Put the numbers of *lines* (k,) of *text*, after *skip* letters, into *values* (k, w).
 
@@ -158,7 +158,7 @@ def numbers_of_lines(text, starts, lines, skip, values):
     return True
 
 
-@_compile
+@_compile("const u1[:], const i8[:], const i8[:], i8, i8[:], i8[:,:]")
 def corners_of_lines(text, starts, lines, skip, counts, corners):
     """Put the corners of faces, a, a/t, a//n or a/t/n, into *corners* (c, 3), with 0 for none.
 
@@ -200,7 +200,7 @@ def corners_of_lines(text, starts, lines, skip, counts, corners):
     return count
 
 
-@_compile
+@_compile()
 def _after_word(text, at, word):
     """Return the index after *word* in letters of any case at text[at]; -1 if it is not there."""
     if at + len(word) > len(text):
@@ -214,7 +214,7 @@ def _after_word(text, at, word):
     return end
 
 
-@_compile
+@_compile("const u1[:], f4[:,:], i8[:]")
 def facet_corners(text, corners, counts):
     """Put the numbers after each "vertex" of an STL *text* (b,) uint8 into *corners* (k, 3).
 
@@ -251,7 +251,9 @@ def facet_corners(text, corners, counts):
     return True
 
 
-@_compile
+@_compile(
+    "i8[:,:], i8[:,:], i8, b1, const u1[:], const f8[:], const i8[:], const i8[:], const u1[:]"
+)
 def rows_of_lists(begins, lengths, at, swapped, letters, numbers, sizes, word_sizes, kinds):
     """Put where values begin, and how many they are, into *begins* and *lengths* (n, p).
 

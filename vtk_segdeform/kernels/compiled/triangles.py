@@ -12,7 +12,7 @@ from .kernels import kernel
 _compile = kernel()
 
 
-@_compile
+@_compile("b1[:], const f8[:,:], const i8[:,:], f8, i8, i8")
 def flat_faces(flat, points, faces, share, start, stop):
     """Put into *flat* (m,) which of faces start..stop are at most *share* as high as long.
 
@@ -37,7 +37,7 @@ def flat_faces(flat, points, faces, share, start, stop):
         )
 
 
-@_compile
+@_compile("f8[:], const f8[:,:], const i8[:,:], i8, i8")
 def face_areas(areas, points, faces, start, stop):
     """Put the areas of faces start..stop into *areas* (m,)."""
     for f in range(start, stop):
@@ -49,7 +49,7 @@ def face_areas(areas, points, faces, start, stop):
         areas[f] = 0.5 * np.sqrt((x * x + y * y) + z * z)
 
 
-@_compile
+@_compile("i1[:], f8, const f8[:,:], const i8[:,:]")
 def quad_cuts(cut, square, points, quads):
     """Put into *cut* (q,) along which diagonal to cut each of *quads* (q, 4).
 
@@ -102,7 +102,7 @@ def quad_cuts(cut, square, points, quads):
             cut[q] = 2 if first == second else 1
 
 
-@_compile
+@_compile("i8[:,:], b1[:], f8, const f8[:,:], const i8[:], const i8[:], const i8[:], const i8[:]")
 def convex_cuts(faces, is_cut, least, points, first, starts, counts, corners):
     """Put into *is_cut* (q,) which polygons are convex, and into *faces* (k, 3) their triangles.
 
@@ -168,7 +168,7 @@ def convex_cuts(faces, is_cut, least, points, first, starts, counts, corners):
                 faces[row, k] = corners[start + ring[k]]
 
 
-@_compile
+@_compile("i8[:,:], const i8[:], const i8[:,:], const i1[:]")
 def quad_halves(faces, first, quads, cut):
     """Put the two triangles of each of *quads* (q, 4) into *faces*, at *first* (q,) and after it.
 
@@ -185,7 +185,10 @@ def quad_halves(faces, first, quads, cut):
             faces[k + 1, 0], faces[k + 1, 1], faces[k + 1, 2] = b, c, d
 
 
-@_compile
+@_compile(
+    "b1[:], f8, f8, const f8[:,:], const i8[:], const i8[:], const i8[:], const i8[:,:], "
+    "const i8[:]"
+)
 def wrongly_cut(failed, down, planar, points, starts, counts, corners, faces, polygon):
     """Mark polygons with too few triangles, or planar with one upside down, in *failed* (m,).
 
@@ -246,7 +249,7 @@ def wrongly_cut(failed, down, planar, points, starts, counts, corners, faces, po
         first = last
 
 
-@_compile
+@_compile("i8[:], const f8[:,:], i4[:]")
 def first_equal_points(first, points, table):
     """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 

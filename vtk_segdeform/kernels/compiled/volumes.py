@@ -9,7 +9,10 @@ _compile = kernel()
 _compile_sums = kernel(fastmath={"reassoc"})
 
 
-@_compile_sums
+@_compile_sums(
+    "const f8[:,:], const i8[:,:], f8[:], i8, i8, i8",
+    "const f8[:,:], const i4[:,:], f8[:], i8, i8, i8",
+)
 def volume_sums(x, faces, out, size, first, last):
     """Put six times the volume of each block of *size* faces into *out*, blocks first..last."""
     ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
@@ -24,7 +27,10 @@ def volume_sums(x, faces, out, size, first, last):
         out[block] = total
 
 
-@_compile_sums
+@_compile_sums(
+    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
+)
 def volume_along_sums(x, faces, out, size, first, last):
     """Put six times the four coefficients of each block into *out* (blocks, 4); *x* is (n, 6)."""
     ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
@@ -51,7 +57,7 @@ def volume_along_sums(x, faces, out, size, first, last):
         out[block, 0], out[block, 1], out[block, 2], out[block, 3] = c0, c1, c2, c3
 
 
-@_compile
+@_compile("const f8[:,:], const i8[:,:], f8[:]")
 def determinants(x, corners, out):
     """Write six times the volume of each tetrahedron to *out* (t,)."""
     for t in range(len(corners)):
@@ -62,7 +68,7 @@ def determinants(x, corners, out):
         out[t] = gx * (ey * fz - ez * fy) + gy * (ez * fx - ex * fz) + gz * (ex * fy - ey * fx)
 
 
-@_compile
+@_compile("const f8[:,:], const i8[:,:], f8[:,:]", "const f8[:,:], const i4[:,:], f8[:,:]")
 def volume_gradient(x, faces, out):
     """Add dV/dx to *out* (n, 3)."""
     for f in range(len(faces)):
@@ -76,7 +82,7 @@ def volume_gradient(x, faces, out):
             out[corner, 2] += nz
 
 
-@_compile
+@_compile("const f8[:,:], const i8[:,:], const i8[:], f8[:]")
 def opposite_volumes(x, faces, opposite, out):
     """Add the volumes of the tetrahedra from the faces at each vertex to its opposite to *out*.
 
