@@ -188,3 +188,20 @@ def bound_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(deformer, "cached_binding", bound)
         yield
+
+
+@pytest.fixture
+def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute the volume of small meshes over a coarse surface in each step, as of larger ones."""
+    from vtk_segdeform import sizes
+
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
+
+
+@pytest.fixture
+def scaled(coarse: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scale small meshes to their volume, as large ones are."""
+    from vtk_segdeform import sizes
+
+    monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)

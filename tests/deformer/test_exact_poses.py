@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scenes import sausage
+from scenes import joined, sausage
 from solids import icosphere, rotation
 
 from vtk_segdeform import models, sizes
@@ -23,29 +23,6 @@ SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
 VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
 BAR = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 10))
-
-
-@pytest.fixture
-def coarse(monkeypatch):
-    """Compute the volume of small meshes over a coarse surface in each step, as of larger ones."""
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
-
-
-@pytest.fixture
-def scaled(coarse, monkeypatch):
-    """Scale small meshes to their volume, as large ones are."""
-    monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)
-
-
-def joined(*parts: tuple[Mesh, float, float, int]) -> Mesh:
-    """Return one mesh of parts, each (mesh, shift along x, scale, orientation)."""
-    vertices, faces, count = [], [], 0
-    for mesh, shift, scale, side in parts:
-        vertices.append(mesh.vertices * scale + [shift, 0.0, 0.0])
-        faces.append((mesh.faces if side > 0 else mesh.faces[:, ::-1]) + count)
-        count += mesh.n_vertices
-    return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 @pytest.mark.usefixtures("coarse")

@@ -26,7 +26,8 @@ KERNELS = Path(compilation._FOLDER)
 # Compiles, in place of the real process, until there is a file "end" beside the stamp.
 COMPILER = """
 import time; from vtk_segdeform.kernels import compilation as c; from vtk_segdeform import files
-stamp = c._stamp(); lock = files.hold(stamp.parent / c._LOCK)
+stamp = c._stamp()
+while (lock := files.hold(stamp.parent / c._LOCK)) is None: time.sleep(0.01)  # the test looks at it
 while not (stamp.parent / "end").exists(): time.sleep(0.01)
 stamp.touch()  # {}
 """

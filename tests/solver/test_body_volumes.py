@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scenes import joined
 
 from vtk_segdeform import models
 from vtk_segdeform.geometry import lids_of, signed_volume
@@ -11,16 +12,6 @@ from vtk_segdeform.solver import Bodies, total_volume
 
 BAR = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 10))
 BALL = models.sphere(162)
-
-
-def joined(*parts: tuple[Mesh, float, float, int]) -> Mesh:
-    """Return one mesh of parts, each (mesh, shift along x, scale, orientation)."""
-    vertices, faces, count = [], [], 0
-    for mesh, shift, scale, side in parts:
-        vertices.append(mesh.vertices * scale + [shift, 0.0, 0.0])
-        faces.append((mesh.faces if side > 0 else mesh.faces[:, ::-1]) + count)
-        count += mesh.n_vertices
-    return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 def constraints_of(mesh: Mesh, moved=()):

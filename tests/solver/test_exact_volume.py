@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere
 
-from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver import exact_volume
@@ -28,19 +27,6 @@ from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
 VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
-
-
-@pytest.fixture
-def coarse(monkeypatch):
-    """Compute the volume of small meshes over a coarse surface in each step, as of larger ones."""
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
-
-
-@pytest.fixture
-def scaled(coarse, monkeypatch):
-    """Scale small meshes to their volume, as large ones are."""
-    monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])

@@ -84,3 +84,13 @@ def sausage(n_regions: int = 2, *, is_coarse: bool = False) -> Scene:
     for ids in (fixed, handle):
         ids.setflags(write=False)
     return Scene(mesh, regions, tuple(cages), fixed, handle)
+
+
+def joined(*parts: tuple[Mesh, float, float, int]) -> Mesh:
+    """Return one mesh of parts, each (mesh, shift along x, scale, orientation)."""
+    vertices, faces, count = [], [], 0
+    for mesh, shift, scale, side in parts:
+        vertices.append(mesh.vertices * scale + [shift, 0.0, 0.0])
+        faces.append((mesh.faces if side > 0 else mesh.faces[:, ::-1]) + count)
+        count += mesh.n_vertices
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))

@@ -269,10 +269,9 @@ class Deformer:
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``,
-        and ``avoid_contact=None`` are the values of this deformer.  The fixed
-        vertices stay at *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at
-        rest.
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
+        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
+        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
         other = self._shared()
         if preserve_volume is not None:

@@ -230,7 +230,7 @@ class Finisher:
 
     def moved(self, x: FloatArray, directions: Sequence[FloatArray]) -> _Evaluated:
         """Return *x* moved along *directions* onto the volumes, and the objective there."""
-        if np.isfinite(x).all():  # others have no volume
+        if np.isfinite(x).all():  # otherwise there is no volume to restore
             x = self._landed(x, directions)
         return self._evaluated(x) if np.isfinite(x).all() else _Evaluated(x, math.inf, x)
 

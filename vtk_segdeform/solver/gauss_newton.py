@@ -14,12 +14,13 @@ A, so that R is constant within a step and refitted at each new pose.  Its step 
 
 (The paper prints a minus before its lambda; then G h = -g would not hold.)
 
-    `GaussNewton.evaluate`    the rotations R, and with them E, d and G at a pose
-    `GaussNewton.step`        h, lambda and Z = H^-1 G^T: eq. (21), line by line
-    `GaussNewton.moved`       p + h, moved along Z onto g = 0
-    `newton.minimise`         the iteration
+    `newton.minimise`           the iteration
+    `newton.constrained_step`   h, lambda and Z = H^-1 G^T: eq. (21)
+    `GaussNewton.step`          the step with an up-to-date H
+    `GaussNewton.moved`         p + h, moved along Z onto g = 0
+    `GaussNewton.evaluate`      the rotations R, and with them E, d and G at a pose
 
-This is added to the paper's iteration, which `deformer.as_printed` has:
+What is added to the iteration of the paper (`deformer.as_printed`):
 
 1. *Exact volume.*  Along Z the volume is a cubic of the step length; its root is the last operation
    of every step (`exact_volume`).  |dV| / V is then about 1e-15; (21) alone leaves 1e-4.  For a
