@@ -157,12 +157,18 @@ def test_the_report_of_drags_has_limits_and_names_arap_when_it_is_absent():
     assert verdicts["volume change"] == "met"
 
 
-def test_frames_are_limited_in_iterations_of_arap():
+def test_frames_are_limited_and_drawn_beside_iterations_of_arap():
     drag = drags.Drag(
         1.0, np.array([0.5, 0.5, 3.0]), np.ones(4), np.zeros(1), 1.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0
     )
-    found = felt.Felt("cactus", 5430, 1.0, 1.0, 1.0, {"handle": drag}, 1.0, "")
-    verdicts = {r.what.rpartition(": ")[2]: r.verdict for r in felt._ratios([found])}
+    drags_of = {"handle": drag, "pull": replace(drag, times=2.0 * drag.times)}
+    found = felt.Felt("cactus", 5430, 1.0, 1.0, 1.0, drags_of, 1.0, "")
+    assert felt.lines([found]) == {
+        "handle, median": [500.0], "handle, longest": [3000.0],
+        "pull, median": [1000.0], "pull, longest": [6000.0], "ARAP iteration": [1000.0],
+    }  # fmt: skip
+    ratios = [ratio for ratio in felt._ratios([found]) if "handle" in ratio.what]
+    verdicts = {r.what.rpartition(": ")[2]: r.verdict for r in ratios}
     assert verdicts["median frame / ARAP"] == "met"
     assert verdicts["95 % frame / ARAP"] == "**not met**"
     assert verdicts["longest frame / ARAP"] == "met"

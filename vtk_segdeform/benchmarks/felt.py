@@ -152,21 +152,23 @@ def _frame_table(found: list[Felt]) -> Table:
 
 
 def _figure(found: list[Felt]) -> Figure:
-    panels = {}
-    for body in BODIES:
-        own = [each for each in found if each.body == body]
-        lines = {
-            f"{name}, {part}": [1e3 * each.drags[name].felt[k] for each in own]
-            for name in ("handle", "pull")
-            for k, part in enumerate(("median", "longest"))
-        }
-        panels[f"{body}, ms"] = lines | {"ARAP iteration": [1e3 * each.arap for each in own]}
+    panels = {f"{body}, ms": lines([f for f in found if f.body == body]) for body in BODIES}
     sizes = sorted({float(each.vertices) for each in found})
     return Figure(
         "drag-times.png",
         "Median and longest frame of a drag and a pull, and one ARAP iteration, by mesh size.",
         lambda path: charts.line_plot(path, sizes, panels, across="vertices", logarithmic=True),
     )
+
+
+def lines(own: list[Felt]) -> dict[str, list[float]]:
+    """Return the lines of a body in the figure, milliseconds for each size."""
+    times = {}
+    for name in ("handle", "pull"):
+        felt = [each.drags[name].felt for each in own]
+        times[f"{name}, median"] = [1e3 * median for median, _, _ in felt]
+        times[f"{name}, longest"] = [1e3 * longest for _, _, longest in felt]
+    return times | {"ARAP iteration": [1e3 * each.arap for each in own]}
 
 
 def _ratios(found: list[Felt]) -> list[Ratio]:
