@@ -52,6 +52,7 @@ def line_plot(
             axis.set_xscale("log")
             axis.set_yscale("log")
             axis.yaxis.set_major_formatter("{x:g}")
+            axis.yaxis.get_minor_locator().set_params(subs=(2.0, 5.0))
             axis.yaxis.set_minor_formatter("{x:g}")
             axis.set_xticks([], minor=True)
             axis.set_xticks(list(x), [_short(size) for size in x])
