@@ -100,7 +100,7 @@ docs: $(VENV)/installed-docs
 	$(BIN)/python -m sphinx -q -W --keep-going -d docs/build/doctrees docs docs/build/html
 	@echo "docs/build/html/index.html"
 
-drag-film: $(VENV)/installed
+drag-film: $(VENV)/installed-docs
 	PYTHONPATH=docs $(BIN)/python -m making.drag
 
 lint: $(VENV)/installed-test
