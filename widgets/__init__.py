@@ -12,7 +12,7 @@ and keys.  `Recorder` and `replay` record and repeat the input, `film` makes a v
 
 Widgets translate events into calls of a session; they compute nothing themselves.
 
-Every name is imported on first use, so that `web.serving` loads no VTK.
+Every name is imported on first use.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ ROOMS = [
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
     "widgets.editor", "widgets.panel", "widgets.hosting",
-    "widgets.web.drawing", "widgets.web.serving", "widgets.web",
+    "widgets.web.drawing", "widgets.web",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
@@ -76,7 +76,8 @@ GRANTED = {
     "widgets.web.transfer": {"aiohttp"},
     "widgets.web.notebook": {"IPython", "pyvista"},
     "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server", "wslink"},
-    "widgets.web.serving": {"aiohttp", "yarl"},
+    "widgets.web.access": {"aiohttp"},
+    "widgets.web.serving": {"aiohttp"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.experiments": {"pyvista"},
     "benchmarks.programs": {"igl", "open3d", "bpy"},
@@ -86,7 +87,7 @@ GRANTED = {
 }
 
 MAY_PRINT_AND_EXIT = {
-    "cli.main", "__main__", "filters.paraview_plugin", "io.reading_child", "widgets.web.client",
+    "cli.main", "__main__", "filters.paraview_plugin", "io.reading_child",
 }  # fmt: skip
 LONGEST = 400
 FILES = {
@@ -412,7 +413,6 @@ def test_scipy_starts_no_threads():
 START_PROCESSES = {
     "interpreter", "benchmarks.chromium", "benchmarks.history", "cli.application", "io.confined",
     "kernels.compilation", "pictures.canvas",
-    "widgets.web.serving.client",
 }  # fmt: skip
 
 

@@ -340,14 +340,8 @@ def _serve(parser: argparse.ArgumentParser) -> None:
     text = "address to listen on (default: 127.0.0.1, this machine only)"
     add("--host", default="127.0.0.1", metavar="HOST", help=text)
     add("--open", action="store_true", help="open the page in the browser")
-    text = "maximum number of clients, each in its own process (default: 4)"
-    add("--clients", type=_count, default=4, metavar="N", help=text)
     text = "maximum size of an upload (default: 500)"
     add("--upload-limit", type=_count, default=500, metavar="MB", help=text)
-    text = "memory limit of each client; Linux only (default: 4000)"
-    add("--memory", type=_count, default=4000, metavar="MB", help=text)
-    text = "time to keep a client after its page is closed (default: 600)"
-    add("--keep", type=_count, default=600, metavar="SECONDS", help=text)
 
 
 def _bench(parser: argparse.ArgumentParser) -> None:

@@ -17,7 +17,6 @@ The files, in reading order:
     drops         files dropped on the window
     recent        recent files
     autosaver     when to autosave
-    autosave      autosaved files, and recovery after a crash
 """
 
 from .window import Window

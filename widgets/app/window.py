@@ -21,16 +21,17 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.session import Session
 
 from ..editor import (
+    Autosaves,
     DeformEditor,
     Job,
     Neighbour,
+    Slot,
     expect_session,
     jumping_to,
     position_of,
     states_of,
 )
 from ..qt import DeformWidget
-from .autosave import Autosaves, Slot
 from .autosaver import INTERVAL, Autosaver, stops_of
 from .dialogs import ask_file, ask_repair_instead, choose_work, show_error
 from .documents import (

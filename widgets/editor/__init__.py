@@ -15,6 +15,7 @@ The files, in reading order:
     rest             what waits until the hand has rested
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to, and meshes that are written
+    autosave         autosaved work on disk, and recovery after a crash
     recordings       recordings of input and video
     messages hints status_line help_card
                      messages, hints and the help card
@@ -40,6 +41,7 @@ from .actions import (
     toggle_overlay,
     toggle_regions,
 )
+from .autosave import About, Autosaves, Slot
 from .bindings import PRESETS, KeyChoice, keys_of
 from .controller import Controller
 from .editor import DeformEditor
@@ -94,7 +96,9 @@ __all__ = [
     "MESH_FILES",
     "PRESETS",
     "READABLE_FILES",
+    "About",
     "Action",
+    "Autosaves",
     "Binding",
     "Controller",
     "DeformEditor",
@@ -106,6 +110,7 @@ __all__ = [
     "Notice",
     "Notices",
     "SessionFile",
+    "Slot",
     "Timer",
     "WrittenMesh",
     "actions",

@@ -36,11 +36,11 @@ from vtk_segdeform.session import Session
 from ..editor import DeformEditor, KeyChoice, keys_of
 from ..hosting import add_editor, session_of
 from ..scene import set_background, set_lights
+from .access import below
 from .page_drawing import PageDrawing, Surface, Update
 from .page_model import PageModel
 from .pictures import Picture
 from .protocol import ViewProtocol
-from .serving import below
 from .stream import Stream
 from .timers import Timers
 from .transfer import UPLOAD_LIMIT, Transfer, formats
@@ -136,7 +136,8 @@ class WebEditor:
         self._transfer = Transfer(
             self.editor, self._folder, upload_limit, names, self.model.changed
         )
-        self._secret, self._hidden = "", None  # the application behind the secret
+        self._secret, self._once = "", ""
+        self._hidden: Any = None  # the application behind the secret
         self._make_page()
 
     @property
@@ -157,10 +158,28 @@ class WebEditor:
         asyncio.run(self.serve(port=port, ready=ready))
 
     async def serve(
-        self, *, port: int = 0, secret: str = "", ready: Callable[[int], object] | None = None
+        self,
+        *,
+        port: int = 0,
+        host: str = "127.0.0.1",
+        secret: str = "",
+        once: str = "",
+        ready: Callable[[int], object] | None = None,
     ) -> None:
-        """Serve the page, as `start` does, in the running event loop; with a *secret*, below it."""
-        self._secret = secret
+        """Serve the page, as `start` does, in the running event loop.
+
+        Parameters
+        ----------
+        port, ready
+            As for `start`.
+        host : str
+            The address to listen on.
+        secret : str
+            Serve the page at ``/SECRET/``, and nothing elsewhere.
+        once : str
+            Redirect the first request for ``/ONCE`` there.
+        """
+        self._secret, self._once = secret, once
         own = asyncio.get_running_loop()
         if own.get_exception_handler() is None:
             own.set_exception_handler(_ignore_lost_pages)
@@ -176,7 +195,7 @@ class WebEditor:
         with _own_settings():
             running = self.server.start(
                 port=port,
-                host="127.0.0.1",
+                host=host,
                 exec_mode="coroutine",
                 backend="aiohttp",
                 open_browser=False,
@@ -196,14 +215,12 @@ class WebEditor:
         self,
         ended: asyncio.Event,
         *,
-        port: int = 0,
-        secret: str = "",
-        ready: Callable[[int], object] | None = None,
         last: Callable[[], object] | None = None,
+        **where: Any,
     ) -> None:
         """Serve the page, as `serve` does, until the event *ended* is set; call *last* before."""
         loop = asyncio.get_running_loop()
-        serving = loop.create_task(self.serve(port=port, secret=secret, ready=ready))
+        serving = loop.create_task(self.serve(**where))
         ending = loop.create_task(ended.wait())
         await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
         if last is not None:
@@ -274,7 +291,7 @@ class WebEditor:
         self._transfer.add_routes(server.app)
         if self._secret:
             self._hidden = server.app
-            server.set_app(below(self._secret, server.app))
+            server.set_app(below(self._secret, server.app, once=self._once))
 
     def _configure(self, root: Any) -> None:
         """Add the messages of the view; remove those by which a page could end this process."""

@@ -34,8 +34,7 @@ from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app import documents, window
-from vtk_segdeform.widgets.app.autosave import About, Autosaves, Slot
-from vtk_segdeform.widgets.editor import preparing
+from vtk_segdeform.widgets.editor import About, Autosaves, Slot, preparing
 from vtk_segdeform.widgets.handle_dragger import LiveSolve
 
 BALL = models.sphere(300)
