@@ -34,8 +34,8 @@ from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.editor import finishing
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, DEFAULT_KEYS
+from vtk_segdeform.widgets.films.film import Film
 from vtk_segdeform.widgets.handle_dragger import live_solve
-from vtk_segdeform.widgets.recording.film import Film
 from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
 
@@ -216,7 +216,6 @@ class Stand:
             pass
         self.session_before, self.start = self.session, self.session.state
         self.hand.failures.clear()  # of a failed test
-        controller.recordings.remove()
         controller.help.hide()
         controller.messages.clear()
         widgets.cages_wanted = widgets.overlay_wanted = False

@@ -30,7 +30,7 @@ ROOMS = [
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
     "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
-    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
+    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.films",
     "widgets.editor", "widgets.panel", "widgets.hosting",
     "widgets.web.drawing", "widgets.web",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
@@ -83,7 +83,6 @@ GRANTED = {
     "benchmarks.programs": {"igl", "open3d", "bpy"},
     "cli.application": {"qtpy"},
     "cli.outputs": {"pyvista"},
-    "cli.replaying": {"pyvista"},
 }
 
 MAY_PRINT_AND_EXIT = {
@@ -431,11 +430,11 @@ def test_python_processes_are_started_in_one_way():
     )
 
 
-# They write to a draft from their caller, or to the growing log of a recording.
+# They write to a draft from their caller.
 WRITE_DIRECTLY = {
     "io.gltf.writing", "io.off", "io.ply", "io.stl", "io.wavefront", "io.vtk_formats",
     "io.reading_child",
-    "widgets.recording.film_files", "widgets.recording.recording",
+    "widgets.films.film_files",
 }  # fmt: skip
 REPLACING = {
     "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",

@@ -6,7 +6,7 @@ The files, in reading order:
     controller       session, widgets, mode, job and file of the editor
     widget_set       the modes, and the widgets of each
     camera           navigation, views, up axis and orientation cube
-    actions recording_actions panel_actions
+    actions panel_actions
                      the actions behind keys, menus and panels
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
@@ -16,7 +16,6 @@ The files, in reading order:
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to, and meshes that are written
     autosave         autosaved work on disk, and recovery after a crash
-    recordings       recordings of input and video
     messages hints status_line help_card
                      messages, hints and the help card
     history neighbours

@@ -47,7 +47,7 @@ from .transfer import UPLOAD_LIMIT, Transfer, formats
 
 _PAGE = Path(__file__).with_name("page")
 # These write to files of the server, or read them: the page uploads and downloads instead.
-_NO_KEYS = dict.fromkeys(("save", "open", "record_input", "record_video"), ())
+_NO_KEYS = dict.fromkeys(("save", "open"), ())
 _COMPRESS = "WSLINK_WS_COMPRESS"
 _SIZE = 1000, 700  # pixels, until the page tells its own
 _SAMPLES = 8  # per pixel, for smooth edges
@@ -71,7 +71,7 @@ class WebEditor:
     name : str
         The name that the page shows for it.
     keys : str or mapping of str to str or sequence of str
-        As in `edit`.  Keys of files and recordings do nothing: the page uploads and downloads.
+        As in `edit`.  Keys of files do nothing: the page uploads and downloads.
     folder : Path, optional
         A private folder for uploads; by default a temporary one, which `close` deletes.
     upload_limit : int

@@ -112,14 +112,16 @@ def settle(editor):
     raise AssertionError(editor.status)
 
 
-def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_view(web):
+def test_input_of_the_page_ends_in_the_pose_of_the_same_events_in_a_plain_view(web, monkeypatch):
     """To the bit; `test_recorded_pages` does this with a real page and more hosts."""
     from hands import plain_view
+    from recorder import Recorder, steady
 
     from vtk_segdeform.widgets import DeformEditor
-    from vtk_segdeform.widgets.recording import Recorder, replay
 
+    steady(monkeypatch)
     editor = web.editor
+    editor.controller.finishing.is_wanted = False
     editor.mode = Mode.PULL
     session = web.session
     session.jump(0)  # before the steps of other tests
@@ -142,10 +144,12 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     recorder.stop()
     assert session.position == 1
     again = DeformEditor(plain_view(), start)
+    again.controller.finishing.is_wanted = False
+    again.view.window.SetSize(width, height)
     again.On()
     again.mode = Mode.PULL
     settle(again)
-    replay(again.view, recorder.lines, busy=lambda: again.is_busy)
+    recorder.replay(again.view, lambda: again.is_busy)
     settle(again)
     np.testing.assert_array_equal(start.vertices, session.vertices)
     again.remove()
