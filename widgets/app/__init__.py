@@ -11,7 +11,7 @@ The files, in reading order:
     saving        saving, and the questions asked before
     dialogs       the dialogs
     menus         the menus
-    keys_dialog   keys assigned to actions
+    stored_keys   the user's keys
     repairing repair_dialog repair_preview
                   repair and open: a closed copy of the surface as a new document
     drops         files dropped on the window

@@ -47,7 +47,7 @@ from .editor import DeformEditor
 from .hints import hint
 from .history import jumping_to, position_of, preview, states_of
 from .job import Job, Timer
-from .keys import Binding, Keys, key_cap, key_name
+from .keys import MOUSE, Binding, Keys, key_cap, key_name
 from .messages import error_text
 from .neighbours import Neighbour
 from .notices import Notice, Notices, notices_of
@@ -93,6 +93,7 @@ from .widget_set import Mode
 
 __all__ = [
     "MESH_FILES",
+    "MOUSE",
     "PRESETS",
     "READABLE_FILES",
     "About",

@@ -241,7 +241,7 @@ def toggle_notices(controller: Controller) -> None:
 
 def toggle_help(controller: Controller) -> None:
     """Show or hide the help card."""
-    controller.help.toggle()
+    controller.show_keys()
 
 
 def cancel(controller: Controller) -> None:

@@ -62,6 +62,8 @@ class Controller:
         The widgets over `session`; replaced when another session is opened.
     help : HelpCard
         The card with the keys.
+    show_keys : callable
+        Shows the keys or hides them: on the card, unless a toolkit has something better.
     messages : Messages
         The status line.
     notices : Notices
@@ -79,7 +81,8 @@ class Controller:
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         load_late()
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
+        self.show_keys: Callable[[], object] = self.help.toggle
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
@@ -157,7 +160,7 @@ class Controller:
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
         keys = self.keys
-        self.help.list_keys(keys.sections(), keys.sections(self._mode), keys.cap("help"))
+        self.help.list_keys(keys.sections(), keys.sections(self._mode))
 
     @property
     def is_on(self) -> bool:
