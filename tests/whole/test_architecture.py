@@ -43,6 +43,7 @@ NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
 # Libraries beyond numpy and scipy, by file or by room.
 GRANTED = {
+    "files.folders": {"platformdirs"},
     "kernels.threads": {"threadpoolctl"},
     "kernels.compiled.kernels": {"numba"},
     "cages.contour": VTK,
