@@ -109,10 +109,13 @@ class DeformWidget(QtWidgets.QWidget):
         return self.editor.session
 
     def show_keys(self) -> None:
-        """Show the keys of all actions in a dialog, in which they can be changed."""
+        """Show the keys of all actions in a dialog, in which they can be changed, or close it."""
+        for shown in self.findChildren(KeysDialog):
+            shown.reject()
+            return
         dialog = KeysDialog(self, self.editor.keys, self.taken_keys())
         dialog.accepted.connect(lambda: self._use_keys(dialog.keys))
-        dialog.open()
+        dialog.show()  # not modal: a drag may be going on
 
     def _use_keys(self, keys: Keys) -> None:
         if keys.changes != self.editor.keys.changes:
