@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import zip_longest
+from math import floor
 from typing import Any
 
 from ..scene import Panel, Stop, Text, View
@@ -16,11 +17,10 @@ Section = tuple[str, Sequence[tuple[str, str]]]
 """A heading, and pairs (key, action)."""
 
 _GROUND, _LETTERS, _KEYS = "#2B2F36", "#FFFFFF", "#FFD27F"  # as in the status line
-_LARGEST, _LEGIBLE = 20.0, 11.0  # font size in pixels
+_LARGEST, _LEGIBLE, _SMALLEST = 20, 10, 6  # font size in pixels
 _WIDE, _HIGH, _FOOT = 0.92, 0.82, 0.1  # of the window: largest text, free space below
 _MARGIN = 1.2  # around the text, in font sizes
 _GAP = 4  # letters between two columns
-_PROBE = 20.0  # font size at which the text is measured
 
 
 class HelpCard:
@@ -99,10 +99,11 @@ class HelpCard:
         words, keys = (Text(front, colour, monospace=True, layer=6) for colour in (_LETTERS, _KEYS))
         self._parts = [panel, words, keys]
         for sections in filter(None, (self.sections, self.fewer)):
-            size, (labels, caps) = max(
+            fitting, (labels, caps) = max(
                 (self._fitted(words, _texts(sections, count), window) for count in (1, 2, 3)),
                 key=lambda fitted: fitted[0],
             )
+            size = max(_SMALLEST, floor(fitting))
             if size >= _LEGIBLE:
                 break
         for text, part in ((labels, words), (caps, keys)):
@@ -118,10 +119,14 @@ class HelpCard:
         self, probe: Text, texts: tuple[str, str], window: Sequence[int]
     ) -> tuple[float, tuple[str, str]]:
         """Return the largest font size at which the first of *texts* fits, and the texts."""
-        probe.set_text(texts[0], _PROBE)
-        wide = _WIDE * window[0] / (probe.width() + 2 * _MARGIN * _PROBE)
-        high = _HIGH * window[1] / (probe.height() + 2 * _MARGIN * _PROBE)
-        return min(_LARGEST, _PROBE * min(wide, high)), texts
+        size = _LARGEST
+        for _ in range(3):  # fonts have sizes in whole pixels, so the text is measured again
+            probe.set_text(texts[0], size)
+            wide = _WIDE * window[0] / (probe.width() + 2 * _MARGIN * size)
+            high = _HIGH * window[1] / (probe.height() + 2 * _MARGIN * size)
+            fitting = min(1.0, wide, high) * size
+            size = max(_SMALLEST, floor(fitting))
+        return fitting, texts
 
 
 def _texts(sections: Sequence[Section], count: int) -> tuple[str, str]:

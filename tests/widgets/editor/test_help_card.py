@@ -94,6 +94,12 @@ def test_where_all_keys_would_be_too_small_those_of_the_mode_are_listed():
         text, size = listed(view)
         assert all(label in text for label in everything)
         assert size >= 12
+        for size in ((1000, 680), (801, 555), (613, 430)):
+            view.window.SetSize(*size)
+            view.renderer.SetBackground(1.0, 1.0, 1.0)
+            view.render()
+            edge = picture(view)[:, [0, -1]], picture(view)[:3]
+            assert all((each > 200).all() for each in (edge[0][: size[1] // 2], edge[1]))
         view.window.SetSize(600, 420)
         seen = []
         for mode in (Mode.HANDLES, Mode.PULL):
