@@ -6,8 +6,7 @@
     on the screen  ->  `Glide`, since the pose may move by some per cent of the diagonal
 
 The next press, every change of the session, and saving cancel it: a file contains what was shown,
-and stays up to date.  Large meshes are finished on request only.  A replay finishes where the
-recording did.
+and stays up to date.  Large meshes are finished on request only.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from vtk_segdeform.checks import as_flag
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, FinishedPose, Session
 
-from ..recording import announce_finish, on_finish_request, recorded_keys
 from ..scene import Glide, SurfaceDisplay, View
 from .job import Job, view_timer
 from .rest import Rest
@@ -63,7 +61,6 @@ class Finishing:
         self._job: Job[FinishedPose] | None = None
         self._is_accepting = False
         self._fraction: float | None = None
-        self._stop_requests = on_finish_request(view, self._finish_now)
 
     @property
     def is_wanted(self) -> bool:
@@ -93,9 +90,8 @@ class Finishing:
     def rest(self) -> None:
         """Finish the pose in a moment: a drag has just ended."""
         self.interrupt()
-        is_replayed = recorded_keys(self._view.interactor) is not None
         is_small = self._session().mesh.n_vertices <= MOST_VERTICES
-        if self._is_wanted and is_small and not is_replayed:
+        if self._is_wanted and is_small:
             self._rest.begin()
 
     def follow(self, change: Change) -> None:
@@ -121,7 +117,6 @@ class Finishing:
     def remove(self) -> None:
         """Stop permanently."""
         self.interrupt()
-        self._stop_requests()
 
     def _start(self) -> bool:
         """Begin to finish the pose; True if it must converge first."""
@@ -135,7 +130,7 @@ class Finishing:
         self._job = Job(
             view_timer(self._view),
             measured(session.finishing()),
-            done=self._accept_announced,
+            done=self.accept,
             watch=self._watch,
             is_due=self._is_free,
         )
@@ -155,19 +150,10 @@ class Finishing:
             self._is_accepting = False
         return is_accepted
 
-    def _accept_announced(self, result: FinishedPose) -> None:
-        if self.accept(result):
-            announce_finish(self._view.interactor)
-
     def _watch(self, job: Job[FinishedPose]) -> None:
         if job is self._job and not job.is_running:
             self._job = None
         self._show(_STEP * int(job.fraction / _STEP) if job.is_running else None)
-
-    def _finish_now(self) -> None:
-        session = self._session()
-        if session.can_finish or session.can_finish_further:
-            session.finish()
 
     def _show(self, fraction: float | None) -> None:
         if fraction != self._fraction:
