@@ -34,7 +34,7 @@ def new() -> Session:
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle, "tip")
+    session.handles.add(SCENE.handle, "tip")
     return session
 
 

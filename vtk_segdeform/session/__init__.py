@@ -3,13 +3,18 @@
 The files, in reading order:
 
     session        `Session`: the interface for widgets and scripts
+    groups         edits of handles and regions, as methods
     state          immutable states
-    history        undo and redo
+    timeline       undo and redo
     handles        named handles and their targets
-    pulling        pulls and pins
+    pulls          pulls and pins
     painting       painting, merging and splitting regions
+    poses          surfaces and deformers of states, cached
+    memo           the cache
+    solving        the next pose of a state
+    preparing      regions, cages and binding in advance
     finishing      poses finished on the mesh itself
-    pose_solver    poses of states, with cached solvers
+    output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes
     naming         names of regions and handles
@@ -19,19 +24,19 @@ The files, in reading order:
 """
 
 from ..mesh import SurfacePoint
+from . import pulls
 from .finishing import FinishedPose
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
-from .pulling import automatic_locality, middle_vertex
-from .session import Effort, Preparation, Session
+from .preparing import Preparation
+from .session import Session
 from .stand_in import StandIn
 from .state import Options, State
 from .store import load_session, save_session, saved_view
 
 __all__ = [
     "Change",
-    "Effort",
     "FinishedPose",
     "Options",
     "Preparation",
@@ -39,9 +44,8 @@ __all__ = [
     "StandIn",
     "State",
     "SurfacePoint",
-    "automatic_locality",
     "load_session",
-    "middle_vertex",
+    "pulls",
     "region_name",
     "require_handle",
     "save_session",

@@ -77,7 +77,7 @@ def redo(controller: Controller) -> None:
     """Redo the last undone step."""
     label, session, neighbours = controller.redo_label, controller.session, controller.neighbours
     after, message = neighbours.after(session), f"Redo: {label}" if label else "Nothing to redo"
-    if after is not None and after[0] == session.position:
+    if after is not None and after[0] == session.history.position:
         after[1].enter(neighbours.count_before + after[0] + 1, message)
     else:
         session.redo()
@@ -275,7 +275,7 @@ def unpin_all(controller: Controller) -> None:
     names = controller.widgets.puller.marked
     if not names:
         raise ConstraintError("No pins to remove. Shift-click the surface to add one")
-    controller.session.remove_handle(*names)
+    controller.session.handles.remove(*names)
     controller.say(f"Removed {_count(len(names), 'point')}")
 
 
@@ -339,7 +339,7 @@ def merge_region(controller: Controller) -> None:
             f"Point at the region to merge with {controller.session.region_name(selector.region)}"
         )
     names = " and ".join(map(controller.session.region_name, sorted([selector.region, other])))
-    controller.session.merge_regions([selector.region, other])
+    controller.session.painting.merge([selector.region, other])
     selector.region = min(selector.region, other)
     controller.say(f"Merged {names}")
 
@@ -348,7 +348,7 @@ def split_region(controller: Controller) -> None:
     """Split the selected region in two."""
     _require_regions(controller, "split")
     region = controller.widgets.selector.region
-    controller.session.split_region(region)
+    controller.session.painting.split(region)
     controller.say(f"Split {controller.session.region_name(region)}")
 
 
@@ -379,7 +379,7 @@ def remove_handle(controller: Controller) -> None:
     if name is None:
         key = controller.keys.cap("next_handle")
         raise ConstraintError(f"No handle selected. Press {key} to select one")
-    controller.session.remove_handle(name)
+    controller.session.handles.remove(name)
     controller.say(f"Removed {name}")
 
 
@@ -396,7 +396,7 @@ def move_pivot(controller: Controller) -> None:
     point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
     if point is None and name not in session.state.pivots:
         raise ConstraintError("Point at the surface to place the pivot")
-    session.set_pivot(name, point)
+    session.handles.set_pivot(name, point)
     controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
 
 
@@ -417,9 +417,9 @@ def converting(name: str) -> Action:
     def convert(controller: Controller) -> None:
         session, widgets = controller.session, controller.widgets
         if name in widgets.puller.marked:
-            new = session.make_handle(name, radius=widgets.puller.radius)
+            new = session.handles.to_patch(name, radius=widgets.puller.radius)
         else:
-            new = session.make_pin(name)
+            new = session.handles.to_pin(name)
         widgets.selector.handle = widgets.dragger.handle = new
         controller.say(f"Converted {name} to {new}")
 
@@ -429,7 +429,7 @@ def converting(name: str) -> Action:
 def reset_pivot(controller: Controller) -> None:
     """Reset the pivot of the handle to its centre."""
     name = _dragged_handle(controller)
-    controller.session.set_pivot(name, None)
+    controller.session.handles.set_pivot(name, None)
     controller.say(f"Pivot of {name} reset")
 
 

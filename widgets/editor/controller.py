@@ -19,7 +19,7 @@ from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Change, Preparation, Session, saved_view
+from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
 
 from ..recording import confined_path
 from ..scene import Draft, View, Widget
@@ -129,16 +129,16 @@ class Controller:
     @property
     def undo_label(self) -> str | None:
         """The step to undo: of the session, or else the one from which the session came."""
-        label, before = self.session.undo_label, self.neighbours.before
+        label, before = self.session.history.undo_label, self.neighbours.before
         return before.step if label is None and before is not None else label
 
     @property
     def redo_label(self) -> str | None:
         """The step to redo: to the session that came from this state, or else of the session."""
         after = self.neighbours.after(self.session)
-        if after is not None and after[0] == self.session.position:
+        if after is not None and after[0] == self.session.history.position:
             return after[1].step
-        return self.session.redo_label
+        return self.session.history.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -328,8 +328,12 @@ class Controller:
             self.messages.note(widget.remark)
         self._rest.begin()
         is_pull = widget is self.widgets.puller  # smooth, while a finish may end in a step
-        pulled = self.session.last_pulled
-        if is_pull and self.session.position != self._began_at and pulled in self.session.handles:
+        pulled = pulls.last_pulled(self.session.mesh, self.session.state)
+        if (
+            is_pull
+            and self.session.history.position != self._began_at
+            and pulled in self.session.handles
+        ):
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
         if widget is self.widgets.dragger:
             self._tell_unmoved()
@@ -346,7 +350,7 @@ class Controller:
         self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
-        self._began_at = self.session.position
+        self._began_at = self.session.history.position
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects
@@ -452,7 +456,7 @@ class Controller:
         if not self._is_on or self.is_busy:
             return
         self._prepare_pulls()
-        if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
+        if self._mode is Mode.DEFORM and session.state.is_ready and not session.is_bound:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)

@@ -84,7 +84,7 @@ class Recordings:
         if session.is_dragging:
             raise SessionError("Finish the drag before recording the input")
         save_session(path.with_suffix(".segdeform"), session)
-        session.start_afresh()  # as the session that the replay loads
+        session.poses.start_afresh()  # as the session that the replay loads
         self._recorder = Recorder(self._view, path, keys=keys, skips=skips)
         if assigned:
             self._recorder.assign(assigned)

@@ -17,7 +17,7 @@ from test_editor import pull_handle as pull_handle_in
 
 from vtk_segdeform import Mesh, Regions, Session, fit_cages, load_session, read_mesh
 from vtk_segdeform.kernels import compiled_kernels
-from vtk_segdeform.session import save_session
+from vtk_segdeform.session import pulls, save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets.editor import (
     Mode,
@@ -67,7 +67,7 @@ def test_a_pose_is_finished_after_a_drag_and_a_replay_ends_in_the_same(bench, tm
     bench.type("4", "ctrl+r")
     pull_handle(bench, (15, 25))
     until(bench, lambda: is_finished(bench))
-    assert len(bench.session.history) == 2
+    assert len(bench.session.history.labels) == 2
     assert bench.session.solution.handle_error < 1e-12
     first = bench.session.vertices
     pull_handle(bench, (-10, 12))
@@ -272,7 +272,7 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
     """Otherwise Remove would remove the point that was pulled before it."""
     bench.session.bind()
     bench.type("0")
-    bench.session.remove_handle(*bench.session.handles)
+    bench.session.handles.remove(*bench.session.handles)
     puller, dragger = bench.editor.widgets.puller, bench.editor.widgets.dragger
     grabbed(bench, 0.6)
     grabbed(bench, -0.4)
@@ -284,7 +284,8 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
         place
         for place in dot + 14.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
         if (hit := puller._picker.hit(Pointer(Phase.HOVER, *place))) is not None
-        and bench.session.grabbed(hit.vertex, puller.radius) == "pull 1"
+        and pulls.grabbed(bench.session.mesh, bench.session.state, hit.vertex, puller.radius)
+        == "pull 1"
     )
     bench.hand.hover(beside)
     assert puller.marker_under_pointer() is None
@@ -301,7 +302,7 @@ def test_pulls_are_finished_and_add_up_and_are_replayed(bench, tmp_path, replaye
     poses = []
     for fraction in (0.7, 0.3):
         grabbed(bench, fraction)
-        assert bench.session.undo_label == "pull"
+        assert bench.session.history.undo_label == "pull"
         bench.type("shift+f")
         until(bench, lambda: is_finished(bench))
         assert bench.session.solution.handle_error < 1e-12
@@ -429,11 +430,12 @@ def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F8
     bench.type("4")
     pull_handle(bench)
     bench.type("shift+f")
-    session, (pose, solution) = bench.session, bench.session._solution
+    session, solution = bench.session, bench.session.solution
     few, many, controller = np.arange(3), np.arange(1200), bench.editor.controller
 
     def told(**changes):
-        session._solution = pose, dataclasses.replace(solution, **changes)
+        changed = dataclasses.replace(solution, **changes)
+        session.poses.keep_solution(session.state.pose, changed)
         controller.refresh()
         return bench.editor.status
 
@@ -468,7 +470,7 @@ def test_a_part_that_no_handle_moves_is_named_once():
     moved = mesh.with_vertices(both.vertices[n:])
     session.set_cages([*scene.cages, *fit_cages(moved, Regions.single(moved), 20)])
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     session.bind()
     made = Bench(plain_view((400, 320)), session, Mode.DEFORM)
     made.editor.do(finishing_after_drags(False))

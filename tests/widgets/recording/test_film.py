@@ -45,7 +45,7 @@ def session():
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     return session
 
 
@@ -147,7 +147,7 @@ def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
     with pytest.raises(ValueError, match="targets require a session"):
         film(tmp_path / "a.gif", plain_view(SIZE), TURNS)
     empty = Session(SCENE.mesh)
-    empty.add_handle(SCENE.handle)
+    empty.handles.add(SCENE.handle)
     with pytest.raises(CageError):
         film(tmp_path / "a.gif", empty, TURNS, size=SIZE)
     with pytest.raises(SessionError, match="without pictures"):

@@ -122,7 +122,7 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     editor = web.editor
     editor.mode = Mode.PULL
     session = web.session
-    session.jump(0)  # before the steps of other tests
+    session.history.jump(0)  # before the steps of other tests
     start = Session(session.mesh, state=session.state)
     web.plotter.render_window.Render()
     settle(editor)
@@ -140,7 +140,7 @@ def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_vie
     web.stream.inputs.send_next()
     settle(editor)
     recorder.stop()
-    assert session.position == 1
+    assert session.history.position == 1
     again = DeformEditor(plain_view(), start)
     again.On()
     again.mode = Mode.PULL

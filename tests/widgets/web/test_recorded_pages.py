@@ -41,7 +41,7 @@ def recorded(browser: Chromium) -> tuple[list[str], Size, list[Any]]:
     with Served(body(), name="cactus.ply") as served:
         page, web = served.page(browser, size=(900, 640)), served.web
         size = served.call(lambda: web.editor.view.window.GetSize())
-        served.call(web.session.start_afresh)
+        served.call(web.session.poses.start_afresh)
         recorder = served.call(lambda: Recorder(web.editor.view))
         tell(served, page)
         served.call(recorder.stop)
@@ -57,7 +57,7 @@ def tell(served: Served, page: Any) -> None:
     def rest(position: int) -> None:
         finishing = web.editor.controller.finishing
         served.wait(
-            lambda: web.session.position == position and served.is_at_rest
+            lambda: web.session.history.position == position and served.is_at_rest
             and not finishing.is_pending
         )  # fmt: skip
 
