@@ -111,12 +111,7 @@ def save(controller: Controller) -> None:
 
 def once_settled(action: Action) -> Action:
     """Return the action that waits until the pose has settled."""
-
-    def wait(controller: Controller) -> None:
-        if controller.settling.then(lambda: action(controller)):
-            controller.say("Saving once the pose has settled")
-
-    return wait
+    return lambda controller: controller.once_settled(lambda: action(controller))
 
 
 def open_file(controller: Controller) -> None:

@@ -328,7 +328,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
 @pytest.mark.parametrize("is_saving", [False, True])
 def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes, is_saving):
     hand = start(arm_file)
-    session, settling = hand.window.session, hand.window.editor.controller.settling
+    session, widgets = hand.window.session, hand.window.editor.widgets
     tick, rests = LiveSolve._tick, [True]
     monkeypatch.setattr(LiveSolve, "_tick", lambda live: None if rests else tick(live))
     hand.window.editor.mode = Mode.DEFORM
@@ -338,7 +338,7 @@ def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, 
         session.drag({"handle 1": session.targets["handle 1"] + by}, max_steps=1)
         session.commit()
         hand.window.editor.widgets.dragger.resume_refining()
-        assert settling.is_active
+        assert widgets.is_settling
 
     bend([0.0, 0.0, 0.4])
     hand.choose("File", "Save session")

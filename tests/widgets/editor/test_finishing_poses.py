@@ -25,9 +25,9 @@ from vtk_segdeform.widgets.editor import (
     finishing,
     finishing_after_drags,
     opening,
+    queue,
     saving,
 )
-from vtk_segdeform.widgets.editor import settling as settling_poses
 from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.recording.recording import replay
 from vtk_segdeform.widgets.scene import Phase, Pointer, glide
@@ -140,15 +140,15 @@ def test_what_is_saved_is_what_was_shown_and_is_not_changed_later(bench, tmp_pat
 @pytest.fixture
 def settling(bench, monkeypatch):  # noqa: F811
     """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
-    monkeypatch.setattr(settling_poses, "_SHOWN_AFTER", 0.0)
+    monkeypatch.setattr(queue, "_SHOWN_AFTER", 0.0)
     for each in ("_EVENT_TIME", "_REFINE_TIME"):  # the fewest steps, however fast the machine is
         monkeypatch.setattr(f"vtk_segdeform.widgets.handle_dragger.live_solve.{each}", 0.0)
     bench.editor.do(finishing_after_drags(False))
     bench.type("4")
     pull_handle(bench, (-40, 90))
     assert bench.session.solution.status is Status.STEP_LIMIT
-    assert bench.editor.controller.settling.is_active
-    return bench.editor.controller.settling
+    assert bench.editor.widgets.is_settling
+    return bench.editor.widgets
 
 
 def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa: F811
@@ -158,7 +158,7 @@ def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa
     assert now.cancel.visible
     assert now.cancel.tip == "Stop at this pose"
     assert bench.editor.controller.messages._line.aside == "Settling ... (Esc)"
-    while settling.is_active:
+    while settling.is_settling:
         bench.hand.tick()
     until(bench, lambda: bench.editor.controller.messages._line.aside == "")
     assert bench.session.solution.status is not Status.STEP_LIMIT
@@ -168,7 +168,7 @@ def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa
 def test_escape_stops_a_pose_that_settles(bench, settling, tmp_path):  # noqa: F811
     shown, bench.editor.path = bench.session.vertices, tmp_path / "work.segdeform"
     bench.type("escape")
-    assert not settling.is_active
+    assert not settling.is_settling
     assert "Stopped. The pose has not settled" in bench.editor.status
     bench.type("0", "4")
     for _ in range(5):
@@ -188,7 +188,7 @@ def test_saving_waits_until_the_pose_has_settled(bench, settling, tmp_path, writ
     assert "Saving once the pose has settled" in bench.editor.status
     assert status(bench.editor).work == "Saving"
     until(bench, path.exists)
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert f"aved to {path}" in bench.editor.status
     read = read_mesh if write == "mesh" else load_session
@@ -201,7 +201,7 @@ def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, c
     bench.editor.path = tmp_path / "work.segdeform"
     shown = bench.session.vertices
     bench.type("ctrl+s")
-    assert settling.is_active
+    assert settling.is_settling
     assert not bench.editor.path.exists()
     ends = {
         "escape": lambda: bench.type("escape"),
@@ -216,7 +216,7 @@ def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, c
 
 def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, tmp_path):  # noqa: F811
     bench.editor.save(tmp_path / "work.segdeform")
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
 
@@ -225,7 +225,7 @@ def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, t
 def test_a_pose_that_settled_when_the_editor_was_turned_off_is_completed(bench, settling, end):  # noqa: F811
     shown = bench.session.vertices
     getattr(bench.editor, end)()
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is Status.STEP_LIMIT
     bench.editor.complete()
     assert bench.session.solution.status is not Status.STEP_LIMIT

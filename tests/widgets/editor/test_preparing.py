@@ -18,7 +18,7 @@ from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import actions, controller, rest, saving
+from vtk_segdeform.widgets.editor import actions, controller, queue, saving
 
 
 @pytest.fixture(scope="module")
@@ -341,16 +341,16 @@ def kernels(monkeypatch):
     """Return a list of what has been loaded; the clock of a rest stands still."""
     loaded = []
     monkeypatch.setattr(controller, "load_early", lambda: loaded.append("kernels"))
-    monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr(queue, "time", SimpleNamespace(monotonic=lambda: 0.0))
     return loaded
 
 
 def test_kernels_are_loaded_once_the_hand_has_rested(kernels, bench, monkeypatch):
     def wait(seconds):
-        monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: seconds))
+        monkeypatch.setattr(queue, "time", SimpleNamespace(monotonic=lambda: seconds))
         bench.hand.tick(3)
 
-    bench.editor.controller._rest._seconds = 1.0  # as in the program
+    monkeypatch.setattr(controller, "_REST", 1.0)  # as in the program
     bench.until(bench.gate.has_begun.is_set)
     bench.hand.press(bench.place + [0.0, 10.0])
     bench.hand.release()
