@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, is_whole, plain
 from ..cages import Cage
-from ..checks import require, require_sequence, shown
+from ..checks import Described, require, require_sequence, shown
 from ..deformer import (
     Deformer,
     checked_constraints,
@@ -85,7 +85,7 @@ class _Placed(NamedTuple):
     places: Cages
 
 
-class Session:
+class Session(Described):
     """An editable deformation of one mesh.
 
     Parameters
@@ -146,6 +146,11 @@ class Session:
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._surface, self.history = state["surface"], state["history"]
         self.poses = Poses(state["mesh"])
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        steps = f"{self.history.position} of {len(self.history.labels) - 1}"
+        return self.mesh.facts() | self.state.facts() | {"step": steps, "next": self.what_next}
 
     # State.
 

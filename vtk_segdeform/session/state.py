@@ -20,7 +20,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
-from ..checks import all_of, require, require_sequence, shown
+from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import checked_constraints, checked_place
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
@@ -171,8 +171,8 @@ class Locality(Frozen):
     """At the press; the rest stays in this pose."""
 
 
-@dataclass(frozen=True, eq=False)
-class State(Frozen):
+@dataclass(frozen=True, eq=False, repr=False)
+class State(Described, Frozen):
     """Everything in a session except its mesh; immutable."""
 
     regions: Regions | None = None
@@ -195,6 +195,17 @@ class State(Frozen):
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
     fixed_at: FloatArray | None = None
     """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        pose = self.pose
+        return {
+            "regions": "none" if self.regions is None else f"{self.regions.n_regions:,}",
+            "cage vertices": f"{sum(cage.n_vertices for cage in self.cages):,}",
+            "fixed": f"{len(self.fixed):,}",
+            "handles": f"{len(self.handles):,}",
+            "pose": "at rest" if pose is None else "finished" if pose.is_finished else "deformed",
+        }
 
     @property
     def is_ready(self) -> bool:
