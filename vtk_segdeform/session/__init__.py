@@ -26,24 +26,31 @@ The files, in reading order:
 from ..mesh import SurfacePoint
 from . import pulls
 from .finishing import FinishedPose
+from .groups import Handles, Painting
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
+from .poses import Poses
 from .preparing import Preparation
 from .session import Session
 from .stand_in import StandIn
 from .state import Options, State
 from .store import load_session, save_session, saved_view
+from .timeline import Timeline
 
 __all__ = [
     "Change",
     "FinishedPose",
+    "Handles",
     "Options",
+    "Painting",
+    "Poses",
     "Preparation",
     "Session",
     "StandIn",
     "State",
     "SurfacePoint",
+    "Timeline",
     "load_session",
     "pulls",
     "region_name",

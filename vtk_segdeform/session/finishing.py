@@ -147,14 +147,14 @@ def errors(
 ) -> Callable[[FloatArray], tuple[float, ...]]:
     """Return `Solution.errors`: how far a mesh (n, 3) is from *wanted* (k, 3) and fixed places."""
     beside, locality, fixed_at = _beside(poses, state), state.locality, poses.fixed_places(state)
+    ids, diagonal = (deformer.handle, deformer.fixed), poses.mesh.diagonal
 
     def errors_of(x: FloatArray) -> tuple[float, ...]:
         places = np.array(wanted)
         if locality is not None and beside is not None:
             point = locality.point
-            places[deformer.handle == point.vertex] += x[point.vertex] + beside - point.at(x)
-        ids, at = (deformer.handle, deformer.fixed), (places, fixed_at)
-        return errors_at(ids, at, poses.mesh.diagonal, x)
+            places[ids[0] == point.vertex] += x[point.vertex] + beside - point.at(x)
+        return errors_at(ids, (places, fixed_at), diagonal, x)
 
     return errors_of
 

@@ -733,13 +733,7 @@ class Session(Described):
         return self.history.redo()
 
     def commit(self, label: str | None = None) -> str | None:
-        """End the drag and record it as one step, by default labelled "drag handle 1".
-
-        Returns
-        -------
-        label : str or None
-            The label of the step; None if there was no drag.
-        """
+        """End the drag as one step, and return its label; see `Timeline.commit`."""
         return self.history.commit(label)
 
     def revert(self) -> None:
@@ -747,11 +741,7 @@ class Session(Described):
         self.history.revert()
 
     def on_change(self, listener: Listener) -> Callable[[], None]:
-        """Call *listener* with a `Change` after every change; return a function that removes it.
-
-        An exception in a listener is raised by the method that made the change.  The change remains
-        in effect, and the other listeners are called; see `Listeners`.
-        """
+        """Call *listener* with each `Change`, until the returned call; see `Timeline.on_change`."""
         return self.history.on_change(listener)
 
     def _released(self, state: State) -> State:
