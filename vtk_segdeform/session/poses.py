@@ -235,15 +235,22 @@ class Poses:
         pose = state.pose
         if pose is None:
             return Shown(self.mesh.vertices, float)
-        known: Shown | None = self.memo.find("live", (pose.surface,)) if live else None
-        if known is not None:
-            return known
+        inputs = pose.cage_vertices, pose.finished, state.regions, state.cages, state.options.lids
+        known: Shown | None = self.memo.find("live", inputs) if live else None
+        return known or self.memo.get("shown", inputs, lambda: self._measured(state, pose))
+
+    def keep_live(self, state: State, shown: Shown) -> None:
+        """Let the frames of a drag show the pose of *state* like this; of a pose not finished."""
+        pose = state.pose
+        assert pose is not None
+        inputs = pose.cage_vertices, None, state.regions, state.cages, state.options.lids
+        self.memo.keep("live", inputs, shown)
+
+    def _measured(self, state: State, pose: Pose) -> Shown:
         own = pose.finished
         x = self.surface(state, pose.cage_vertices) if own is None else own.vertices
         _, volume = self.enclosed(state)
-        return self.memo.get(
-            "shown", (x, volume), lambda: Shown(x, cache(partial(volume.relative, x)))
-        )
+        return Shown(x, cache(partial(volume.relative, x)))
 
     def vertices(self, state: State, *, live: bool = False) -> FloatArray:
         """Return the vertices (n, 3) of `shown`, read-only."""

@@ -76,11 +76,12 @@ def solve(
         if np.array_equal(shift[deformer.handle], last[deformer.handle]):
             break
     pose = Pose(cages, MappingProxyType({**targets}), finished)
+    after = replace(state, pose=pose)
     is_large = poses.mesh.n_vertices > sizes.SCALED_VOLUME
     if live and is_large and finished is None and cages is solution.cage_vertices:
         frozen(solution.vertices)
-        poses.memo.keep("live", (pose.surface,), Shown(solution.vertices, cache(solution.volume)))
-    x, change = poses.shown(replace(state, pose=pose), live=live)
+        poses.keep_live(after, Shown(solution.vertices, cache(solution.volume)))
+    x, change = poses.shown(after, live=live)
     poses.keep_path(pose, Path(held, deformer, aim))
     solution = replace(solution, vertices=x, volume=change)
     if shift is not None:

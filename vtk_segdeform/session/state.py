@@ -149,11 +149,6 @@ class Pose(Frozen):
         """Whether the mesh was finished with these cages, which were not moved since then."""
         return self.finished is not None and self.finished.cage_vertices is self.cage_vertices
 
-    @property
-    def surface(self) -> tuple[Cages, Finished | None]:
-        """What the mesh depends on; the targets make no difference."""
-        return self.cage_vertices, self.finished
-
 
 @dataclass(frozen=True, eq=False)
 class Locality(Frozen):
