@@ -35,15 +35,15 @@ def test_places_are_those_of_the_targets_and_fixed_vertices_set_by_set():
 
 
 def test_pulled_points_move_their_own_places_and_no_others():
-    places, offsets = np.arange(15.0).reshape(5, 3), np.array([[1.0, 2, 3], [0, 0, 7]])
+    places, levers = np.arange(15.0).reshape(5, 3), np.array([[1.0, 2, 3], [0, 0, 7]])
     points = SurfacePoint.at_vertex(3), SurfacePoint.of([1, 2], [0.25, 0.75])
-    pulled = PulledPoints(places=np.array([4, 1]), targets=np.array([0, 1]), points=points)
-    moved = pulled.moved(places, offsets)
+    pulled = PulledPoints(np.array([4, 1]), np.array([0, 1]), points, levers)
+    moved = pulled.moved(places)
     expected = places.copy()
-    expected[4] += offsets[0]
-    expected[1] += offsets[1]
+    expected[4] += levers[0]
+    expected[1] += levers[1]
     assert_array_equal(moved, expected)
     assert_array_equal(places, np.arange(15.0).reshape(5, 3))
     assert_allclose(pulled.at(X), [X[3], 0.25 * X[1] + 0.75 * X[2]])
-    assert PulledPoints().moved(places, offsets) is places
+    assert PulledPoints().moved(places) is places
     assert PulledPoints().at(X).shape == (0, 3)

@@ -63,8 +63,9 @@ def test_a_twist_to_270_degrees_and_back_never_jumps(sense):
         assert farthest(pose.vertices, last) < 0.03 * mesh.diagonal, f"at {degrees} degrees"
         assert abs(pose.volume_change) <= 1e-12
         last = pose.vertices
-    # A frame ends with a step of 1e-5 mesh sizes, root mean square.
-    assert farthest(last, mesh.vertices) < 3e-5 * mesh.diagonal
+    # A frame ends with a step of 1e-5 mesh sizes, root mean square; at the slowest rate at which
+    # steps go on, 0.8, those that would follow move the mesh by 5 times as much.
+    assert farthest(last, mesh.vertices) < 6e-5 * mesh.diagonal
 
 
 def test_a_pull_of_a_soft_body_keeps_the_point_and_follows():
@@ -83,4 +84,4 @@ def test_a_pull_of_a_soft_body_keeps_the_point_and_follows():
             if share > 0.15:
                 worst = max(worst, farthest(converged(session, preparation), session.vertices))
     print(f"{worst / mesh.diagonal:.2%} away")
-    assert worst < 0.03 * mesh.diagonal
+    assert worst < 0.015 * mesh.diagonal

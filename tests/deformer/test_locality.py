@@ -100,17 +100,6 @@ def test_another_body_stays():
     assert not np.diag(apart.quadratic(SurfacePoint.at_vertex(8), np.inf, 0.0)).any()
 
 
-def test_a_soft_row_reproduces_affine_maps():
-    samples = held()._samples
-    rest = held()._rest.vertices
-    row = samples.soft_row(SurfacePoint.at_vertex(HIGH), rest[HIGH], 0.15)
-    cages = held()._rest_cages
-    affine = np.array([[1.1, 0.2, 0.0], [0.1, 0.9, 0.3], [0.0, -0.2, 1.0]])
-    assert_allclose(row @ (cages @ affine), rest[HIGH] @ affine, atol=1e-3)
-    assert row.sum() == pytest.approx(1.0)
-    assert samples.soft_row(SurfacePoint.at_vertex(HIGH), rest[HIGH], 1e-6) is None
-
-
 def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_one():
     solver, p = held()._constraints.solver, held()._path.p
     assert solver.steadying(p, 0.0) == 0.0
@@ -355,12 +344,12 @@ def test_arguments_of_a_local_deformer_are_checked(changes, says):
         held().local(**{"vertex": HIGH, "reach": 1.0, "spread": 0.5, **changes})
 
 
-def test_a_pull_that_needs_every_correction_has_converged():
+def test_a_pull_of_a_tetrahedron_has_converged():
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     solution = pull(tetrahedron, 3, [0.0, 0.0, 1.3])
     assert solution.status is Status.CONVERGED
-    assert solution.handle_error < 1e-4
+    assert solution.handle_error < 1e-3  # its four vertices resist as much as they are held
 
 
 def test_the_finish_of_a_pull_makes_no_bump_around_the_pulled_point():
@@ -468,23 +457,6 @@ def test_sheets_that_face_the_same_way_are_joined_only_if_they_are_two_component
     assert layered.distances(SurfacePoint.at_vertex(0))[25] == pytest.approx(0.1)
 
 
-def test_a_soft_row_has_the_least_shares_that_reproduce_affine_maps():
-    """Of all psi with these moments, psi^2 weighted by (1 - d^2)^2 a is least: dense equations."""
-    own = held()._samples
-    samples = replace(own, rows=np.eye(len(own.points)))
-    at, spread = own.points[HIGH] + [0.001, 0.0, 0.0], 0.15
-    row = samples.soft_row(SurfacePoint.at_vertex(HIGH), at, spread)
-    away = samples.distances(SurfacePoint.at_vertex(HIGH)) / spread
-    near = np.flatnonzero(away < 1.0)
-    assert 4 < len(near) < 0.3 * len(row)
-    assert not np.delete(row, near).any()
-    weights = own.areas[near] * (1.0 - away[near] ** 2) ** 2
-    basis = np.column_stack([np.ones(len(near)), (own.points[near] - at) / spread])
-    full = np.block([[np.diag(1.0 / weights), basis], [basis.T, np.zeros((4, 4))]])
-    expected = np.linalg.solve(full, np.append(np.zeros(len(near)), [1.0, 0.0, 0.0, 0.0]))
-    assert_allclose(row[near], expected[:-4], atol=1e-6)
-
-
 def test_values_of_samples_are_smoothed_between_cells(monkeypatch):
     own = held()._samples
     values = np.sin(3.0 * own.points[:, 0])
@@ -563,27 +535,20 @@ def test_parts_beyond_the_reach_follow_by_their_area():
 
 
 def test_a_body_that_nothing_holds_follows_its_pulled_point():
-    """All of it is within the reach; the drag, without which it might turn, is weak."""
+    """All of it is within the reach, and back at rest it has not turned."""
     x, d = coarse().mesh.vertices, coarse().mesh.diagonal
     top, low = int(x[:, 2].argmax()), int(x[:, 2].argmin())
     local = coarse().hold(handle=[top]).local(top, 10.0 * d, 0.1 * d)
     solution = local.solve(x[[top]] + [0.0, 0.0, 0.3 * d])
     assert solution.vertices[low, 2] - x[low, 2] > 0.95 * 0.3 * d
     assert_allclose(solution.vertices.mean(axis=0)[:2], x.mean(axis=0)[:2], atol=0.02 * d)
-
-
-def test_a_drag_is_added_only_where_all_of_the_grabbed_part_is_free():
-    point, deformer = SurfacePoint.at_vertex(HIGH), held()
-    assert not deformer._drag_of(point, np.inf, 0.0).any()
-    assert not deformer._drag_of(point, 0.1, 0.0).any()
-    drag = deformer._drag_of(point, 5.0, 0.0)  # mesh sizes
-    assert np.linalg.eigvalsh(drag)[0] > -1e-12
-    assert 0.0 < np.trace(drag) < 1e-2 * np.trace(deformer._binding.energy.quadratic)
+    local.solve(x[[top]] + [0.2 * d, 0.3 * d, -0.1 * d])
+    assert_allclose(local.solve(x[[top]]).vertices, x, rtol=0, atol=1e-6 * d)
 
 
 @pytest.mark.parametrize("corners", [1, 2, 3])
-def test_the_surface_around_a_point_is_pulled_where_its_ring_may_not_resist(corners):
-    """A neighbour is fixed.  The point is that of the surface, not a mean of the corners alone."""
+def test_a_point_is_pulled_alone_where_its_ring_may_not_resist(corners):
+    """A neighbour is fixed."""
     face = SCENE.mesh.faces[(SCENE.mesh.faces == HIGH).any(axis=1)][0]
     face = [HIGH, *face[face != HIGH]]
     shares = np.array([[1.0, 0.0, 0.0], [0.6, 0.4, 0.0], [0.5, 0.3, 0.2]][corners - 1])
@@ -593,6 +558,5 @@ def test_the_surface_around_a_point_is_pulled_where_its_ring_may_not_resist(corn
     solver, pulled = local._constraints.solver, local._constraints.pulled
     assert solver.energy is local._binding.energy
     assert pulled.points == (point,)
-    row, own = solver.positions.rows[pulled.places[0]], local._row_of(point)
-    assert np.abs(row - own).max() > 1e-3
-    assert_allclose(row @ local._rest_cages, own @ local._rest_cages, atol=2e-2)
+    row = solver.positions.rows[pulled.places[0]]
+    assert_allclose(row @ local._rest_cages, point.at(local._rest.vertices), atol=1e-6)

@@ -116,13 +116,12 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
         asked.append(factor)
         return replace(factor, triangle=np.asfortranarray(1e-3 * factor.triangle))
 
-    deformer = SCENE.held()
-    expected = deformer.solve(SCENE.turned(10))
+    expected, deformer = SCENE.held().solve(SCENE.turned(60)), SCENE.held()
     with monkeypatch.context() as wrong:
         wrong.setattr(GaussNewton, "_factor_at", almost_singular)
-        found = SCENE.held().solve(SCENE.turned(10), max_steps=20)
-    assert asked
-    assert found.status is Status.STEP_LIMIT
+        for _ in range(20):  # with few steps left H is computed soon
+            found = deformer.solve(SCENE.turned(60), max_steps=3)
+    assert len(asked) > 1
     assert distance(found, expected) < 5e-3
 
 

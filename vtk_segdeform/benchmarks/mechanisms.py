@@ -159,13 +159,8 @@ MECHANISMS = (
         _DEFORMER, "_way_to", lambda *_: iter(()), _BEND,
     ),
     Mechanism(
-        "flat rings", "the neighbours of a pulled point resist a spike",
-        _DEFORMER, "_with_flat_rings", lambda self, *_: (self._binding.energy, {}), _PULLS,
-    ),
-    Mechanism(
-        "shifts of pulled points", "targets are shifted by the error of the point",
-        _DEFORMER, "_off",
-        lambda self, *_: np.zeros((len(self._constraints.pulled.targets), 3)), _PULLS,
+        "rings", "the neighbours of a pulled point resist a spike",
+        _DEFORMER, "_with_rings", lambda self, *_: self._binding.energy, _PULLS,
     ),
     Mechanism(
         "load at the press", "forces that are not in balance remain as a constant load",
@@ -174,10 +169,6 @@ MECHANISMS = (
     Mechanism(
         "steadying", "springs that make the pose at the press stable",
         _SOLVER, "steadying", lambda *_: 0.0, _SECOND,
-    ),
-    Mechanism(
-        "drag on free parts", "a weak drag on a part that is all within reach",
-        _DEFORMER, "_drag_of", _no_quadratic, _SECOND,
     ),
     Mechanism(
         "layers and parts that move together", "distances of a pull go across thin walls",

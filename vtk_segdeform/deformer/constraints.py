@@ -20,21 +20,20 @@ _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 @dataclass(frozen=True, eq=False)
 class PulledPoints:
-    """Handles of one vertex that pull the surface around it; see `locality`."""
+    """Points that handles of one vertex move; see `locality`."""
 
     places: IntArray = field(default_factory=lambda: _NONE)  # (q,), among the places of all sets
     targets: IntArray = field(default_factory=lambda: _NONE)  # (q,), their targets
     points: tuple[SurfacePoint, ...] = ()  # (q,)
     levers: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from their vertices
-    spread: float = 0.0  # within which they pull, in the mesh's unit
-    offsets: FloatArray = field(default_factory=lambda: _NO_POINTS)  # (q, 3), from target to x~
+    spread: float = 0.0  # within which a finish leaves the surface alone, in the mesh's unit
 
-    def moved(self, places: FloatArray, offsets: FloatArray) -> FloatArray:
-        """Return the *places* (s, 3), with those of x~ moved by *offsets* (q, 3)."""
+    def moved(self, places: FloatArray) -> FloatArray:
+        """Return the *places* (s, 3) with those of the points instead of their vertices."""
         if not len(self.places):
             return places
         places = places.copy()
-        places[self.places] += offsets
+        places[self.places] += self.levers
         return places
 
     def at(self, x: FloatArray) -> FloatArray:
@@ -47,9 +46,8 @@ class HandlePoint(NamedTuple):
 
     place: int
     """Among those of all sets."""
+    target: int
     point: SurfacePoint
-    is_alone: bool
-    """Whether no edge joins the vertex to another one in a handle."""
 
 
 class Preserved(NamedTuple):

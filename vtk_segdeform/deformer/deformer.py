@@ -12,10 +12,9 @@ A solve does the following; `gauss_newton` has the steps.
 
 1. Divide a far motion of the handles into short ones (`waypoints`).
 2. For each of them take the steps (21) to the minimum, starting from the last p.
-3. Shift the places of pulled points that are missed by the error, and solve again (`path`).
-4. Map the cages to the mesh, x = W~ p, and restore its exact volume (`exact_volume`).  A small mesh
+3. Map the cages to the mesh, x = W~ p, and restore its exact volume (`exact_volume`).  A small mesh
    moves along Z, as in the steps.  For a large one the steps preserved the volume of a coarse
-   surface only, so the mesh is scaled to V_0; if by more than 3e-5, step 3 is repeated with the
+   surface only, so the mesh is scaled to V_0; if by more than 3e-5, step 2 is repeated with the
    coarse volumes of the scaled mesh as targets, at most 4 times.
 
 Positions are in the coordinates of the solver, where the mesh has size 1; see `frame`.
@@ -101,8 +100,6 @@ _ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `l
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
-_GAIN = 0.7  # the factor by which errors of pulled points must fall
-_PULLED = 1e-5  # largest error of pulled points in a final pose
 _SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
@@ -113,7 +110,6 @@ _VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
-_DRAG = 1e-3  # weight of the drag on a part that is free to turn, in traces of its energy
 _LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
@@ -311,8 +307,8 @@ class Deformer:
             it the surface is held the more, the farther away; from 4 times this distance it hardly
             moves.  Infinite: all of it is free.
         spread : float
-            Distance along the surface, from a handle of one vertex, within which it pulls, so that
-            it makes no spike.  Where that is not enough, its neighbours rotate as one.
+            Distance from a handle of one vertex within which a finish leaves the surface as the
+            cages have it.
         follows : float
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
@@ -327,38 +323,27 @@ class Deformer:
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
         near = point, float(reach) / self._frame.size, follows
         weight = _ANCHOR_WEIGHT * self._binding.energy.scale
-        quadratic = weight * self._samples.quadratic(*near) + self._drag_of(*near)
-        quadratic += self._of_loose_parts()
+        quadratic = weight * self._samples.quadratic(*near) + self._of_loose_parts()
         before, p = self._constraints.solver, self._path.p
-        rows, soft, of_target = before.positions.rows.copy(), [], []
         anchors = Anchors(quadratic, p, np.zeros_like(p))
-        points = self._points_of_handles(point)
-        energy, flat = self._with_flat_rings(points, anchors)
-        for target, (place, own, is_alone) in points.items():
-            row = flat.get(target)
-            if row is None and is_alone:
-                at = own.at(self._rest.vertices)
-                row = self._samples.soft_row(own, at, spread / self._frame.size)
-            if row is None and not own.is_vertex:
-                row = self._row_of(own)
-            if row is not None:
-                rows[place] = row
-                soft.append(place)
-                of_target.append(target)
-        positions = before.positions.local(rows, anchors)
-        places = self._constraints.places(self._path.targets)
-        own_rows = [self._row_of(points[target].point) for target in of_target]
-        stacked = np.array(own_rows).reshape(-1, self.subspace.n_columns)
+        handles = self._points_of_handles(point)
+        own_rows = np.array([self._row_of(each.point) for each in handles])
+        own_rows = own_rows.reshape(-1, self.subspace.n_columns)
+        targets = np.array([each.target for each in handles], dtype=np.int64)
         pulled = PulledPoints(
-            places=np.array(soft, dtype=np.int64),
-            targets=np.array(of_target, dtype=np.int64),
-            points=tuple(points[target].point for target in of_target),
-            levers=(stacked - self.subspace.at(self.handle[of_target])) @ p,
+            places=np.array([each.place for each in handles], dtype=np.int64),
+            targets=targets,
+            points=tuple(each.point for each in handles),
+            levers=(own_rows - self.subspace.at(self.handle[targets])) @ p,
             spread=spread,
-            offsets=rows[soft] @ p - places[soft],
         )
-        solver = replace(before, energy=energy, positions=positions)
-        load = solver.unbalanced(p, pulled.moved(places, pulled.offsets))
+        rows = before.positions.rows.copy()
+        rows[pulled.places] = own_rows
+        positions = before.positions.local(rows, anchors)
+        solver = replace(before, positions=positions)
+        energy = self._with_rings(pulled, own_rows, solver)
+        solver = replace(solver, energy=energy)
+        load = solver.unbalanced(p, pulled.moved(self._constraints.places(self._path.targets)))
         least = _FIRM * energy.scale
         is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
         steady = solver.steadying(p, least) if is_loaded else 0.0
@@ -372,9 +357,9 @@ class Deformer:
         other._begin(p, self._path.targets)
         return other
 
-    def _points_of_handles(self, point: SurfacePoint) -> dict[int, HandlePoint]:
-        """Return the points that handles of one vertex move, and *point*, by their target."""
-        found, set_of = {}, self._constraints.solver.positions.set_of
+    def _points_of_handles(self, point: SurfacePoint) -> list[HandlePoint]:
+        """Return the points that handles of one vertex move, and *point* if its vertex is alone."""
+        found, set_of = [], self._constraints.solver.positions.set_of
         for number, ids in enumerate(self._constraints.handles):
             places = np.flatnonzero(set_of == number)
             for place, target in zip(places, ids, strict=False):
@@ -382,58 +367,36 @@ class Deformer:
                 is_grabbed = vertex == point.vertex and len(places) == len(ids)
                 own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
                 if len(ids) == 1 or not own.is_vertex:
-                    found[int(target)] = HandlePoint(int(place), own, len(ids) == 1)
+                    found.append(HandlePoint(int(place), int(target), own))
         return found
 
     def _row_of(self, point: SurfacePoint) -> FloatArray:
         """Return the row of W~ of *point*, (m,)."""
         return np.asarray(np.array(point.shares) @ self.subspace.at(np.array(point.corners)))
 
-    def _drag_of(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
-        """Return the quadratic (m, m) of a weak drag, if all of the grabbed part is free to move.
+    def _with_rings(
+        self, pulled: PulledPoints, own_rows: FloatArray, solver: GaussNewton
+    ) -> Energy:
+        """Return the energy of *solver* with the rings of points that it would pull as spikes.
 
-        It would turn about the grabbed point without any resistance.
+        *own_rows* (q, m) are those of the points; see `locality`.
         """
-        samples, energy = self._samples, self._binding.energy
-        near = np.isfinite(samples.distances(point))
-        if not np.isfinite(reach) or samples.weights(point, reach, follows)[near].any():
-            return np.zeros_like(energy.quadratic)
-        traces = self._traces[self.regions.membership[:, list(point.corners)].any(axis=1)]
-        weight = _DRAG * float(traces.min()) * samples.areas[near] / samples.areas[near].sum()
-        rows = samples.rows[near]
-        return np.asarray((rows.T * weight) @ rows)
-
-    def _with_flat_rings(
-        self, pulled: dict[int, HandlePoint], anchors: Anchors
-    ) -> tuple[Energy, dict[int, FloatArray]]:
-        """Return the shape energy with the rings of *pulled* points that would become spikes.
-
-        And the rows of these points by their target; see `locality`.
-        """
-        energy, flat = self._binding.energy, dict[int, FloatArray]()
-        held, x = np.concatenate([self.fixed, self.handle]), self._rest.vertices
-        rings = []
-        for target, (_, point, _) in pulled.items():
-            ring = Ring.around(self.mesh, x, point)
-            others = held[held != point.vertex]
-            if ring is not None and not np.isin(ring.vertices, others).any():
-                rings.append((target, point, ring))
-        if not rings:
-            return energy, flat
-        positions = self._constraints.solver.positions
-        positions = positions.local(positions.rows, anchors)
-        without = replace(self._constraints.solver, energy=energy, positions=positions)
+        energy = self._binding.energy
+        held = np.concatenate([self.fixed, self.handle])
+        solver = replace(solver, energy=energy)
         far = _FAR_PULL * self.mesh.diagonal / self._frame.size
         most = _ANCHOR_WEIGHT * energy.scale
-        for target, point, ring in rings:
-            rows, row = ring.combinations @ self.subspace.at(ring.vertices), self._row_of(point)
-            (own, both), (_, offset) = without.compliance(np.stack([row, rows[0]]))
+        for point, row in zip(pulled.points, own_rows, strict=True):
+            ring = Ring.around(self.mesh, self._rest.vertices, point)
+            if ring is None or np.isin(ring.vertices, held[held != point.vertex]).any():
+                continue
+            rows = ring.combinations @ self.subspace.at(ring.vertices)
+            (own, both), (_, offset) = solver.compliance(np.stack([row, rows[0]]))
             excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
             if excess > 0.0:
                 strength = most * excess / max(excess, most * (offset - both * both / own))
                 energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
-                flat[target] = row
-        return energy, flat
+        return energy
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
@@ -721,19 +684,11 @@ class Deformer:
         if is_frame:
             options = replace(options, tolerance=max(options.tolerance, _FRAME))
         steps = self._follow_waypoints(goal, options)
-        path.targets, error = goal, math.inf
-        while True:
-            result, x, more = self._solve_once(goal, replace(options, max_steps=limit))
-            steps, limit = steps + more, limit - more
-            off = self._off(goal, x)
-            before, error = error, _largest(off)
-            is_there = error <= _PULLED or error > _GAIN * before
-            if is_there or result.status is Status.STEP_LIMIT or limit <= 0:
-                break
-            path.offsets = path.offsets + off
+        path.targets = goal
+        result, x, more = self._solve_once(goal, options)
         if is_frame and result.status is Status.CONVERGED:
             result = replace(result, status=Status.STEP_LIMIT)
-        solution = self._solution(result, x, steps)
+        solution = self._solution(result, x, steps + more)
         return solution if is_live else self._with_remaining(solution, goal)
 
     def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
@@ -747,12 +702,6 @@ class Deformer:
         if remaining <= CONVERGED:
             status = self._or_missed(Status.CONVERGED, solution)
         return replace(solution, remaining=remaining, status=status)
-
-    def _off(self, targets: FloatArray, x: FloatArray) -> FloatArray:
-        """Return how far the pulled points of *x* (n, 3) are off their *targets*, (q, 3)."""
-        pulled = self._constraints.pulled
-        there = self._frame.inward(self._frame.in_scene(pulled.at(x)))
-        return targets[pulled.targets] + pulled.levers - there
 
     def _solve_once(
         self, goal: FloatArray, options: SolverOptions
@@ -775,9 +724,8 @@ class Deformer:
         return result, x, steps
 
     def _places(self, targets: FloatArray) -> FloatArray:
-        """Return the places (s, 3) of all sets for *targets* (k, 3), with those of x~."""
-        constraints = self._constraints
-        return constraints.pulled.moved(constraints.places(targets), self._path.offsets)
+        """Return the places (s, 3) of all sets for *targets* (k, 3), pulled points included."""
+        return self._constraints.pulled.moved(self._constraints.places(targets))
 
     def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
         """Move through the waypoints before *goal*; return the number of steps."""
@@ -1032,7 +980,7 @@ class Deformer:
     def _begin(self, p: FloatArray, targets: FloatArray) -> None:
         """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
         constraints = self._constraints
-        self._path = Path(constraints.solver.fresh(), p, p, targets, constraints.pulled.offsets)
+        self._path = Path(constraints.solver.fresh(), p, p, targets)
         if constraints.preserved.scaled is not None and p is not self._rest_cages:
             self._path.continue_from(p)
 

@@ -21,18 +21,10 @@ The samples are the cells of the coarse volume, or the vertices of a small mesh,
 along the edges between them, so a press takes some milliseconds whatever the size of the mesh; to
 fix as many vertices would take a second.
 
-A single vertex would be pulled out as a spike, as wide as the cages are apart.  So the samples
-around it are pulled, with their orientation free: the point that moves is
-
-    x~ = sum_s psi_s x_s,    sum_s psi_s = 1,    sum_s psi_s v_s = v
-
-with the least psi that decrease with the distance from the vertex v: moving least squares, which
-reproduce every affine motion of these samples.  `Deformer` corrects the target of x~ until the
-vertex itself is in its place.
-
-Where the mesh is coarse or its detail is sharp, this is not enough: pulled by 0.3 diagonals,
-vertices of meshes of 500 to 2,500 vertices left the plane of their neighbours x_j by up to 1.6
-edges.  There the vertex itself is pulled, and its ring resists.  Added to the shape energy is
+Cages are coarse, so a point is pulled with much of the surface around it.  But where the mesh is
+coarse, too, or its detail is sharp, it would become a spike: pulled by 0.3 diagonals, vertices of
+meshes of 500 to 2,500 vertices left the plane of their neighbours x_j by up to 1.6 edges.  There
+the ring around the point resists.  Added to the shape energy is
 
     min_R  w |y - R y_rest|^2 + e w mean_j |x_j - x_v - R (x_j - x_v)_rest|^2
     y = x_v - sum_j c_j x_j,    sum_j c_j = 1,    sum_j c_j v_j = v  in their plane at rest
@@ -64,8 +56,8 @@ from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
-_FEWEST = 4  # samples that determine an affine motion
-_SHORTEST = 1e-12  # reach and spread; the mesh has size 1
+_FEWEST = 4  # points of a ring, its own included
+_SHORTEST = 1e-12  # reach; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
 _AROUND = 20  # nearest samples that are looked at
 _EDGES = 2000  # about, of which the median motion is computed
@@ -274,20 +266,3 @@ class SurfaceSamples:
         for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
-
-    def soft_row(self, point: SurfacePoint, at: FloatArray, spread: float) -> FloatArray | None:
-        """Return the row of x~, (m,), from samples within *spread* of *point*, which is *at* v.
-
-        None if there are too few.
-        """
-        spread = max(spread, _SHORTEST)
-        away = self.distances(point) / spread
-        near = np.flatnonzero(away < 1.0)
-        if len(near) < _FEWEST:
-            return None
-        weights = self.areas[near] * (1.0 - away[near] ** 2) ** 2
-        basis = np.column_stack([np.ones(len(near)), (self.points[near] - at) / spread])
-        moments = (basis.T * weights) @ basis
-        share = np.linalg.pinv(moments, rcond=_FLAT, hermitian=True)[0]
-        psi = weights * (basis @ share)
-        return np.asarray(psi @ self.rows[near] / psi.sum())

@@ -10,21 +10,12 @@ from ..solver import GaussNewton, SolverOptions, SolverResult
 
 @dataclass(eq=False)
 class Path:
-    """The last pose, and what the next solve continues with.
-
-    The places of pulled points are shifted by how far they are off, again and again: the step of
-    the method of multipliers, since a single vertex is hardly moved by its weight alone.
-
-    Source
-    ------
-    M. R. Hestenes, "Multiplier and gradient methods", J. Optim. Theory Appl. 4, 1969.
-    """
+    """The last pose, and what the next solve continues with."""
 
     solver: GaussNewton  # with its factor, its acceleration and the way of the last solves
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
     targets: FloatArray  # (k, 3)
-    offsets: FloatArray  # (q, 3), from the targets of pulled points to their places
 
     def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
         """Minimise from the last pose, for *places* (s, 3)."""

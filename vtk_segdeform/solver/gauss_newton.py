@@ -27,12 +27,14 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    large mesh this is the volume of a coarse surface (`coarse_volume`), and `Deformer` restores that
    of the mesh itself at the end.
 2. *Exact Hessian* (`hessian`).  The paper's H is constant, W~^T A^T A W~ plus the position weights,
-   and rotations follow one step behind: hundreds of steps are needed, and a small step does not
-   mean that the minimum is near.  With the derivatives of the rotations and of the volumes in H, h
-   is Newton's step, about as long as the remaining distance.  H is computed again after 6 steps,
-   before and after a long step, and if a step with an earlier one lowers nothing.  If it is not
-   convex, it contains a share of the rotations' derivatives only, and h is shorter.  If it is
-   almost singular, so that no share of h lowers the objective, the paper's H takes its place.
+   and rotations follow one step behind: where much turns, hundreds of steps are needed, and a small
+   step does not mean that the minimum is near.  With the derivatives of the rotations and of the
+   volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
+   takes as long as some 12 steps.  So the paper's H is used first, and H is computed at the present
+   pose if steps at the present rate would not converge within 12 steps, or those that are left, and
+   if no share of a step lowers the objective.  If it is not convex, it contains a share of the
+   rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
+   lowers the objective, the paper's H takes its place.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  In pulls of soft
    bodies, with 8 steps a frame, poses are 2 to 5 times nearer to converged ones with it.
 4. *Line search* (`newton`).
@@ -44,7 +46,8 @@ Long because the formulas of the iteration are explained here, and its problem i
 
 Source
 ------
-Section 3.3 of the paper.
+Section 3.3 of the paper.  E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", 2nd
+ed., Springer 1996, section IV.8: when a factor serves on.
 """
 
 from __future__ import annotations
@@ -73,12 +76,13 @@ from .volume_constraints import Volumes, gradients, violations
 
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
-# Step lengths, root mean square over the surface of a mesh of size 1:
-_LONG = 1e-2  # a longer step is computed again with H at the present pose
-_CLOSE = 3e-3  # of the paper's step: below it multipliers are accurate enough for volume Hessians
+_COST = 12  # of computing H again, in steps
+_SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
+# Of the paper's step, root mean square over the surface, mesh size 1: below it multipliers are
+# accurate enough for the Hessian of the volumes.
+_CLOSE = 3e-3
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
-_OLD = 6  # steps after which H is computed again
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 
@@ -135,23 +139,29 @@ class _State:
     """The running state of an iteration, from which a later call continues."""
 
     factor: Factor  # of H
-    age: int = _OLD  # of the factor, in steps
+    age: int = 1  # of the factor, in steps; that of the start is of rest
+    length: float = math.inf  # of the last step in this call
+    left: int = 0  # steps, in this call
+    tolerance: float = 0.0  # of this call
     has_terms: bool = False  # whether the factor is with those terms that were active
     acceleration: Anderson = field(default_factory=lambda: Anderson(_WINDOW))
     end: tuple[FloatArray, FloatArray] | None = None  # p and targets of the last call
 
-    def is_usable(self, here: _Iterate) -> bool:
-        """Tell whether H need not be computed again."""
-        return self.age < _OLD and (self.has_terms or not here.is_active)
-
-    def begin(self, p: FloatArray, targets: FloatArray) -> None:
-        """Forget the last steps unless a call begins where the last one ended."""
+    def begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> None:
+        """Begin a call; forget the last steps unless it begins where the last one ended."""
+        self.tolerance, self.left = options.tolerance, options.max_steps
         if self.end is None or self.end[0] is not p or not np.array_equal(targets, self.end[1]):
             self.acceleration.forget()
+            self.length = math.inf
+
+    def is_slow(self, step: Step) -> bool:
+        """Tell whether *step* and the next ones would not converge while a new H pays."""
+        rate, steps = min(step.length / self.length, 1.0), min(self.left, _COST)
+        return self.age >= _SETTLED and step.length * rate**steps > self.tolerance
 
     def took(self, step: Step) -> None:
-        """Count a step; after a long one H is out of date."""
-        self.age = _OLD if step.length > _LONG else self.age + 1
+        """Count a step."""
+        self.age, self.left, self.length = self.age + 1, self.left - 1, step.length
 
     def copy(self) -> _State:
         """Return a state from which another solver continues."""
@@ -211,10 +221,10 @@ class GaussNewton:
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
 
-        Called again with the last p and targets, it continues as if it had never returned.
+        Called again with the last p and targets, it continues.
         """
         state, self._term = self._state, self.positions.toward(targets)
-        state.begin(p, targets)
+        state.begin(p, targets, options)
         end = minimise(
             self,
             self._ahead(self._iterate_at(p), targets),
@@ -237,12 +247,12 @@ class GaussNewton:
         return self.energy.constant
 
     def step(self, here: _Iterate) -> Step:
-        """Return the step (21), with H of this pose or of one not far from it."""
+        """Return the step (21), with H of this pose if the last one is out of date."""
         state = self._state
-        if not state.is_usable(here):
+        if here.is_active and not state.has_terms:
             self._renew(here)
         step = self._step(here, state.factor)
-        if state.age and step.length > _LONG:
+        if state.is_slow(step):
             self._renew(here)
             step = self._step(here, state.factor)
         share = share_of_step(self.terms, step.h) if here.is_active else 1.0
