@@ -147,30 +147,20 @@ class Poses:
 
     def constrained(self, state: State) -> Deformer:
         """Return a deformer with the fixed vertices, handles and volumes of *state*, at rest."""
-        fixed_at, shift = state.fixed_at, self.shift(state)
-        if shift is None or not shift[state.fixed].any():
-            return self.held(state, fixed_at)
-        places = self.fixed_places(state) - shift[state.fixed]
-        return self.held(state, places, key=places.tobytes())
+        places, shift = state.fixed_at, self.shift(state)
+        key: object = places
+        if shift is not None and shift[state.fixed].any():
+            places = self.fixed_places(state) - shift[state.fixed]
+            key = places.tobytes()  # as it is a new array each time
+        held = tuple(state.handles.values())
+        inputs = self.bind(state), state.fixed, key, held, *_volumes(state).values()
+        return self.memo.get("held", inputs, partial(self.held, state, places))
 
-    def held(
-        self, state: State, fixed_at: FloatArray | None, *, key: bytes | None = None
-    ) -> Deformer:
-        """Return a deformer with the constraints of *state*, its fixed vertices at *fixed_at*.
-
-        The *key* identifies *fixed_at* if it is a new array.
-        """
-        bound, options = self.bind(state), state.options
-        how: dict[str, Any] = {
-            "preserve_volume": options.preserve_volume,
-            "preserve_region_volumes": options.preserve_region_volumes,
-            "lids": options.lids,
-            "avoid_contact": options.avoid_contact,
-        }
-        places = fixed_at if key is None else key
-        inputs = bound, state.fixed, places, tuple(state.handles.values()), *how.values()
-        hold = partial(bound.hold, fixed=state.fixed, handle=state.handle, fixed_at=fixed_at)
-        return self.memo.get("held", inputs, partial(hold, **how), most=2)  # one at its own places
+    def held(self, state: State, fixed_at: FloatArray | None) -> Deformer:
+        """Return a deformer with the constraints of *state*, its fixed vertices at *fixed_at*."""
+        return self.bind(state).hold(
+            fixed=state.fixed, handle=state.handle, fixed_at=fixed_at, **_volumes(state)
+        )
 
     def path(self, state: State) -> Path:
         """Return the path to the pose of *state*, by resuming the pose if it is not known."""
@@ -320,3 +310,9 @@ def _binding(state: State) -> tuple[Any, ...]:
     """Return the inputs of a bound deformer."""
     options = state.options
     return state.regions, state.cages, options.stretch, options.rotation_groups
+
+
+def _volumes(state: State) -> dict[str, Any]:
+    """Return the options of *state* for `Deformer.hold`."""
+    names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
+    return {name: getattr(state.options, name) for name in names}
