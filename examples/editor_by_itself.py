@@ -18,7 +18,7 @@ import numpy as np
 import pyvista as pv
 
 import vtk_segdeform as sd
-from vtk_segdeform.widgets import DeformEditor, replay
+from vtk_segdeform.widgets import DeformEditor
 
 mesh = sd.models.cactus(5430 if len(sys.argv) > 1 else 1500)
 plotter = pv.Plotter(off_screen=True, window_size=(1000, 700))
@@ -30,26 +30,33 @@ plotter.show(interactive=False, auto_close=False)
 session = editor.session
 
 
-def play(*lines):
-    """Replay *lines* of a recording."""
-    replay(plotter, ["vtk_segdeform recording 1", *lines], busy=lambda: editor.is_busy)
+def send(name, place=(5, 300), key=None):
+    """Send an event of VTK, as a device does, when no background work is running."""
+    interactor = plotter.iren.interactor
+    while editor.is_busy:
+        interactor.InvokeEvent("TimerEvent")
+    x, y = (round(float(pixel)) for pixel in place)
+    interactor.SetEventInformation(x, y, 0, 0, "\0", 0, key)
+    interactor.InvokeEvent(name)
 
 
 def keys(*names):
-    """Press keys, one after the other."""
-    play(*(f"0.0 KeyPress 5 300 key={name}" for name in names))
+    """Press keys, one after the other, and wait for the work that they start."""
+    for name in names:
+        send("KeyPressEvent", key=name)
+    send("MouseMoveEvent")
 
 
 def drag(places):
     """Press at the first pixel, release at the last."""
-    pixels = [f"{x:.0f} {y:.0f}" for x, y in places]
-    play(
-        f"0.0 MouseMove {pixels[0]}",
-        f"0.0 LeftButtonPress {pixels[0]}",
-        *(f"0.0 MouseMove {place}" for place in pixels[1:]),
-        f"0.0 LeftButtonRelease {pixels[-1]}",
-        "0.0 Timer 80",  # time to converge
-    )
+    places = list(places)
+    send("MouseMoveEvent", places[0])
+    send("LeftButtonPressEvent", places[0])
+    for place in places[1:]:
+        send("MouseMoveEvent", place)
+    send("LeftButtonReleaseEvent", places[-1])
+    for _ in range(80):  # time to converge
+        send("TimerEvent", places[-1])
 
 
 def around(vertices):

@@ -2,7 +2,8 @@
 Editor in a plotter
 ===================
 
-The editor in a PyVista plotter, next to other meshes. A recording of keys and a drag works it here.
+The editor in a PyVista plotter, next to other meshes. Here a program uses its session, and the
+editor shows the result.
 
     python examples/editor_in_a_plotter.py show
 
@@ -17,7 +18,7 @@ import pyvista as pv
 
 import vtk_segdeform as sd
 from vtk_segdeform.io import to_polydata
-from vtk_segdeform.widgets import replay
+from vtk_segdeform.widgets import Mode
 
 show = sys.argv[1:] == ["show"]
 mesh = to_polydata(sd.models.cactus(1500))
@@ -35,19 +36,11 @@ plotter.camera.zoom(1.4)
 plotter.show(interactive=show, auto_close=False)  # with "show", until the window is closed
 
 if not show:
-    x, y, _ = editor.view.to_display(session.vertices[session.handles["tip"]].mean(axis=0)[None])[0]
-    path = [f"MouseMove {x + dx:.0f} {y - dx / 3:.0f}" for dx in np.linspace(0.0, 100.0, 11)]
-    recording = [
-        "vtk_segdeform recording 1",
-        "0.0 KeyPress 400 300 key=g",  # auto-segment
-        "1.0 KeyPress 400 300 key=f",  # fit cages
-        "2.0 KeyPress 400 300 key=4",  # deform
-        f"3.0 {path[0]}",
-        f"3.1 {path[0].replace('MouseMove', 'LeftButtonPress')}",
-        *(f"3.{k + 10} {place}" for k, place in enumerate(path[1:])),
-        f"4.0 {path[-1].replace('MouseMove', 'LeftButtonRelease')}",
-    ]
-    replay(plotter, recording, busy=lambda: editor.is_busy)
+    session.segment(3)
+    session.fit_cages()
+    editor.mode = Mode.DEFORM
+    session.drag({"tip": session.vertices[session.handles["tip"]] + [0.3, 0.0, -0.1]})
+    session.commit()
     if len(sys.argv) > 1:
         Path(sys.argv[1]).mkdir(parents=True, exist_ok=True)
         plotter.screenshot(f"{sys.argv[1]}/editor.png")

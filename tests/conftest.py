@@ -174,10 +174,10 @@ def either(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.fixture(scope="module")
 def bound_once() -> Iterator[None]:
     """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
-    from vtk_segdeform.deformer import deformer
+    from vtk_segdeform.deformer import problem
 
     known: dict[str, Any] = {}
-    bind = deformer.cached_binding
+    bind = problem.cached_binding
 
     def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
         key = inputs.digest()
@@ -186,7 +186,7 @@ def bound_once() -> Iterator[None]:
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(deformer, "cached_binding", bound)
+        patch.setattr(problem, "cached_binding", bound)
         yield
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sized
 from typing import Any
 
@@ -168,3 +169,8 @@ def _require_bounded(values: object, name: str) -> None:
             raise ArgumentError(f"{name} must be an array; got {shown(inner)}") from fault
         if count > _LONGEST:
             raise ArgumentError(f"{name} has more than {_LONGEST:.0e} entries; got {shown(inner)}")
+
+
+def largest_length(vectors: FloatArray) -> float:
+    """Return the largest length of *vectors* (k, 3); 0 if there are none."""
+    return math.sqrt(float(np.einsum("ij,ij->i", vectors, vectors).max(initial=0.0)))

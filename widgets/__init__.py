@@ -8,11 +8,11 @@
 `RegionSelector` paints regions, fixed vertices and handles; `CageDisplay` shows cages and drags
 their vertices; `HandleDragger` moves and rotates handles; `VolumeOverlay` shows the local volume
 change.  Each of them works alone; `DeformEditor` combines all four over one `Session`, with modes
-and keys.  `Recorder` and `replay` record and repeat the input, `film` makes a video of a session.
+and keys.  `film` makes a video of a session.
 
 Widgets translate events into calls of a session; they compute nothing themselves.
 
-Every name is imported on first use, so that `web.serving` loads no VTK.
+Every name is imported on first use.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from vtk_segdeform.importing import imported as _imported
 if _TYPE_CHECKING:
     from .cage_display import CageDisplay
     from .editor import DeformEditor, Mode
+    from .films import film
     from .handle_dragger import HandleDragger
-    from .recording import Recorder, ReplayLimits, film, replay
     from .region_selector import Paint, RegionSelector, Tool
     from .scene import SurfaceDisplay, View
     from .volume_overlay import VolumeOverlay
@@ -36,15 +36,12 @@ _MODULE_OF = {
     "HandleDragger": "handle_dragger",
     "Mode": "editor",
     "Paint": "region_selector",
-    "Recorder": "recording",
     "RegionSelector": "region_selector",
-    "ReplayLimits": "recording",
     "SurfaceDisplay": "scene",
     "Tool": "region_selector",
     "View": "scene",
     "VolumeOverlay": "volume_overlay",
-    "film": "recording",
-    "replay": "recording",
+    "film": "films",
 }
 
 __all__ = [
@@ -53,15 +50,12 @@ __all__ = [
     "HandleDragger",
     "Mode",
     "Paint",
-    "Recorder",
     "RegionSelector",
-    "ReplayLimits",
     "SurfaceDisplay",
     "Tool",
     "View",
     "VolumeOverlay",
     "film",
-    "replay",
 ]
 
 

@@ -1,10 +1,11 @@
 """The pictures of the tutorial by hand, from the mouse and key events that the tutorial describes.
 
-The events are replayed by `vtk_segdeform.widgets.replay`, so readers who do the same see the same.
+The events are those of VTK, so readers who do the same see the same.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,7 +14,7 @@ import pyvista as pv
 
 import vtk_segdeform as sd
 from making.made import FIGURES as FOLDER
-from vtk_segdeform.widgets import DeformEditor, replay
+from vtk_segdeform.widgets import DeformEditor
 
 PICTURES = (
     "hand-open", "hand-pulled", "hand-regions", "hand-cages", "hand-fixed", "hand-handle",
@@ -33,29 +34,36 @@ class Hand:
         self.plotter.camera_position = [(0.4, -2.4, 0.85), (0.05, 0.0, 0.47), (0.0, 0.0, 1.0)]
         self.plotter.show(interactive=False, auto_close=False)
 
-    def play(self, *lines: str) -> None:
-        """Replay lines of a recording."""
-        editor = self.editor
-        replay(
-            self.plotter,
-            ["vtk_segdeform recording 1", *lines],
-            busy=lambda: editor.is_busy or editor.is_preparing,
-        )
+    def send(self, name: str, place: Any = (5, 300), key: str | None = None) -> None:
+        """Send an event, as a device does, when no background work is running."""
+        interactor = self.plotter.iren.interactor
+        while self.editor.is_busy or self.editor.is_preparing:
+            interactor.InvokeEvent("TimerEvent")
+            time.sleep(0.005)
+        x, y = (round(float(pixel)) for pixel in place)
+        interactor.SetEventInformation(x, y, 0, 0, "\0", 0, key)
+        interactor.InvokeEvent(name)
+
+    def wait(self, ticks: int = 1) -> None:
+        """Let timers fire, once background work has ended."""
+        for _ in range(ticks):
+            self.send("TimerEvent", self.plotter.iren.interactor.GetEventPosition())
 
     def press(self, *keys: str) -> None:
         """Press keys, one after the other, and wait for the jobs they start."""
-        self.play(*(f"0.0 KeyPress 5 300 key={key}" for key in keys), "0.0 Timer 1")
+        for key in keys:
+            self.send("KeyPressEvent", key=key)
+        self.wait()
 
     def drag(self, places: Iterable[Any]) -> None:
         """Press at the first of some pixels, move to the last and release there."""
-        pixels = [f"{x:.0f} {y:.0f}" for x, y in places]
-        self.play(
-            f"0.0 MouseMove {pixels[0]}",
-            f"0.0 LeftButtonPress {pixels[0]}",
-            *(f"0.0 MouseMove {place}" for place in pixels[1:]),
-            f"0.0 LeftButtonRelease {pixels[-1]}",
-            "0.0 Timer 80",  # time to converge
-        )
+        first, *others = places
+        self.send("MouseMoveEvent", first)
+        self.send("LeftButtonPressEvent", first)
+        for place in others:
+            self.send("MouseMoveEvent", place)
+        self.send("LeftButtonReleaseEvent", others[-1])
+        self.wait(80)  # to converge
 
     def at(self, points: Any) -> Any:
         """Return the pixels (k, 2) of points (k, 3)."""
@@ -76,7 +84,7 @@ def bend(hand: Hand) -> None:
     vertices = hand.editor.session.mesh.vertices
     height = vertices[:, 2]
     hand.save("hand-open")
-    hand.play("0.0 Timer 1")  # until pulls are prepared
+    hand.wait()  # until pulls are prepared
     end = hand.at(vertices[[np.argmax(vertices[:, 0])]])[0] - [8.0, 0.0]
     hand.drag(end + t * np.array([80.0, 60.0]) for t in np.linspace(0.0, 1.0, 16))
     if np.allclose(hand.editor.session.vertices, vertices):
@@ -100,7 +108,7 @@ def bend(hand: Hand) -> None:
     hand.drag(centre + radius * np.array([np.cos(t), np.sin(t)]) for t in ring)
     hand.save("hand-bent")
     hand.press("o")
-    hand.play("0.0 Timer 80")
+    hand.wait(80)
     hand.save("hand-volume")
 
 

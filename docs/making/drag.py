@@ -2,8 +2,8 @@
 
     make drag-film      writes docs/pictures/drag.gif
 
-Mouse events drive the widget, as in `vtk_segdeform.widgets.replay`.  The pointer follows a closed
-curve, so the film loops almost without a jump.
+Mouse events drive the widget.  The pointer follows a closed curve, so the film loops almost without
+a jump.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 import vtk_segdeform as sd
 from making.made import DOCS
-from vtk_segdeform.widgets import View, film, replay
+from vtk_segdeform.widgets import View, film
 from vtk_segdeform.widgets.puller import Puller
 
 FILE = DOCS / "pictures" / "drag.gif"
@@ -63,11 +63,11 @@ def frames(plotter: pv.Plotter, view: View, start: Any) -> Iterator[Callable[[],
     for k, place in enumerate(view.to_display(path)[:, :2].round()):
 
         def play(place: Any = place, first: bool = k == 0) -> None:
-            at = f"{place[0]:.0f} {place[1]:.0f}"
-            press = [f"0.0 LeftButtonPress {at}"] if first else []
-            lines = [f"0.0 MouseMove {at}", *press, "0.0 Timer 8"]
+            press = ["LeftButtonPressEvent"] if first else []
             arrow.SetPosition(*place)
-            replay(plotter, ["vtk_segdeform recording 1", *lines])
+            view.interactor.SetEventPosition(*map(int, place))
+            for name in ("MouseMoveEvent", *press, *["TimerEvent"] * 8):
+                view.interactor.InvokeEvent(name)
 
         yield play
 

@@ -142,7 +142,6 @@ def test_a_pipe_is_told_from_a_file_that_is_not_there(folder):
         ["deform", "bar.ply", "-o", "out.ply", *POSE, "--matrix", LONG],
         ["regions", "bar.ply", "-o", f"{LONG}.ply"],
         ["check", f"{LONG}.ply"],
-        ["replay", LONG, "bar.ply", "--film", f"{LONG}.gif"],
         ["edit", f"{LONG}.segdeform"],
     ],
 )

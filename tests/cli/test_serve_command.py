@@ -25,7 +25,6 @@ def with_all_libraries(monkeypatch):
         (["missing.ply"], "missing.ply: there is no such file"),
         (["."], ".: is a folder, not a file"),
         (["--port", "99999"], "--port must be at most 65535; got 99999"),
-        (["--clients", "0"], "--clients must be at least 1"),
         (["--upload-limit", "0"], "--upload-limit must be at least 1"),
     ],
 )

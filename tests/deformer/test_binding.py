@@ -47,7 +47,7 @@ def test_a_cached_binding_gives_the_same_pose_bit_for_bit(tmp_path, counted, mon
     assert len(counted) == 1
     assert_array_equal(again.vertices, first.vertices)
     assert len(list(tmp_path.iterdir())) == 1
-    coarse = SCENE.deformer(cache=tmp_path)._binding.coarse_volume
+    coarse = SCENE.deformer(cache=tmp_path)._problem.binding.coarse_volume
     assert (coarse.cells is not None) == (large == 250)
 
 

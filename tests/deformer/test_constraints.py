@@ -19,7 +19,7 @@ def test_places_are_those_of_the_targets_and_fixed_vertices_set_by_set():
     handle = np.random.default_rng(0).permutation(np.concatenate([SCENE.handle, high]))
     fixed = np.random.default_rng(1).permutation(np.concatenate([low, SCENE.fixed]))
     deformer = SCENE.held().hold(fixed=fixed, handle=handle)
-    constraints, frame = deformer._constraints, deformer._frame
+    constraints, frame = deformer._constraints, deformer._problem.frame
     targets = X[deformer.handle] + [0.0, 0.1, 0.2]
     places = frame.outward(constraints.places(frame.inward(targets)))
     assert len(constraints.handles) == 2

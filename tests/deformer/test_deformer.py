@@ -613,7 +613,7 @@ def test_a_pull_is_the_same_in_every_unit(scale, beside):
     for scene, unit in zip(scenes, (1.0, scale), strict=True):
         deformer = scene.held().hold(fixed=fixed.astype(int), handle=[vertex])
         local = deformer.local(vertex, 0.25 * d * unit, 0.1 * d * unit, follows=1.0)
-        is_soft = local._constraints.solver.energy is deformer._binding.energy
+        is_soft = local._constraints.solver.energy is deformer._problem.energy
         assert is_soft == beside
         solution = local.solve(scene.mesh.vertices[[vertex]] + [0.0, 0.0, 0.05 * d * unit])
         poses.append([each.vertices / unit for each in (solution, local.finish(solution))])
@@ -625,7 +625,7 @@ def test_a_pull_is_the_same_in_every_unit(scale, beside):
 def test_weights_of_the_finish_are_a_quarter_of_a_cage_vertex_over_its_region(scale):
     scene = SCENE.transformed(scale=scale)
     deformer, areas = scene.held(), scene.mesh.vertex_areas
-    found = deformer._cage_weights
+    found = deformer._problem.cage_weights
     assert found.sum() == pytest.approx(36 / 4)
     alone = scene.regions.weights == 1.0
     for own, weights in zip(alone, scene.regions.weights, strict=True):
@@ -635,8 +635,8 @@ def test_weights_of_the_finish_are_a_quarter_of_a_cage_vertex_over_its_region(sc
 
 def test_a_pose_is_plausible_within_two_sizes_and_one_and_a_half_motions():
     deformer = SCENE.held()
-    size, rest = deformer._frame.size, deformer._rest.vertices[SCENE.handle]
-    at_rest = deformer._rest_cages
+    size, rest = deformer._problem.frame.size, deformer._problem.rest.vertices[SCENE.handle]
+    at_rest = deformer._problem.rest_cages
     for moved in (0.0, 1.0):
         goal, limit = rest + [moved, 0.0, 0.0], 2.0 + 1.5 * moved
         for share, ok in ((0.99, True), (1.01, False)):
@@ -703,10 +703,10 @@ def test_legs_toward_a_contact_are_little_longer_than_the_clearance(
     """By half a sample, but as long as one at least; without a contact they are of usual length."""
     monkeypatch.setattr(Contact, "clearance", lambda _, p, most: min(clearance, most))
     free, avoiding = SCENE.held(), SCENE.held(avoid_contact=True)
-    goal, start = free._frame.inward(SCENE.turned(degrees)), free._path.targets
+    goal, start = free._problem.frame.inward(SCENE.turned(degrees)), free._path.targets
     usual = [start, *waypoints(start, goal, free._constraints.handles)]
-    assert_array_equal([start, *free._way_to(goal), goal], usual)
-    way = [start, *avoiding._way_to(goal), goal]
+    assert_array_equal([start, *free._path._way_to(goal), goal], usual)
+    way = [start, *avoiding._path._way_to(goal), goal]
     legs = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(way)]
     spacing = avoiding._constraints.contact.surface.spacing
     longest = max(clearance + 0.5 * spacing, spacing)
@@ -721,7 +721,7 @@ def test_samples_of_a_body_are_held_where_half_of_their_vertices_are(monkeypatch
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
     deformer = SCENE.deformer(avoid_contact=True)
-    cells, is_held = deformer._samples.cells, deformer._constraints.contact.held
+    cells, is_held = deformer._problem.samples.cells, deformer._constraints.contact.held
     ids = np.concatenate([SCENE.fixed, SCENE.handle])
     shares = [np.isin(np.flatnonzero(cells == k), ids).mean() for k in range(len(is_held))]
     assert_array_equal(is_held, np.array(shares) >= 0.5)

@@ -172,11 +172,11 @@ def test_a_direction_that_is_only_rounding_moves_nothing(monkeypatch):
     deformer = deformer.hold(fixed=[low], handle=[high])
     target = mesh.vertices[[high]] + [0.0, 0.0, 0.3]
     expected = deformer.solve(target).vertices
-    places = deformer._constraints.places(deformer._frame.inward(target))
-    result = deformer._path.solve(places, deformer._options)
+    goal = deformer._problem.frame.inward(target)
+    result = deformer._path.solve(goal, deformer._limits).result
     noise = 1e-20 * np.random.default_rng(1).normal(size=result.p.shape)  # of a vanishing volume
     result = replace(result, directions=(result.directions[0], noise))
-    x = deformer._frame.in_scene(deformer._with_exact_volume(result)[0])
+    x = deformer._problem.frame.in_scene(deformer._path._with_exact_volume(result)[0])
     changes = [each.relative(x) for each in deformer.preserved_volumes]
     assert_allclose(changes, [0.0, 0.0], atol=1e-12)
     assert_allclose(x, expected, atol=1e-3)

@@ -67,7 +67,7 @@ def targets(deformer: Deformer, degrees: float) -> np.ndarray:
 
 def what_comes_next(deformer: Deformer) -> list[bytes]:
     """Return what a *deformer* does from where it is, bit for bit."""
-    last = deformer._frame.outward(deformer._path.targets)
+    last = deformer._problem.frame.outward(deformer._path.targets)
     solutions = [
         deformer.solve(last, max_steps=1),
         deformer.solve(targets(deformer, 55), max_steps=3),
@@ -93,7 +93,7 @@ def solve_some_steps(deformer, progress=None):
 
 
 def solve_and_finish(deformer, progress=None):
-    solution = deformer.solve(deformer._frame.outward(deformer._path.targets), max_steps=1)
+    solution = deformer.solve(deformer._problem.frame.outward(deformer._path.targets), max_steps=1)
     deformer.finish(deformer.finish(solution, progress=progress), progress=progress)
 
 

@@ -18,6 +18,7 @@ from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.deformer.locality import Ring, SurfaceSamples
+from vtk_segdeform.deformer.path import Path
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry import distortion
@@ -75,7 +76,7 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
     posed.solve(X[[HIGH]] + UP)
     local = posed.local(int(X[:, 0].argmax()), 0.2 * D, 0.1 * D)
     solver, p = local._constraints.solver, local._path.p
-    places = local._places(local._path.targets)
+    places = local._constraints.places(local._path.targets)
     assert np.abs(solver.unbalanced(p, places)).max() < 1e-12 * np.abs(solver._hessian).max()
     assert local.solve(X[[HIGH]] + UP).steps == 0
     assert local._constraints.pulled.points == (SurfacePoint.at_vertex(HIGH),)
@@ -150,15 +151,15 @@ def test_a_pulled_point_that_is_pulled_on_takes_nothing_else_along():
 def test_a_pose_out_of_all_proportion_is_not_shown_and_the_status_says_so(monkeypatch):
     deformer = held().local(HIGH, 0.2 * D, 0.1 * D)
     before = deformer.solve(X[[HIGH]] + 0.1 * UP)
-    own = Deformer._with_exact_volume
+    own = Path._with_exact_volume
 
     def explode(self, result):
         x, scaled_by = own(self, result)
-        self._path.p = 50.0 * self._path.p
+        self.p = 50.0 * self.p
         return 50.0 * x, scaled_by
 
     with monkeypatch.context() as wrong:
-        wrong.setattr(Deformer, "_with_exact_volume", explode)
+        wrong.setattr(Path, "_with_exact_volume", explode)
         missed = deformer.solve(X[[HIGH]] + 0.2 * UP)
         assert missed.status is Status.MISSED
         assert_allclose(missed.vertices, before.vertices, atol=1e-12)
@@ -269,7 +270,8 @@ def test_the_finish_of_a_pull_has_no_more_energy_than_its_start():
     solution = local.solve(x[[0]] + [0.0, 0.0, 0.1 * d])
     finished = local.finish(solution)
     before, after = (
-        local._cell_energy.value_and_slope(each.vertices)[0] for each in (solution, finished)
+        local._problem.cell_energy.value_and_slope(each.vertices)[0]
+        for each in (solution, finished)
     )
     assert after < before
     assert finished.status is Status.CONVERGED
@@ -278,7 +280,7 @@ def test_the_finish_of_a_pull_has_no_more_energy_than_its_start():
 
 def test_only_rings_that_would_bend_resist():
     deformer, d = coarse(), coarse().mesh.diagonal
-    plain = deformer._binding.energy
+    plain = deformer._problem.energy
     one = deformer.hold(handle=[0]).local(0, 0.3 * d, 0.075 * d)
     more = one._constraints.solver.energy.constant - plain.constant
     assert more > 0.0
@@ -290,7 +292,7 @@ def test_only_rings_that_would_bend_resist():
     regions = Regions.single(dense)
     fine = Deformer(dense, regions, fit_cages(dense, regions, 20))
     local = fine.hold(handle=[0]).local(0, 0.8 * d, 0.075 * d)
-    assert local._constraints.solver.energy is fine._binding.energy
+    assert local._constraints.solver.energy is fine._problem.energy
     far = deformer.hold(handle=[0, 217]).local(0, 0.3 * d, 0.075 * d)
     assert far._constraints.solver.energy.constant > plain.constant + 1.5 * more
 
@@ -393,7 +395,7 @@ def test_weights_grow_with_the_distance_to_the_largest_one():
 
 
 def test_a_point_of_an_edge_is_as_far_as_its_nearer_corner():
-    one = held()._samples
+    one = held()._problem.samples
     a, b = SCENE.mesh.edges[5]
     point = SurfacePoint.of([a, b], [0.3, 0.7])
     graph = one.edges
@@ -458,12 +460,12 @@ def test_sheets_that_face_the_same_way_are_joined_only_if_they_are_two_component
 
 
 def test_values_of_samples_are_smoothed_between_cells(monkeypatch):
-    own = held()._samples
+    own = held()._problem.samples
     values = np.sin(3.0 * own.points[:, 0])
     assert_allclose(own.smooth_at_vertices(values), values)
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    coarse = SCENE.deformer()._samples
+    coarse = SCENE.deformer()._problem.samples
     assert_allclose(coarse.smooth_at_vertices(np.ones(len(coarse.points))), 1.0)
     ids = np.arange(len(coarse.points)) % 2.0
     raw, smooth = ids[coarse.cells], coarse.smooth_at_vertices(ids)
@@ -478,14 +480,14 @@ def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
     deformer = SCENE.deformer()
-    samples, rest = deformer._samples, deformer._rest
+    samples, rest = deformer._problem.samples, deformer._problem.rest
     assert len(samples.points) < 100
     for cell in range(0, len(samples.points), 7):
         own = np.flatnonzero(samples.cells == cell)
         areas = rest.vertex_areas[own]
         assert_allclose(samples.points[cell], np.average(rest.vertices[own], axis=0, weights=areas))
         assert samples.areas[cell] == pytest.approx(areas.sum() / rest.vertex_areas.sum())
-    assert_allclose(samples.rows @ deformer._rest_cages, samples.points, atol=1e-6)
+    assert_allclose(samples.rows @ deformer._problem.rest_cages, samples.points, atol=1e-6)
     near = samples.edges.tocoo()
     expected = np.linalg.norm(samples.points[near.row] - samples.points[near.col], axis=1)
     assert_allclose(near.data, expected)
@@ -497,8 +499,8 @@ def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
 def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monkeypatch):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    samples = SCENE.deformer()._samples
-    surface, x = samples.contact_surface, SCENE.deformer()._rest.vertices
+    samples = SCENE.deformer()._problem.samples
+    surface, x = samples.contact_surface, SCENE.deformer()._problem.rest.vertices
     normals = surface.normals(samples.points)
     for cell, normal in enumerate(normals):
         over = (x[samples.cells == cell] - samples.points[cell]) @ normal
@@ -556,7 +558,9 @@ def test_a_point_is_pulled_alone_where_its_ring_may_not_resist(corners):
     near = np.setdiff1d(SCENE.mesh.adjacency[[HIGH]].indices, face)[0]
     local = held().hold(fixed=[near], handle=[HIGH]).local(point, 0.3 * D, 0.2 * D)
     solver, pulled = local._constraints.solver, local._constraints.pulled
-    assert solver.energy is local._binding.energy
+    assert solver.energy is local._problem.energy
     assert pulled.points == (point,)
     row = solver.positions.rows[pulled.places[0]]
-    assert_allclose(row @ local._rest_cages, point.at(local._rest.vertices), atol=1e-6)
+    assert_allclose(
+        row @ local._problem.rest_cages, point.at(local._problem.rest.vertices), atol=1e-6
+    )

@@ -17,7 +17,7 @@ from vtk_segdeform.mesh import Mesh, winding_number
 
 SCENE = sausage(2)
 DEFORMER = SCENE.deformer()
-MESH, CAGES = DEFORMER._rest, DEFORMER._rest_cages
+MESH, CAGES = DEFORMER._problem.rest, DEFORMER._problem.rest_cages
 BODY = np.array([True])
 
 
@@ -35,7 +35,7 @@ def gradients(interior: Interior, subspace=None) -> np.ndarray:
 
 def solid():
     """Return the energy inside alone, which is scaled by that of the surface."""
-    surface = DEFORMER._binding.energy
+    surface = DEFORMER._problem.energy
     nothing = replace(
         surface,
         quadratic=np.eye(len(CAGES)),

@@ -31,8 +31,8 @@ def fine(scene: Scene) -> tuple[Energy, np.ndarray, tuple[np.ndarray, ...]]:
     """Return the energy with a rotation for each vertex, the cages at rest, and the patches."""
     deformer = of_surface(scene)
     n = scene.mesh.n_vertices
-    patches = deformer._rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
-    return deformer._binding.energy, deformer._rest_cages, patches
+    patches = deformer._problem.rest.vertices, scene.regions.labels, np.ones(n, dtype=np.int64)
+    return deformer._problem.energy, deformer._problem.rest_cages, patches
 
 
 @functools.cache

@@ -22,7 +22,6 @@ from vtk_segdeform.files import open_regular, read_regular
 from vtk_segdeform.io import meshlab, read_polydata, write_mesh
 from vtk_segdeform.io.meshlab_project import read_project
 from vtk_segdeform.session.store import saved_view
-from vtk_segdeform.widgets.recording.reading import read_recording
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sparse files, pipes")
 POINTS = np.asarray(OCTAHEDRON[0], dtype=float)
@@ -30,7 +29,7 @@ MESHES = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtk", ".vtp", ".vtu
 MESHES += [".dae", ".x3d"] if meshlab.available() else []
 DOORS = {
     **dict.fromkeys(MESHES, read_polydata),
-    ".segdeform": sd.load_session, ".mlp": read_project, ".recording.txt": read_recording,
+    ".segdeform": sd.load_session, ".mlp": read_project,
     ".def": read_matrix, ".txt": lambda path: parse_selection(str(path), POINTS),
     ".sel": lambda path: parse_selection(str(path), POINTS, role="fixed"), ".jsonl": read_history,
     ".any": open_regular,
@@ -105,14 +104,14 @@ def test_a_file_of_a_gltf_file_is_not_read_if_it_is_too_large(tmp_path, key, cap
         assert "has 20 GB" in caplog.text
 
 
-@pytest.mark.parametrize("command", ["check", "edit", "deform", "serve", "replay", "pull"])
+@pytest.mark.parametrize("command", ["check", "edit", "deform", "serve", "pull"])
 def test_commands_refuse_such_files_in_one_line(tmp_path, capsys, command):
     path = tmp_path / "vast.ply"
     path.touch()
     os.truncate(path, 20_000_000_000)
     words = {
         "deform": ["-o", f"{path}.obj", "--fixed", "z<10%", "--handle", "z>90%"],
-        "replay": [str(path)], "pull": ["-o", f"{path}.obj", "--at", "0,0,0", "--to", "0,0,1"],
+        "pull": ["-o", f"{path}.obj", "--at", "0,0,0", "--to", "0,0,1"],
     }  # fmt: skip
     assert main([command, str(path), *words.get(command, [])]) == 1
     error = capsys.readouterr().err

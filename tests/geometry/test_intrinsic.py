@@ -196,7 +196,7 @@ def test_the_matrix_of_the_energy_is_positive_semidefinite(height):
 
 
 def scale(mesh):
-    return sd.Deformer(mesh, sd.Regions.single(mesh), clean(1)[2], handle=[0])._binding.energy.scale
+    return sd.Deformer(mesh, sd.Regions.single(mesh), clean(1)[2], handle=[0])._problem.energy.scale
 
 
 def test_bad_triangles_hardly_change_the_scale_of_the_energy():

@@ -8,7 +8,6 @@ import struct
 
 import numpy as np
 import pytest
-from hands import plain_view
 from solids import OCTAHEDRON
 
 import vtk_segdeform as sd
@@ -17,8 +16,7 @@ from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
 from vtk_segdeform.pictures import canvas
 from vtk_segdeform.pictures.pictures import picture_distortion
-from vtk_segdeform.widgets.recording.film_files import write_film
-from vtk_segdeform.widgets.recording.recording import Recorder
+from vtk_segdeform.widgets.films.film_files import write_film
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="modes, links and pipes of files")
 
@@ -26,18 +24,10 @@ MESH = sd.Mesh(*OCTAHEDRON)
 PICTURES = np.zeros((2, 8, 8, 3), dtype=np.uint8)
 
 
-def write_recording(path):
-    """Write an empty recording."""
-    recorder = Recorder(plain_view((40, 40)))
-    recorder.stop()
-    recorder.save(path)
-
-
 WRITERS = {
     "session.segdeform": lambda path: sd.save_session(path, sd.Session(MESH)),
     "film.gif": lambda path: write_film(path, PICTURES, 20.0),
     "picture.png": lambda path: picture_distortion(path, MESH, MESH.vertices, np.zeros(8)),
-    "work.recording.txt": write_recording,
     "project.mlp": lambda path: write_project(path, MESH),
     **{
         f"mesh{suffix}": lambda path: write_mesh(path, MESH)

@@ -122,7 +122,8 @@ def test_every_copy_and_step_has_the_same_finished_pose(tmp_path):
     session.history.jump(len(session.history.labels) - 1)
     assert_array_equal(session.vertices, second)
     assert_array_equal(
-        session.poses.peek(session.history.state_at(session.history.position - 1)), first
+        session.poses.peek(session.history.state_at(session.history.position - 1)),
+        first,
     )
     save_session(tmp_path / "posed", session)
     loaded = load_session(tmp_path / "posed")

@@ -76,7 +76,7 @@ def test_crossings_at_rest_do_not_count(through, fork):
     regions = sd.segment(crossed, 1)
     deformer = sd.Deformer(crossed, regions, sd.fit_cages(crossed, regions, 30), avoid_contact=True)
     contact = deformer._constraints.contact
-    assert contact.value_and_slope(deformer._rest_cages)[0] == 0.0
+    assert contact.value_and_slope(deformer._problem.rest_cages)[0] == 0.0
     assert not len(deformer.hold(handle=[0]).solve(crossed.vertices[[0]]).crossings())
 
 
@@ -107,7 +107,7 @@ def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, mon
 def test_on_a_way_into_contact_no_pair_is_missed(fork, through, compiled, monkeypatch):
     """The list of pairs, searched anew now and then, has every pair that is active."""
     deformer, end = fork[0], through[1]
-    contact, start = deformer._constraints.contact, deformer._rest_cages
+    contact, start = deformer._constraints.contact, deformer._problem.rest_cages
     monkeypatch.setattr(contact, "_listed", None)
     if not compiled:
         monkeypatch.setattr("vtk_segdeform.solver.contact.compiled_kernels", lambda: None)
@@ -252,7 +252,7 @@ def test_the_clearance_is_the_least_distance_of_samples_that_face_each_other():
 
 
 def test_with_and_without_compiled_kernels_the_same_pairs_are_listed(fork, through, monkeypatch):
-    contact, p = fork[0]._constraints.contact, 0.9 * through[1] + 0.1 * fork[0]._rest_cages
+    contact, p = fork[0]._constraints.contact, 0.9 * through[1] + 0.1 * fork[0]._problem.rest_cages
     y, slack = contact.surface.rows @ p, 2.5 * contact.surface.spacing
     listed = []
     for _ in range(2):

@@ -68,8 +68,7 @@ class Slow:
 def solver_with(deformer, *terms):
     """Give a deformer the solver with these terms."""
     own = deformer._constraints
-    deformer._constraints = replace(own, solver=replace(own.solver, terms=terms))
-    deformer.reset()
+    deformer._hold(replace(own, solver=replace(own.solver, terms=terms)))
     return deformer
 
 
@@ -89,7 +88,7 @@ def test_an_inactive_term_changes_no_bit(free):
 def test_a_term_limits_every_step():
     deformer = SCENE.held()
     own, start, limit = deformer._constraints, deformer._path.p, 0.01
-    targets = deformer._frame.inward(SCENE.turned(10))
+    targets = deformer._problem.frame.inward(SCENE.turned(10))
     solver, places = replace(own.solver, terms=(Slow(limit),)), own.places(targets)
     p, moves = start, []
     for _ in range(40):

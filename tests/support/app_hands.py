@@ -21,8 +21,8 @@ from scenes import sausage
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.app.autosave import Autosaves, Slot
 from vtk_segdeform.widgets.app.window import Window
+from vtk_segdeform.widgets.editor import Autosaves, Slot
 
 INTERVAL = 0.3  # seconds
 

@@ -27,7 +27,6 @@ from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import read_polydata
 from vtk_segdeform.io.meshlab_project import read_project
-from vtk_segdeform.widgets.recording.reading import read_recording
 
 SECONDS, MEMORY = 60, 2 << 30  # for each file, in addition to the memory in use
 MESH = sd.Mesh(*OCTAHEDRON)
@@ -36,7 +35,6 @@ READERS = {
     "surface": read_polydata,
     "session": sd.load_session,
     "project": read_project,
-    "recording": read_recording,
     "matrix": read_matrix,
     "selection": lambda path: parse_selection(path, MESH.vertices, role="handle"),
 }

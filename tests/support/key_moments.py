@@ -35,7 +35,6 @@ from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
 from vtk_segdeform.widgets.editor import finishing
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, DEFAULT_KEYS
 from vtk_segdeform.widgets.handle_dragger import live_solve
-from vtk_segdeform.widgets.recording.film import Film
 from vtk_segdeform.widgets.scene import draft, viewpoint
 from vtk_segdeform.widgets.scene.view import View
 
@@ -216,7 +215,6 @@ class Stand:
             pass
         self.session_before, self.start = self.session, self.session.state
         self.hand.failures.clear()  # of a failed test
-        controller.recordings.remove()
         controller.help.hide()
         controller.messages.clear()
         widgets.cages_wanted = widgets.overlay_wanted = False
@@ -364,24 +362,6 @@ class Stand:
         self._meanwhile("o", place, during=during, released=released)
         assert overlay.is_shown
 
-    def film_that_ends(self, *, during: bool) -> None:
-        """End a film, which a job then writes, during a drag."""
-        self.begin(Mode.DEFORM)
-        self.hand.types("ctrl+m")
-        place = self.drag(Mode.DEFORM)
-        self.draw()
-        before = set(self.folder.glob("work.film*"))
-        released, save = threading.Event(), Film.save
-
-        def save_after_release(*args, **named):  # as in `first_overlay`
-            assert released.wait(LONGEST)
-            save(*args, **named)
-
-        with pytest.MonkeyPatch.context() as slow:
-            slow.setattr(Film, "save", save_after_release)
-            self._meanwhile("ctrl+m", place, during=during, released=released)
-        assert len(set(self.folder.glob("work.film*")) - before) == 1
-
     def _meanwhile(
         self, key: str, place: np.ndarray, *, during: bool, released: threading.Event | None = None
     ) -> None:
@@ -413,7 +393,11 @@ class Stand:
         assert delivered == ["counted"] * (key != "escape")
         assert "Cancelled" in self.editor.status or key != "escape"
         assert self.session is session
-        assert (session.state, session.history.undo_label, session.history.redo_label) == before
+        assert (
+            session.state,
+            session.history.undo_label,
+            session.history.redo_label,
+        ) == before
 
 
 def same_places(story: Story, dragged: Story, diagonal: float) -> None:

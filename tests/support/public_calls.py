@@ -33,7 +33,7 @@ from vtk_segdeform.mesh.faults import Search, as_soup
 from vtk_segdeform.session.groups import Handles, Painting
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
-from vtk_segdeform.widgets.recording.film import Film
+from vtk_segdeform.widgets.films.film import Film
 from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 
 CORE = (
@@ -50,7 +50,7 @@ CORE = (
     "vtk_segdeform.widgets.plugin",
     "vtk_segdeform.io.repaired",
 )
-WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.recording.film")
+WIDGETS = ("vtk_segdeform.widgets", "vtk_segdeform.widgets.films.film")
 
 # Hooks that `Widget` calls with its own objects, and arithmetic of a view at every event.
 NOT_CALLED = {"on_press", "on_hover", "on_wheel", "on_key", "reset_pivot_at"}
@@ -272,7 +272,7 @@ def _widget(cls: type) -> Any:
     widgets = sd.widgets
     if cls is widgets.View:
         return view()
-    made_widgets.append(cls(view()) if cls is widgets.Recorder else cls(view(), shared_session()))
+    made_widgets.append(cls(view(), shared_session()))
     return made_widgets[-1]
 
 
@@ -284,9 +284,7 @@ def tidy() -> None:
 
 def remove(widget: Any) -> None:
     """Remove a widget from its view and stop what a call started; ignore anything else."""
-    if isinstance(widget, sd.widgets.Recorder):
-        widget.stop()
-    elif inspect.isroutine(widget):
+    if inspect.isroutine(widget):
         widget()
     elif type(widget).__module__.startswith("vtk_segdeform.widgets"):
         getattr(widget, "remove", lambda: None)()
@@ -381,7 +379,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
     "largest_hole": lambda: 10,
     "lids": lambda: None,
-    "limits": sd.widgets.ReplayLimits,
     "locked": lambda: True,
     "listener": lambda: lambda _change: None,
     "locality": lambda: 0.5,
@@ -467,7 +464,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "priority": lambda: 1.0,
     "scene": session,
     "skips": lambda: lambda _entry: False,
-    "source": lambda: list(sd.widgets.Recorder(view()).lines),
     "tag": lambda: 1,
     "title": lambda: "segdeform",
     "visible": lambda: True,
@@ -491,8 +487,6 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "HandleDragger.handle.value": lambda: "handle 1",
     "HandleDragger.local.value": lambda: True,
     "HandleDragger.refine_while_resting.value": lambda: False,
-    "Recorder.assign.keys": lambda: {"undo": ("u",)},
-    "Recorder.path": lambda: Path("events.txt"),
     "RegionSelector.radius.value": lambda: 0.1,
     "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
     "Handles.add.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],
@@ -579,7 +573,6 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "from_meshset.arrays": ("attribute",),
     "repair.faces": ("cannot be repaired",),
     "repair.vertices": ("cannot be repaired",),
-    "replay.source": ("recording",),
     "to_meshset.what": ("Mesh",),
     "write_project.what": ("Mesh",),
 }

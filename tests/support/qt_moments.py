@@ -7,6 +7,7 @@ import time
 from key_moments import Stand, aim, ready
 from qt_hands import QtCore, QtHand, application, until
 
+from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 from vtk_segdeform.widgets.scene.view import View
 
@@ -42,6 +43,8 @@ class QtStand(Stand):
         View.render(self.editor.view)
 
     def begin(self, mode):
+        for dialog in self.widget.findChildren(KeysDialog):
+            dialog.reject()
         super().begin(mode)
         self.widget.plotter.setFocus()  # Tab moves the focus
 

@@ -8,13 +8,19 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
+import msgpack
 import pytest
+from aiohttp import ClientSession
 from chromium import Chromium, Page
+from wslink.chunking import generate_chunks
 
 T = TypeVar("T")
+HELLO = {"id": "system:c0:0", "method": "wslink.hello", "args": [{"secret": "wslink-secret"}]}
+STATE = {"id": "rpc:c0:9", "method": "trame.state.get", "args": []}
 _SHOWN = "Number(document.querySelector('canvas')?.dataset.number) > 0"
 _STEPS = "document.querySelectorAll('.sd-history .sd-row').length"
 _WORK = "!!document.querySelector('.sd-work, .sd-progress')"
@@ -152,3 +158,40 @@ def rested(page: Page) -> None:
         if page.evaluate(_WORK):
             since = time.monotonic()
         time.sleep(0.05)
+
+
+def call(method: str, *args: Any, **more: Any) -> dict[str, Any]:
+    return {"id": "rpc:c0:1", "method": method, "args": [*args], **more}
+
+
+@asynccontextmanager
+async def connected(url: str, *, enters: bool = True):
+    """Connect as a page; yield a function that sends a message, and one that returns all answers.
+
+    It sends `STATE` and waits for that answer, too, so the connection still works.
+    """
+    async with ClientSession() as session, session.ws_connect(url) as socket:
+
+        async def send(message):
+            if isinstance(message, str):
+                await socket.send_str(message)
+            else:
+                data = message if isinstance(message, bytes) else msgpack.packb(message)
+                await socket.send_bytes(b"".join(generate_chunks(data, 0)))
+
+        async def answers():
+            await send(STATE)
+            found = []
+            while True:
+                data = (await socket.receive(20)).data
+                assert isinstance(data, bytes), (data, socket.close_code)
+                answer = msgpack.unpackb(data[12:])
+                if answer["id"] == STATE["id"]:
+                    return found
+                if not str(answer["id"]).startswith("publish:"):
+                    found.append(answer)
+
+        if enters:
+            await send(HELLO)
+            assert "error" not in (await answers())[0]
+        yield send, answers

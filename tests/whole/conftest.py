@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vtk_segdeform.deformer import deformer
+from vtk_segdeform.deformer import problem
 from vtk_segdeform.regions import segmentation
 
 
@@ -41,7 +41,7 @@ def segmented_once() -> Iterator[None]:
 def bound_once_in_memory() -> Iterator[None]:
     """Bind equal meshes, regions and cages once, unless in a folder or with reports of progress."""
     known: dict[str, Any] = {}
-    bind = deformer.cached_binding
+    bind = problem.cached_binding
 
     def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
         if folder is not None or progress is not None:
@@ -52,5 +52,5 @@ def bound_once_in_memory() -> Iterator[None]:
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(deformer, "cached_binding", bound)
+        patch.setattr(problem, "cached_binding", bound)
         yield

@@ -30,9 +30,9 @@ ROOMS = [
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
     "finish", "deformer", "io", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
-    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.recording",
+    "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.films",
     "widgets.editor", "widgets.panel", "widgets.hosting",
-    "widgets.web.drawing", "widgets.web.serving", "widgets.web",
+    "widgets.web.drawing", "widgets.web",
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
@@ -43,6 +43,7 @@ NUMERIC = {"numpy", "scipy"}
 VTK = {"vtkmodules"}
 # Libraries beyond numpy and scipy, by file or by room.
 GRANTED = {
+    "files.folders": {"platformdirs"},
     "kernels.threads": {"threadpoolctl"},
     "kernels.compiled.kernels": {"numba"},
     "cages.contour": VTK,
@@ -77,17 +78,17 @@ GRANTED = {
     "widgets.web.transfer": {"aiohttp"},
     "widgets.web.notebook": {"IPython", "pyvista"},
     "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server", "wslink"},
-    "widgets.web.serving": {"aiohttp", "yarl"},
+    "widgets.web.access": {"aiohttp"},
+    "widgets.web.serving": {"aiohttp"},
     "benchmarks.charts": {"matplotlib"},
     "benchmarks.experiments": {"pyvista"},
     "benchmarks.programs": {"igl", "open3d", "bpy"},
     "cli.application": {"qtpy"},
     "cli.outputs": {"pyvista"},
-    "cli.replaying": {"pyvista"},
 }
 
 MAY_PRINT_AND_EXIT = {
-    "cli.main", "__main__", "filters.paraview_plugin", "io.reading_child", "widgets.web.client",
+    "cli.main", "__main__", "filters.paraview_plugin", "io.reading_child",
 }  # fmt: skip
 LONGEST = 400
 FILES = {
@@ -413,7 +414,6 @@ def test_scipy_starts_no_threads():
 START_PROCESSES = {
     "interpreter", "benchmarks.chromium", "benchmarks.history", "cli.application", "io.confined",
     "kernels.compilation", "pictures.canvas",
-    "widgets.web.serving.client",
 }  # fmt: skip
 
 
@@ -432,11 +432,11 @@ def test_python_processes_are_started_in_one_way():
     )
 
 
-# They write to a draft from their caller, or to the growing log of a recording.
+# They write to a draft from their caller.
 WRITE_DIRECTLY = {
     "io.gltf.writing", "io.off", "io.ply", "io.stl", "io.wavefront", "io.vtk_formats",
     "io.reading_child",
-    "widgets.recording.film_files", "widgets.recording.recording",
+    "widgets.films.film_files",
 }  # fmt: skip
 REPLACING = {
     "os.replace", "os.rename", "os.renames", "os.link", "shutil.move", "tempfile.mkstemp",

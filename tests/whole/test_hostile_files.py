@@ -34,14 +34,6 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and 
 
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
-RECORDING = """vtk_segdeform recording 1
-0.0 Window 400 300
-0.1 Camera position 0 0 5 focus 0 0 0 up 0 1 0 angle 30 parallel 0 scale 1 range 0.1 100
-0.2 MouseMove 10 20
-0.3 LeftButtonPress 10 20 shift
-0.4 KeyPress 10 20 key=g code=103
-0.5 Timer 3
-"""
 STRIPS = """ply
 format ascii 1.0
 element vertex 4
@@ -105,7 +97,6 @@ def originals(folder, foreign=FOREIGN):
     write_project(folder / "sound.mlp", mesh)
     files.append(("project", folder / "sound.mlp"))
     for name, text, reader in [
-        ("sound.recording.txt", RECORDING, "recording"),
         ("sound.def", MATRIX, "matrix"),
         ("sound.sel", "0 0 1 1 2 2\n", "selection"),
         ("ids.txt", "0, 1 2 # three of them\n5\n", "selection"),

@@ -82,24 +82,6 @@ def test_benchmarks_run_elsewhere(downloads):
     assert os.getcwd() == str(downloads)
 
 
-@pytest.mark.campaign
-def test_an_editor_in_the_browser_is_started_elsewhere(request):
-    client = pytest.importorskip("vtk_segdeform.widgets.web.serving.client")
-    pytest.importorskip("trame")
-    request.getfixturevalue("downloads")
-    done = subprocess.run(
-        [*client.client_command(None), "--help"], env=python_environment(), capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
-    assert "--upload-limit" in done.stdout, done.stderr
-
-
-def test_an_editor_in_the_browser_has_that_command(tmp_path):
-    client = pytest.importorskip("vtk_segdeform.widgets.web.serving.client")
-    file = str(tmp_path / "a.ply")
-    assert client.client_command(tmp_path / "a.ply") == python_command(client._RUN, file)
-
-
 def test_an_application_without_interpreter_starts_no_process(monkeypatch):
     monkeypatch.setattr(interpreter.spawn, "get_executable", lambda: "/opt/editor/bin/editor")
     monkeypatch.setattr(subprocess, "run", None)

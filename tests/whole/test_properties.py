@@ -178,7 +178,7 @@ def test_the_volume_is_exact_for_any_targets(move, degrees, axis):
     assert np.isfinite(solution.vertices).all()
     assert abs(now - rest) <= 1e-12 * rest
     # Near rest the objective is the difference of two sums as large as its constant.
-    rounding = 2e-13 * deformer._binding.energy.constant
+    rounding = 2e-13 * deformer._problem.energy.constant
     assert all(
         b <= a * (1 + 1e-12) + rounding
         for a, b in zip(solution.merits, solution.merits[1:], strict=False)

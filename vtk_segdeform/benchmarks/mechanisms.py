@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray
-from ..deformer import Deformer
+from ..deformer import Deformer, Problem
 from ..energy import Factor, full_factor
 from ..mesh import Mesh, SurfacePoint
 from ..models import cactus, random_limbs
@@ -38,7 +38,7 @@ from .sections import Cell, Section, Table
 _DRAGS, _PULLS, _SECOND = ("handle", "pull"), ("pull", "second"), ("second",)
 _EVERY, _SHAPE, _BEND = (*_DRAGS, "bend"), (*_DRAGS, "twist", "bend"), ("bend",)
 _PACKAGE = __name__.partition(".")[0]
-_DEFORMER, _SOLVER = "deformer.deformer:Deformer", "solver.gauss_newton:GaussNewton"
+_PROBLEM, _SOLVER = "deformer.problem:Problem", "solver.gauss_newton:GaussNewton"
 _LIMIT = 8  # steps of a frame, as the widgets take on a machine that is not busy
 _TURN = 0.5 * np.pi
 _TWIST = np.radians(np.arange(5.0, 275.0, 5.0))
@@ -113,8 +113,8 @@ def _without_volumes(*given: Any, added: FloatArray | None = None, **_: object) 
     return full_factor(*given, added=added)
 
 
-def _no_quadratic(deformer: Deformer, *_: object) -> FloatArray:
-    return np.zeros_like(deformer._binding.energy.quadratic)
+def _no_quadratic(problem: Problem, *_: object) -> FloatArray:
+    return np.zeros_like(problem.energy.quadratic)
 
 
 MECHANISMS = (
@@ -152,15 +152,15 @@ MECHANISMS = (
     ),
     Mechanism(
         "anchors of loose parts", "weak springs on parts without handles",
-        _DEFORMER, "_of_loose_parts", _no_quadratic, (*_EVERY, *_SECOND),
+        _PROBLEM, "anchors_of_loose_parts", _no_quadratic, (*_EVERY, *_SECOND),
     ),
     Mechanism(
         "waypoints", "a far motion goes through intermediate targets",
-        _DEFORMER, "_way_to", lambda *_: iter(()), _BEND,
+        "deformer.path:Path", "_way_to", lambda *_: iter(()), _BEND,
     ),
     Mechanism(
         "rings", "the neighbours of a pulled point resist a spike",
-        _DEFORMER, "_with_rings", lambda self, *_: self._binding.energy, _PULLS,
+        "deformer.local", "_with_rings", lambda _, __, solver: solver.energy, _PULLS,
     ),
     Mechanism(
         "load at the press", "forces that are not in balance remain as a constant load",
@@ -184,7 +184,7 @@ MECHANISMS = (
     ),
     Mechanism(
         "proximal weight", "the finish keeps long waves where the cages found them",
-        _DEFORMER, "_cage_weights",
+        _PROBLEM, "cage_weights",
         property(lambda self: np.zeros(self.mesh.n_vertices)), _BEND,
     ),
 )  # fmt: skip

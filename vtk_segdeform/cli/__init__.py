@@ -17,7 +17,6 @@ The files, in reading order:
     serving         ``segdeform serve``
     interactive     ``segdeform bench --interactive``
     opening         ``segdeform bench --interactive --open``
-    replaying       ``segdeform replay``
     progress_bar    progress bar in the terminal
 """
 

@@ -23,8 +23,8 @@ from ..models import cactus
 from ..progress import Progress, part
 from ..regions import segment
 from ..session import Change, Session
+from ..widgets.films import OffScreen
 from ..widgets.handle_dragger import HandleDragger
-from ..widgets.recording import OffScreen
 from ..widgets.scene import Phase
 from ..widgets.volume_overlay import VolumeOverlay
 from .demo import bent_top

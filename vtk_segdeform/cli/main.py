@@ -45,7 +45,6 @@ COMMANDS = {
     "edit": "commands",
     "app": "application",
     "serve": "serving",
-    "replay": "replaying",
     "check": "checking",
     "subdivide": "subdividing",
     "regions": "commands",
@@ -64,12 +63,6 @@ selections (SEL):
   z>80%&x<10%      points in both selections
 """
 
-_REPLAYS = """\
-Recordings may come from untrusted sources: recorded keys read and write files only in --folder,
-and a replay that exceeds --events, --seconds or a window of 16 million pixels stops with exit
-code 1.
-"""
-
 _EXAMPLES = """\
 examples:
   segdeform demo -o demo-output
@@ -83,7 +76,6 @@ examples:
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
-  segdeform replay horse.recording.txt horse.recording.segdeform --film bug.gif
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
@@ -295,18 +287,6 @@ def _parser() -> argparse.ArgumentParser:
 
     _serve(add_command("serve", "deform a mesh in the browser"))
 
-    sub = add_command("replay", "replay a recording made with Ctrl+R", _REPLAYS)
-    sub.add_argument("recording", type=Path, metavar="RECORDING", help="NAME.recording.txt")
-    _input_output(sub, "the deformed mesh at the end", session=True)
-    text = "film the replay, off-screen, to a .gif or .mp4 file"
-    sub.add_argument("--film", type=Path, metavar="OUT", help=text)
-    text = "folder for files that recorded keys save; by default, saving fails"
-    sub.add_argument("--folder", type=Path, metavar="FOLDER", help=text)
-    text = "limit on events and timer ticks (default: 200000)"
-    sub.add_argument("--events", type=_count, default=200_000, metavar="N", help=text)
-    text = "time limit in seconds (default: 300)"
-    sub.add_argument("--seconds", type=_count, default=300, metavar="S", help=text)
-
     sub = add_command("check", "report how a surface can be deformed; optionally repair it")
     _input_output(sub, "the repaired mesh; requires --repair")
     sub.add_argument("--json", action="store_true", help="report as JSON")
@@ -340,14 +320,8 @@ def _serve(parser: argparse.ArgumentParser) -> None:
     text = "address to listen on (default: 127.0.0.1, this machine only)"
     add("--host", default="127.0.0.1", metavar="HOST", help=text)
     add("--open", action="store_true", help="open the page in the browser")
-    text = "maximum number of clients, each in its own process (default: 4)"
-    add("--clients", type=_count, default=4, metavar="N", help=text)
     text = "maximum size of an upload (default: 500)"
     add("--upload-limit", type=_count, default=500, metavar="MB", help=text)
-    text = "memory limit of each client; Linux only (default: 4000)"
-    add("--memory", type=_count, default=4000, metavar="MB", help=text)
-    text = "time to keep a client after its page is closed (default: 600)"
-    add("--keep", type=_count, default=600, metavar="SECONDS", help=text)
 
 
 def _bench(parser: argparse.ArgumentParser) -> None:

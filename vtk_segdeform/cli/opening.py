@@ -42,7 +42,7 @@ from ..pictures import require_offscreen
 from ..progress import Progress, tell
 from ..session import Session
 from ..widgets import DeformEditor, Mode
-from ..widgets.recording import OffScreen
+from ..widgets.films import OffScreen
 from ..widgets.scene import Phase, Pointer
 
 _SIZE = (800, 600)  # window size in pixels

@@ -3,8 +3,12 @@
 The files, in reading order:
 
     deformer         `Deformer`: targets in, `Solution` out
+    problem          the mesh, its cages and its energy, made once
+    enclosed_volume  the volume under its lids, and what of it is preserved
     constraints      fixed vertices, handles and volumes, made once for a set of them
-    path             the last pose, and what the next solve continues with
+    path             the last pose, and how the next one is reached from there
+    local            constraints that move the surface near a grabbed point only
+    finishing        what a finish is given
     frame            the coordinates in which a mesh is deformed
     arguments        checks of its arguments
     locality         what stays when one point is pulled
@@ -36,6 +40,7 @@ from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
+from .problem import Problem
 from .pull import pull
 
 __all__ = [
@@ -45,6 +50,7 @@ __all__ = [
     "Deformer",
     "PaperDeformer",
     "PaperSolution",
+    "Problem",
     "automatic_locality",
     "checked_constraints",
     "checked_locality",

@@ -4,9 +4,9 @@
     minimise  E(p) + sum_i omega_i |x_i - u_i|^2                                        (20)
     subject to  V(x) = V_0, or the same for every region                                (8), (9)
 
-    mesh, regions, cages  ->  W~, E             `binding.Binding`, once
-    fixed, handle         ->  H = L L^T         `gauss_newton.GaussNewton`, once per set of handles
-    targets               ->  p                 `Deformer.solve`, at every motion of the mouse
+    mesh, regions, cages  ->  W~, E             `problem.Problem`, once
+    fixed, handle         ->  H = L L^T         `constraints.Constraints`, once per set of handles
+    targets               ->  p                 `path.Path`, at every motion of the mouse
 
 A solve does the following; `gauss_newton` has the steps.
 
@@ -25,104 +25,52 @@ Long because every option of the method is explained in the docstring of `Deform
 from __future__ import annotations
 
 import itertools
-import math
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from types import EllipsisType
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
 
-from .. import sizes
-from ..arrays import BoolArray, FloatArray, IntArray, is_number
+from ..arrays import FloatArray, IntArray, is_number, largest_length
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
-from ..energy import Energy, with_rotating_rows
 from ..errors import ArgumentError, ConstraintError
-from ..finish import CellEnergy, Finisher
-from ..freezing import read_only
-from ..geometry import Lids, lids_of, turned_over
+from ..geometry import turned_over
 from ..kernels import compiled_kernels, load_for, one_blas_thread
-from ..mesh import Mesh, SurfacePoint, connected, new_crossings, require_mesh
+from ..mesh import Mesh, SurfacePoint, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
-from ..solver import (
-    CONVERGED,
-    LONGEST_MOVE,
-    Anchors,
-    Bodies,
-    Contact,
-    GaussNewton,
-    ScaledSurface,
-    Solution,
-    SolverOptions,
-    SolverResult,
-    Status,
-    Term,
-    VolumeConstraint,
-    Volumes,
-    are_met,
-    connected_sets,
-    errors_at,
-    moved_along,
-    position_term,
-    region_volumes,
-    steps_to_volume,
-    total_volume,
-    waypoints,
-)
+from ..solver import CONVERGED, Solution, SolverOptions, Status, VolumeConstraint, Volumes
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
     as_lids,
     check_distance,
     check_options,
-    checked_constraints,
     checked_place,
     checked_targets,
     require_together,
     stacked_cages,
 )
 from .as_printed import PaperDeformer
-from .binding import BindingInputs
-from .binding_cache import cached_binding
-from .constraints import Constraints, HandlePoint, Preserved, PulledPoints
-from .frame import Frame
-from .locality import Ring, SurfaceSamples
-from .path import Path
+from .constraints import Constraints, HoldOptions
+from .enclosed_volume import EnclosedVolume
+from .finishing import finish_of
+from .local import near_point
+from .path import Path, Pose
+from .problem import Problem
 
-_POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
-_ANCHOR_WEIGHT = 90.0  # kappa of a local deformer, times the same scale; see `locality`
-_WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
-_SOLVES_PER_SCALING = 4  # at most
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
-_SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
-_VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
 _SEEN = 10_000  # vertices, of which this is checked
-_SCALED = 3e-5  # relative scale from which another solve follows
-_ROUNDING = 1e-7  # relative scale that counts as rounding
-_VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
 _MET = 1e-3  # position error, in diagonals, below which a target is met
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
-_CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
-_LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
-_FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
-_BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
-_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
 _BOUND = 0.95  # of the progress bar, before the trial step
-# l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
-# four bodies is 1.5 times that of as-rigid-as-possible, with 2, 1.3 times; poses of a dog are 2 %
-# farther from the true ones.
-_SPACINGS = 2.0
-_STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
-_NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
 class Deformer:
@@ -179,11 +127,6 @@ class Deformer:
         If *progress* raised it.
     """
 
-    _lids: Lids
-    _total_volume: VolumeConstraint
-    _bodies: Bodies
-    _known_volumes: dict[bytes | bool, Preserved]
-    _constraints: Constraints
     _path: Path
 
     @one_blas_thread()
@@ -211,29 +154,25 @@ class Deformer:
         cages = all_of(cages, Cage, "cages")
         check_options(stretch, rotation_groups)
         load_for(mesh.n_vertices)
-        self._options = SolverOptions(tolerance, max_steps)
-        self._preserve_volume = as_flag(preserve_volume, "preserve_volume")
-        self._preserve_region_volumes = as_flag(preserve_region_volumes, "preserve_region_volumes")
-        self._avoid_contact = as_flag(avoid_contact, "avoid_contact")
-        self._lids_option = as_lids(lids)
-        folder = None if cache is None else as_path(cache, "cache")
-
-        self.mesh, self.regions, self.cages = mesh, regions, cages
-        self._frame = Frame.of(mesh.vertices)
-        self._rest = mesh.with_vertices(self._frame.inward(mesh.vertices))
-        inside = [self._frame.inward(cage.vertices) for cage in cages]
-        self._rest_cages = np.concatenate([_NO_POINTS, *inside])
-        inputs = BindingInputs(
-            self._rest, regions, cages, self._rest_cages, stretch, rotation_groups
+        self._limits = SolverOptions(tolerance, max_steps)
+        self._options = HoldOptions(
+            preserve_volume=as_flag(preserve_volume, "preserve_volume"),
+            preserve_region_volumes=as_flag(preserve_region_volumes, "preserve_region_volumes"),
+            avoid_contact=as_flag(avoid_contact, "avoid_contact"),
+            lids=as_lids(lids),
         )
-        self._binding = cached_binding(inputs, folder, part(progress, 0.0, _BOUND))
-
-        at_origin = self._frame.about_origin(mesh.vertices)
-        self._rest_pose = mesh.with_vertices(at_origin) if self._frame.is_far else mesh
-        self._enclose()
-        of_component, _ = self._linked_parts
-        self._samples = SurfaceSamples.of(self._rest, self._binding.coarse_volume, of_component)
-        self._constrain(fixed, handle)
+        self.mesh, self.regions, self.cages = mesh, regions, cages
+        self._problem = Problem.of(
+            mesh,
+            regions,
+            cages,
+            stretch=stretch,
+            rotation_groups=rotation_groups,
+            cache=None if cache is None else as_path(cache, "cache"),
+            progress=part(progress, 0.0, _BOUND),
+        )
+        self._enclosed = EnclosedVolume.under(self._problem, self._options.lids)
+        self._hold(Constraints.of(self._enclosed, self._options, fixed=fixed, handle=handle))
         if compiled_kernels(mesh.n_vertices):
             tell(progress, _BOUND, "taking a trial step")
             self._take_trial_step()
@@ -269,19 +208,21 @@ class Deformer:
         ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
         *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
+        flags = {
+            "preserve_volume": preserve_volume,
+            "preserve_region_volumes": preserve_region_volumes,
+            "avoid_contact": avoid_contact,
+        }
+        given = {name: as_flag(flag, name) for name, flag in flags.items() if flag is not None}
+        options = replace(self._options, **given)
         other = self._shared()
-        if preserve_volume is not None:
-            other._preserve_volume = as_flag(preserve_volume, "preserve_volume")
-        if preserve_region_volumes is not None:
-            other._preserve_region_volumes = as_flag(
-                preserve_region_volumes, "preserve_region_volumes"
-            )
-        if avoid_contact is not None:
-            other._avoid_contact = as_flag(avoid_contact, "avoid_contact")
-        if lids is not ... and as_lids(lids) is not self._lids_option:
-            other._lids_option = as_lids(lids)
-            other._enclose()
-        other._constrain(fixed, handle, fixed_at)
+        if lids is not ... and as_lids(lids) is not options.lids:
+            options = replace(options, lids=as_lids(lids))
+            other._enclosed = EnclosedVolume.under(self._problem, options.lids)
+        other._options = options
+        other._hold(
+            Constraints.of(other._enclosed, options, fixed=fixed, handle=handle, places=fixed_at)
+        )
         return other
 
     @one_blas_thread()
@@ -321,82 +262,12 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
-        near = point, float(reach) / self._frame.size, follows
-        weight = _ANCHOR_WEIGHT * self._binding.energy.scale
-        quadratic = weight * self._samples.quadratic(*near) + self._of_loose_parts()
-        before, p = self._constraints.solver, self._path.p
-        anchors = Anchors(quadratic, p, np.zeros_like(p))
-        handles = self._points_of_handles(point)
-        own_rows = np.array([self._row_of(each.point) for each in handles])
-        own_rows = own_rows.reshape(-1, self.subspace.n_columns)
-        targets = np.array([each.target for each in handles], dtype=np.int64)
-        pulled = PulledPoints(
-            places=np.array([each.place for each in handles], dtype=np.int64),
-            targets=targets,
-            points=tuple(each.point for each in handles),
-            levers=(own_rows - self.subspace.at(self.handle[targets])) @ p,
-            spread=spread,
+        near = near_point(
+            self._path, point, reach=float(reach), spread=float(spread), follows=float(follows)
         )
-        rows = before.positions.rows.copy()
-        rows[pulled.places] = own_rows
-        positions = before.positions.local(rows, anchors)
-        solver = replace(before, positions=positions)
-        energy = self._with_rings(pulled, own_rows, solver)
-        solver = replace(solver, energy=energy)
-        load = solver.unbalanced(p, pulled.moved(self._constraints.places(self._path.targets)))
-        least = _FIRM * energy.scale
-        is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
-        steady = solver.steadying(p, least) if is_loaded else 0.0
-        anchors = Anchors(quadratic + steady * energy.mass, p, load)
-        solver = replace(solver, positions=positions.local(rows, anchors))
         other = self._shared()
-        keeps = self._samples.weights(*near)
-        for each in pulled.points:
-            keeps[self._samples.distances(each) < spread / self._frame.size] = np.inf
-        other._constraints = replace(self._constraints, solver=solver, pulled=pulled, keeps=keeps)
-        other._begin(p, self._path.targets)
+        other._path = Path.begin(near, self._path.p, self._path.targets)
         return other
-
-    def _points_of_handles(self, point: SurfacePoint) -> list[HandlePoint]:
-        """Return the points that handles of one vertex move, and *point* if its vertex is alone."""
-        found, set_of = [], self._constraints.solver.positions.set_of
-        for number, ids in enumerate(self._constraints.handles):
-            places = np.flatnonzero(set_of == number)
-            for place, target in zip(places, ids, strict=False):
-                vertex = int(self.handle[target])
-                is_grabbed = vertex == point.vertex and len(places) == len(ids)
-                own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
-                if len(ids) == 1 or not own.is_vertex:
-                    found.append(HandlePoint(int(place), int(target), own))
-        return found
-
-    def _row_of(self, point: SurfacePoint) -> FloatArray:
-        """Return the row of W~ of *point*, (m,)."""
-        return np.asarray(np.array(point.shares) @ self.subspace.at(np.array(point.corners)))
-
-    def _with_rings(
-        self, pulled: PulledPoints, own_rows: FloatArray, solver: GaussNewton
-    ) -> Energy:
-        """Return the energy of *solver* with the rings of points that it would pull as spikes.
-
-        *own_rows* (q, m) are those of the points; see `locality`.
-        """
-        energy = self._binding.energy
-        held = np.concatenate([self.fixed, self.handle])
-        solver = replace(solver, energy=energy)
-        far = _FAR_PULL * self.mesh.diagonal / self._frame.size
-        most = _ANCHOR_WEIGHT * energy.scale
-        for point, row in zip(pulled.points, own_rows, strict=True):
-            ring = Ring.around(self.mesh, self._rest.vertices, point)
-            if ring is None or np.isin(ring.vertices, held[held != point.vertex]).any():
-                continue
-            rows = ring.combinations @ self.subspace.at(ring.vertices)
-            (own, both), (_, offset) = solver.compliance(np.stack([row, rows[0]]))
-            excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
-            if excess > 0.0:
-                strength = most * excess / max(excess, most * (offset - both * both / own))
-                energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
-        return energy
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
@@ -416,9 +287,6 @@ class Deformer:
             vars(self).update(vars(before))
             raise
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state | {name: read_only(state[name]) for name in ("fixed", "handle")})
-
     def _shared(self) -> Deformer:
         """Return another deformer that shares all parts with this one."""
         other = object.__new__(type(self))
@@ -426,14 +294,28 @@ class Deformer:
         return other
 
     @property
+    def _constraints(self) -> Constraints:
+        return self._path.constraints
+
+    @property
+    def fixed(self) -> IntArray:
+        """Vertices that stay in place, (f,)."""
+        return self._constraints.fixed
+
+    @property
+    def handle(self) -> IntArray:
+        """Vertices that follow targets, (k,)."""
+        return self._constraints.handle
+
+    @property
     def subspace(self) -> Subspace:
         """W~; ``subspace.map`` computes mesh vertices from stacked cage vertices."""
-        return self._binding.energy.subspace
+        return self._problem.subspace
 
     @property
     def has_volume(self) -> bool:
         """Whether the mesh encloses a volume, with its lids if it is open."""
-        return self._total_volume.has_volume
+        return self._enclosed.total.has_volume
 
     @property
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -457,14 +339,12 @@ class Deformer:
 
         For many poses keep the `passengers`: most of the time is spent on binding the points.
         """
-        p = self._frame.outward(self._path.p)
-        return self.passengers(points).moved([p[columns] for columns in self.subspace.columns])
+        return self.passengers(points).moved(self._problem.cages_in_scene(self._path.p))
 
     @one_blas_thread()
     def surface(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the mesh (n, 3) with its cages at *cage_vertices*, (m_r, 3) each: x = W~ p."""
-        offsets = stacked_cages(self.cages, cage_vertices) - self._frame.centre
-        return self._frame.in_scene(self._map(offsets))
+        return self._problem.frame.in_scene(self._problem.map(self._inward(cage_vertices)))
 
     @one_blas_thread()
     def rotations(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
@@ -472,17 +352,16 @@ class Deformer:
 
         These are the rotations of the shape energy, blended smoothly.
         """
-        p = stacked_cages(self.cages, cage_vertices) - self._frame.centre
-        return self._binding.energy.vertex_rotations(p / self._frame.size)
+        return self._problem.energy.vertex_rotations(self._inward(cage_vertices))
 
     def reset(self) -> None:
         """Return to rest: the next solve starts from there."""
-        self._begin(self._rest_cages, self._rest.vertices[self.handle])
+        self._hold(self._constraints)
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Continue from an earlier pose: its `Solution.cage_vertices` and its targets."""
-        p = self._frame.inward(stacked_cages(self.cages, cage_vertices))
-        self._begin(p, self._frame.inward(checked_targets(targets, len(self.handle))))
+        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        self._path = Path.begin(self._constraints, self._inward(cage_vertices), goal)
 
     @one_blas_thread()
     def solve(
@@ -514,9 +393,9 @@ class Deformer:
             If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
             from the mesh or from the fixed vertices, that it must be in another unit.
         """
-        goal = self._frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
         check_distance(goal)
-        require_together(self._rest, goal, self._constraints.fixed_box)
+        require_together(self._problem.rest, goal, self._constraints.fixed_box)
         before = self._path.copy()
         with nullcontext() if progress is None else self.restoring():
             solution = self._solve(goal, max_steps, _counting(progress))
@@ -560,455 +439,121 @@ class Deformer:
             If *solution* is not a pose of the last solve.
         """
         require(solution, Solution, "solution")
-        frame, cages = self._frame, [each.shape for each in solution.cage_vertices]
+        frame, cages = self._problem.frame, [each.shape for each in solution.cage_vertices]
         if cages != [cage.vertices.shape for cage in self.cages] or not (
-            _largest(np.concatenate(solution.cage_vertices) - frame.outward(self._path.p))
+            largest_length(np.concatenate(solution.cage_vertices) - frame.outward(self._path.p))
             <= _SAME * frame.size
         ):
             raise ArgumentError("solution is not the pose of the last solve; resume it first")
-        held = np.zeros(self.mesh.n_vertices, dtype=bool)
-        held[self.fixed] = held[self.handle] = True
-        in_faces = [each for each in self._constraints.pulled.points if not each.is_vertex]
-        held[[each.vertex for each in in_faces]] = False
-        places = np.array(self._rest_pose.vertices)
-        places[self.fixed] = frame.about_origin(self._constraints.fixed_at)
-        places[self.handle] = frame.about_origin(frame.outward(self._path.targets))
         unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
         pose = start = frame.about_origin(unfinished)
         if solution.is_finished:
             start = frame.about_origin(solution.vertices)
-        keeps = self._constraints.keeps
-        if keeps is not None:
-            away = self._samples.smooth_at_vertices(np.minimum(np.sqrt(keeps / _STAYS), 1.0))
-            stays = ((away == 1.0) | self._is_near_pulled_points()) & ~held
-            places[stays] = pose[stays]
-            held |= stays
-            self._place_points(places, stays)
-        given = self._rest_pose, self._cell_energy, held, self.preserved_volumes
-        finisher = Finisher(*given, self._cage_weights, progress, avoid_contact=self._avoid_contact)
-        found = finisher.run(pose, places[held], progress, start=start)
-        # Without enough free vertices exact handles and exact volumes exclude each other.
-        off = [abs(each.relative(found.vertices)) for each in self.preserved_volumes]
-        if max(off, default=0.0) > _VOLUME_KEPT:
-            found = replace(found, vertices=start)
+        found = finish_of(self._path, pose, start, progress)
         is_start = found.vertices is start
         if is_start and not solution.is_finished:
             return solution
-        remaining = found.remaining / self.mesh.diagonal
         finished = replace(
             solution,
             vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
             steps=solution.steps + found.steps,
             merits=found.merits,
-            errors=partial(self._errors, self._path.targets),
-            volume=partial(self._total_volume.relative, found.vertices),
-            region_volumes=self._region_volume_changes,
-            remaining=remaining,
+            errors=partial(self._constraints.errors, self._path.targets),
+            volume=partial(self._enclosed.total.relative, found.vertices),
+            region_volumes=self._enclosed.changes_of_regions,
+            remaining=found.remaining / self.mesh.diagonal,
             unfinished=unfinished,
             unmoved=self._constraints.unmoved,
         )
         return replace(finished, status=self._missed_status if _is_off(finished) else found.status)
 
-    def _is_near_pulled_points(self) -> BoolArray:
-        """Return which vertices are within the spread of pulled points, or next to these, (n,).
+    def _inward(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
+        """Return the *cage_vertices* of all cages in the coordinates of the solver, (m, 3)."""
+        return self._problem.frame.inward(stacked_cages(self.cages, cage_vertices))
 
-        Triangles resist no bending, so the finish would concentrate the load of a pulled point in a
-        crease around it.  The cages distribute it, so their pose is kept here.
-        """
-        x, pulled = self._rest_pose.vertices, self._constraints.pulled
-        near = np.zeros(len(x), dtype=bool)
-        for each in pulled.points:
-            near |= np.linalg.norm(x - each.at(x), axis=1) <= pulled.spread
-            corners = list(each.corners)
-            near[corners] = near[self.mesh.adjacency[corners].indices] = True
-        return near
+    def _hold(self, constraints: Constraints) -> None:
+        """Begin at rest, held by *constraints*."""
+        rest = self._problem.rest.vertices[constraints.handle]
+        self._path = Path.begin(constraints, self._problem.rest_cages, rest)
 
-    def _place_points(self, places: FloatArray, stays: BoolArray) -> None:
-        """Move corners that stay at *places* (n, 3) so that pulled points are at their targets."""
-        pulled, frame = self._constraints.pulled, self._frame
-        goals = frame.outward(self._path.targets[pulled.targets] + pulled.levers)
-        for point, goal in zip(pulled.points, frame.about_origin(goals), strict=True):
-            if not point.is_vertex:
-                corners, shares = np.array(point.corners), np.array(point.shares)
-                free = stays[corners]
-                places[corners[free]] += (goal - point.at(places)) / shares[free].sum()
-
-    @cached_property
-    def _cage_weights(self) -> FloatArray:
-        """Weights w (n,) of `finish.finisher`: 1 / 4 of a cage vertex, over its region by area."""
-        own = self.regions.weights * self.mesh.vertex_areas
-        counts = np.array([len(cage.vertices) for cage in self.cages])
-        areas = own.sum(axis=1)
-        density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
-        return np.asarray(density @ own) / _SPACINGS**2
-
-    @cached_property
-    def _cell_energy(self) -> CellEnergy:
-        return CellEnergy.of(self._rest_pose, self.mesh.n_vertices / len(self._rest_cages))
-
-    def _is_plausible(self, x: FloatArray, goal: FloatArray, before: FloatArray) -> bool:
-        """Tell whether no vertex of *x* (n, 3) is farther away than a motion to *goal* explains.
-
-        Nor than in the pose with cages *before*, wherever it is.
-        """
-        some, size = slice(None, None, 1 + len(x) // _SEEN), self._frame.size
-        rest = self.mesh.vertices[some]
-        moved = _largest(goal - self._rest.vertices[self.handle])
-        limit = size * (_SIZES + _MOTIONS * moved)
-        if _largest(x[some] - rest) <= limit:
-            return True
-        at = self._frame.in_scene(self._map(before * size))
-        return _largest(x[some] - rest) <= _largest(at[some] - rest)
-
-    def _missed(self, goal: FloatArray, solution: Solution) -> Solution:
-        """Return the current pose instead of *solution*, which is far from every reasonable one."""
-        p = self._path.p * self._frame.size
-        x = self._frame.in_scene(self._map(p))
-        return replace(
-            solution,
-            vertices=x,
-            cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
-            status=Status.MISSED,
-            errors=partial(self._errors, goal),
-            volume=partial(self._total_volume.relative, x),
-            remaining=np.inf,
-        )
+    def _take_trial_step(self) -> None:
+        """Compile the kernels, or load them, before the first frame needs them."""
+        handle = [0]
+        targets = self.mesh.vertices[handle] + _TRIAL_MOTION * self._problem.frame.size
+        self.hold(handle=handle).solve(targets, max_steps=1)
 
     def _solve(
         self, goal: FloatArray, max_steps: int | None, progress: Progress | None
     ) -> Solution:
-        limit = self._options.max_steps if max_steps is None else max_steps
-        options = replace(self._options, max_steps=limit, progress=progress)
+        limit = self._limits.max_steps if max_steps is None else max_steps
+        options = replace(self._limits, max_steps=limit, progress=progress)
         path, is_live = self._path, max_steps is not None
         is_frame = is_live and not np.array_equal(goal, path.targets)
         if is_frame:
             options = replace(options, tolerance=max(options.tolerance, _FRAME))
-        steps = self._follow_waypoints(goal, options)
-        path.targets = goal
-        result, x, more = self._solve_once(goal, options)
-        if is_frame and result.status is Status.CONVERGED:
-            result = replace(result, status=Status.STEP_LIMIT)
-        solution = self._solution(result, x, steps + more)
-        return solution if is_live else self._with_remaining(solution, goal)
+        pose = path.solve(goal, options)
+        if is_frame and pose.result.status is Status.CONVERGED:
+            result = replace(pose.result, status=Status.STEP_LIMIT)
+            pose = pose._replace(result=result)
+        solution = self._solution(pose)
+        return solution if is_live else self._with_remaining(solution)
 
-    def _with_remaining(self, solution: Solution, goal: FloatArray) -> Solution:
-        """Return the *solution* for *goal* (k, 3) with its estimate, and the status by that."""
-        solver, p = self._path.solver, self._path.end
+    def _solution(self, pose: Pose) -> Solution:
+        x = self._problem.frame.in_scene(pose.x)
+        rest, faces, status = self.mesh.vertices, self.mesh.faces, pose.result.status
+        solution = Solution(
+            vertices=x,
+            cage_vertices=self._problem.cages_in_scene(self._path.p),
+            steps=pose.steps,
+            status=status,
+            merits=pose.result.merits,
+            errors=partial(self._constraints.errors, self._path.targets),
+            volume=partial(self._enclosed.total.relative, x),
+            region_volumes=self._enclosed.changes_of_regions,
+            crossed=partial(new_crossings, rest=rest, faces=faces),
+            folded=partial(turned_over, rest=rest, faces=faces),
+            remaining=0.0 if status is Status.CONVERGED else np.inf,
+            unmoved=self._constraints.unmoved,
+        )
+        return replace(solution, status=self._or_missed(status, solution))
+
+    def _with_remaining(self, solution: Solution) -> Solution:
+        """Return the *solution* with its estimate, and the status by that."""
         if solution.status is Status.STEP_LIMIT:
             return solution
-        remaining = solver.remaining(p, self._places(goal)) * self._frame.size / self.mesh.diagonal
+        remaining = self._path.remaining() * self._problem.frame.size / self.mesh.diagonal
         is_stalled = solution.status is Status.STALLED
         status = Status.STALLED if is_stalled else Status.STEP_LIMIT
         if remaining <= CONVERGED:
             status = self._or_missed(Status.CONVERGED, solution)
         return replace(solution, remaining=remaining, status=status)
 
-    def _solve_once(
-        self, goal: FloatArray, options: SolverOptions
-    ) -> tuple[SolverResult, FloatArray, int]:
-        """Solve for *goal* (k, 3) with exact volume; return the mesh and the steps as well."""
-        contact = self._constraints.contact
-        if contact is not None and contact.is_active(self._path.end):
-            tolerance = max(options.tolerance, _CONTACT_TOLERANCE)
-            steps = min(options.max_steps, _CONTACT_STEPS)
-            options = replace(options, tolerance=tolerance, max_steps=steps)
-        result = self._path.solve(self._places(goal), options)
-        steps = result.steps
-        x, scaled_by = self._with_exact_volume(result)
-        for _ in range(_SOLVES_PER_SCALING):
-            if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
-                break
-            result = self._path.solve(self._places(goal), options)
-            steps += result.steps
-            x, scaled_by = self._with_exact_volume(result)
-        return result, x, steps
+    def _is_plausible(self, x: FloatArray, goal: FloatArray, before: FloatArray) -> bool:
+        """Tell whether no vertex of *x* (n, 3) is farther away than a motion to *goal* explains.
 
-    def _places(self, targets: FloatArray) -> FloatArray:
-        """Return the places (s, 3) of all sets for *targets* (k, 3), pulled points included."""
-        return self._constraints.pulled.moved(self._constraints.places(targets))
-
-    def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
-        """Move through the waypoints before *goal*; return the number of steps."""
-        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
-        steps = 0
-        for targets in self._way_to(goal):
-            steps += self._path.solve(self._places(targets), options).steps
-        return steps
-
-    def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
-        """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
-        handles, start = self._constraints.handles, self._path.targets
-        shortest = self._longest_leg(0.0)
-        if _largest(goal - start) <= shortest * LONGEST_MOVE:
-            shortest = 1.0
-        way = [start, *waypoints(start, goal, handles, shortest)]
-        done, last, most = 0, len(way) - 1, round(1.0 / shortest)
-        while done + 1 < last:
-            ahead = min(most, last - done)
-            if ahead > 1 and most > 1:
-                length = self._longest_leg(_CLEARANCE)
-                while ahead > 1 and _largest(way[done + ahead] - way[done]) > length * LONGEST_MOVE:
-                    ahead -= 1
-            done += ahead
-            if done < last:
-                yield way[done]
-
-    def _longest_leg(self, most: float) -> float:
-        """Return how far apart waypoints may be at this pose, as a share of the usual distance.
-
-        With contacts it is little more than the clearance between parts, which is looked for up to
-        *most*: a part that has crossed another by less is pushed back.
+        Nor than in the pose with cages *before*, wherever it is.
         """
-        contact = self._constraints.contact
-        if contact is None or 0.0 < most <= contact.surface.spacing:
-            return 1.0
-        clearance = contact.clearance(self._path.end, most) if most else 0.0
-        spacing = contact.surface.spacing
-        return min(1.0, max(clearance + 0.5 * spacing, spacing) / LONGEST_MOVE)
+        problem, some = self._problem, slice(None, None, 1 + len(x) // _SEEN)
+        rest = self.mesh.vertices[some]
+        moved = largest_length(goal - problem.rest.vertices[self.handle])
+        limit = problem.frame.size * (_SIZES + _MOTIONS * moved)
+        if largest_length(x[some] - rest) <= limit:
+            return True
+        at = problem.frame.in_scene(problem.map(before))
+        return largest_length(x[some] - rest) <= largest_length(at[some] - rest)
 
-    def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
-        """Restore the exact volumes; return the mesh and by how much it was scaled.
-
-        The latter is 0 if the mesh was moved along the directions of the solver instead.
-        """
-        p, directions, size = result.p, result.directions, self._frame.size
-        if not directions:
-            return self._map(p * size), 0.0
-        preserved, _, scaled = self._constraints.preserved
-        if scaled is not None:
-            return self._scaled(scaled)
-        lengths = np.array([np.abs(each).max() for each in directions])
-        if lengths.min() > _VANISHED * lengths.max():
-            x = self._moved_to_volume(preserved, directions)
-        else:
-            x = self._map(p * size)
-        if len(preserved) > 1 and not are_met(preserved, x):
-            # Of small bodies the coarse volumes, and so these directions, may vanish.
-            gradients = self.subspace.adjoints([each.gradient(x) / size for each in preserved])
-            x = self._moved_to_volume(preserved, self._path.solver.directions(gradients))
-        return x, 0.0
-
-    def _moved_to_volume(
-        self, preserved: Sequence[VolumeConstraint], directions: Sequence[FloatArray]
-    ) -> FloatArray:
-        """Move the cages along *directions* (m, 3) to the exact volumes; return the mesh."""
-        size = self._frame.size
-        path = self._path
-        paths = self._map(path.p * size, [z * size for z in directions])
-        steps = steps_to_volume(preserved, paths)
-        path.p = path.p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
-        return moved_along(paths, steps)
-
-    def _scaled(self, surface: ScaledSurface) -> tuple[FloatArray, float]:
-        """Scale the mesh and its cages to the exact volume; return the mesh and by how much."""
-        frame, anchors = self._frame, self._constraints.anchors
-        p = self._path.p
-        moves = (p - self._rest_cages) * frame.size
-        x, scales = surface.scaled(moves, frame.centre - frame.origin + anchors)
-        inside = (anchors / frame.size)[surface.body_of_column]
-        p = self._path.p = inside + scales[surface.body_of_column, None] * (p - inside)
-        scaled_by = float(np.abs(scales - 1.0).max())
-        if scaled_by > _ROUNDING:
-            self._path.continue_from(p)
-        return x, scaled_by
-
-    def _map(self, offsets: FloatArray, directions: Sequence[FloatArray] = ()) -> FloatArray:
-        """Return x for cages at *offsets* (m, 3) from the centre; and W~ z of *directions* beside.
-
-        x is rest + W~ (p - rest), which is W~ p, but at rest exact however W~ is rounded.
-        """
-        moves = offsets - self._rest_cages * self._frame.size
-        return self.subspace.map(np.hstack([moves, *directions]), self._rest_pose.vertices)
-
-    def _preserved_volumes(self) -> Preserved:
-        """Return the volumes to preserve for the current handle."""
-        regions = self.has_volume and self._preserve_region_volumes
-        is_whole = self.has_volume and self._preserve_volume and not regions
-        numbers = self._bodies.numbers(self.handle) if is_whole else _NONE
-        key = numbers.tobytes() if is_whole else regions
-        if (found := self._known_volumes.get(key)) is None:
-            preserved = self._region_volumes if regions else ()
-            if is_whole:
-                preserved = self._bodies.constraints(numbers)
-            coarse, scaled = self._binding.coarse_volume, None
-            volumes = coarse.volumes(preserved, self._rest.vertices)
-            is_large = self.mesh.n_vertices > sizes.SCALED_VOLUME and coarse.cells is not None
-            if is_whole and is_large:
-                body, rest = numbers[self.mesh.components], self._rest_pose.vertices
-                scaled = ScaledSurface.of(self.subspace, rest, preserved, body)
-            found = self._known_volumes[key] = Preserved(preserved, volumes, scaled)
-        return found
-
-    @cached_property
-    def _region_volumes(self) -> tuple[VolumeConstraint, ...]:
-        return region_volumes(self._rest_pose, self.regions.labels, self._lids)
-
-    def _enclose(self) -> None:
-        """Compute the volume enclosed under the current lids."""
-        vars(self).pop("_region_volumes", None)
-        self._known_volumes = {}
-        self._lids = lids_of(self._rest_pose, self._lids_option)
-        self._total_volume = total_volume(self._rest_pose, self._lids)
-        self._bodies = Bodies(self._rest_pose, self._total_volume, self._lids)
-
-    def _region_volume_changes(self, x: FloatArray) -> FloatArray:
-        return np.array([each.relative(x) for each in self._region_volumes])
-
-    def _constrain(
-        self, fixed: ArrayLike, handle: ArrayLike, places: ArrayLike | None = None
-    ) -> None:
-        """Set fixed vertices and handles, factor their problem and return to rest.
-
-        Fixed vertices stay at their *places* (f, 3), by default at rest.
-        """
-        mesh, rest, binding = self.mesh, self._rest.vertices, self._binding
-        self.fixed, self.handle = map(read_only, checked_constraints(mesh, fixed, handle))
-        handles = connected_sets(mesh, self.handle)
-        patches = connected_sets(mesh, self.fixed)
-        # The sets one after the other, each in the order of `handle` or `fixed`.
-        ids = np.concatenate([self.handle, self.fixed])
-        order = [*handles, *(len(self.handle) + patch for patch in patches)]
-        in_order = sparse.eye_array(len(ids)).tocsr()[np.concatenate([_NONE, *order])]
-        weight = _POSITION_WEIGHT * binding.energy.scale
-        positions = position_term(
-            self.subspace, self._rest, [ids[places] for places in order], weight
-        )
-        if (loose := self._of_loose_parts()).any():
-            start = self._rest_cages
-            anchors = Anchors(loose, start, np.zeros_like(start))
-            positions = positions.local(positions.rows, anchors)
-        gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved = self._preserved_volumes()
-        contact = self._contact_of()
-        terms: tuple[Term, ...] = () if contact is None else (contact,)
-        fixed_in_scene, inside = mesh.vertices[self.fixed], rest[self.fixed]
-        if places is not None:
-            fixed_in_scene = checked_targets(places, len(self.fixed), "fixed_at", "fixed")
-            inside = self._frame.inward(fixed_in_scene)
-            check_distance(inside)
-        fixed_at = inside if len(self.fixed) else np.zeros((1, 3))
-        box = np.stack([fixed_at.min(axis=0), fixed_at.max(axis=0)])
-        self._constraints = Constraints(
-            fixed_at=fixed_in_scene,
-            handles=handles,
-            places_of_targets=gathered[:, : len(self.handle)].tocsr(),
-            places_of_fixed=gathered[:, len(self.handle) :] @ inside,
-            fixed_box=box[: 2 * len(self.fixed)],
-            anchors=self._anchors(preserved.scaled, inside),
-            preserved=preserved,
-            solver=GaussNewton(binding.energy, positions, preserved.volumes, terms=terms),
-            contact=contact,
-            pulled=PulledPoints(),
-            unmoved=self._unmoved_parts(),
-        )
-        self.reset()
-
-    def _of_loose_parts(self) -> FloatArray:
-        """Return the quadratic (m, m) of anchors for components without fixed vertices and handles.
-
-        Nothing determines where they are.  Those that share no region with other components stay.
-        The others follow these; the anchors are so weak, compared with the energy of the least
-        region that they are in, that they only prevent drifting.
-        """
-        component, samples, energy = self.mesh.components, self._samples, self._binding.energy
-        ids, inside = np.concatenate([self.handle, self.fixed]), self.regions.components
-        if not len(ids) or inside.shape[1] == 1:
-            return np.zeros_like(energy.quadratic)
-        of_component, of_region = self._linked_parts
-        has_ids = np.zeros(len(of_component), dtype=bool)
-        has_ids[component[ids]] = True
-        stays = ~np.isin(of_region, of_component[has_ids])
-        own = [len(cage.vertices) for cage in self.cages]
-        quadratic = np.diag(np.where(np.repeat(stays, own), energy.scale, 0.0))
-        least = np.where(inside, self._traces[:, None], np.inf).min(axis=0)
-        of_sample = np.empty(len(samples.points), dtype=np.int64)
-        of_sample[samples.cells] = component
-        loose = ~has_ids[of_sample]
-        weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
-        rows = samples.rows[loose]
-        return np.asarray(quadratic + (rows.T * weight) @ rows)
-
-    def _unmoved_parts(self) -> IntArray:
-        """Return `Solution.unmoved`."""
-        ids = np.concatenate([self.handle, self.fixed])
-        if not len(ids):
-            return _NONE
-        of_component, _ = self._linked_parts
-        return np.flatnonzero(~np.isin(of_component, of_component[self.mesh.components[ids]]))
-
-    @cached_property
-    def _linked_parts(self) -> tuple[IntArray, IntArray]:
-        """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
-        region, component = np.nonzero(self.regions.components)
-        n_regions, count = self.regions.components.shape
-        part = connected(count + n_regions, component, count + region)
-        return part[:count], part[count:]
-
-    @property
-    def _traces(self) -> FloatArray:
-        """The trace of the energy in the cage vertices of each region, (r,)."""
-        starts = np.cumsum([0, *(len(cage.vertices) for cage in self.cages[:-1])])
-        return np.add.reduceat(np.diag(self._binding.energy.quadratic), starts)
-
-    def _anchors(self, surface: ScaledSurface | None, fixed_at: FloatArray) -> FloatArray:
-        """Return the centres (c, 3) about which bodies are scaled: means of fixed vertices, if any.
-
-        From the centre of the frame, in scene units; *fixed_at* (k, 3) in solver coordinates.
-        """
-        if surface is None:
-            return np.zeros((1, 3))
-        if len(surface.middles) == 1:
-            centres = np.zeros((1, 3))
-        else:
-            centres = surface.middles - (self._frame.centre - self._frame.origin)
-        body = surface.body[self.fixed]
-        for k in np.unique(body):
-            centres[k] = fixed_at[body == k].mean(axis=0) * self._frame.size
-        return centres
-
-    def _contact_of(self) -> Contact | None:
-        """Return the term that keeps parts of the surface apart, if they are to be."""
-        if not self._avoid_contact:
-            return None
-        held = np.zeros(self.mesh.n_vertices)
-        held[self.fixed] = held[self.handle] = 1.0
-        cells = self._samples.cells
-        is_held = np.bincount(cells, held) >= 0.5 * np.bincount(cells)
-        surface, scale = self._samples.contact_surface, self._binding.energy.scale
-        return Contact.of(surface, is_held, scale)
-
-    def _begin(self, p: FloatArray, targets: FloatArray) -> None:
-        """Begin at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
-        constraints = self._constraints
-        self._path = Path(constraints.solver.fresh(), p, p, targets)
-        if constraints.preserved.scaled is not None and p is not self._rest_cages:
-            self._path.continue_from(p)
-
-    def _take_trial_step(self) -> None:
-        """Compile the kernels, or load them, before the first frame needs them."""
-        handle = [0]
-        targets = self.mesh.vertices[handle] + _TRIAL_MOTION * self._frame.size
-        self.hold(handle=handle).solve(targets, max_steps=1)
-
-    def _solution(self, result: SolverResult, x: FloatArray, steps: int) -> Solution:
-        p = self._path.p * self._frame.size
-        x = self._frame.in_scene(x)
-        rest, faces = self.mesh.vertices, self.mesh.faces
-        solution = Solution(
+    def _missed(self, goal: FloatArray, solution: Solution) -> Solution:
+        """Return the current pose instead of *solution*, which is far from every reasonable one."""
+        x = self._problem.frame.in_scene(self._problem.map(self._path.p))
+        return replace(
+            solution,
             vertices=x,
-            cage_vertices=tuple(p[own] + self._frame.centre for own in self.subspace.columns),
-            steps=steps,
-            status=result.status,
-            merits=result.merits,
-            errors=partial(self._errors, self._path.targets),
-            volume=partial(self._total_volume.relative, x),
-            region_volumes=self._region_volume_changes,
-            crossed=partial(new_crossings, rest=rest, faces=faces),
-            folded=partial(turned_over, rest=rest, faces=faces),
-            remaining=0.0 if result.status is Status.CONVERGED else np.inf,
-            unmoved=self._constraints.unmoved,
+            cage_vertices=self._problem.cages_in_scene(self._path.p),
+            status=Status.MISSED,
+            errors=partial(self._constraints.errors, goal),
+            volume=partial(self._enclosed.total.relative, x),
+            remaining=np.inf,
         )
-        return replace(solution, status=self._or_missed(result.status, solution))
 
     def _or_missed(self, status: Status, solution: Solution) -> Status:
         """Return *status*, but that handles are off if a converged *solution* misses its places."""
@@ -1019,23 +564,10 @@ class Deformer:
         is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
         return Status.MISSED if is_free else Status.ALL_HELD
 
-    def _errors(self, targets: FloatArray, x: FloatArray) -> tuple[float, ...]:
-        """Return `Solution.handle_error`, that of the pulled points included, and `fixed_error`."""
-        places, pulled = self._frame.outward(targets), self._constraints.pulled
-        own = self.handle[pulled.targets]
-        places[pulled.targets] += x[own] + self._frame.size * pulled.levers - pulled.at(x)
-        at = places, self._constraints.fixed_at
-        return errors_at((self.handle, self.fixed), at, self.mesh.diagonal, x)
-
 
 def _is_off(solution: Solution) -> bool:
     """Return whether handles or fixed vertices of *solution* are off their places."""
     return max(solution.handle_error, solution.fixed_error) > _MET
-
-
-def _largest(vectors: FloatArray) -> float:
-    """Return the largest length of *vectors* (k, 3); 0 if there are none."""
-    return math.sqrt(float(np.einsum("ij,ij->i", vectors, vectors).max(initial=0.0)))
 
 
 def _counting(progress: Progress | None) -> Progress | None:

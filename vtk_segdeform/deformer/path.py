@@ -1,33 +1,194 @@
-"""Where a deformer is: the only value of it that changes."""
+"""Where a deformer is, the only value of it that changes, and how it goes on from there.
+
+targets  ->  waypoints  ->  p, a minimum for each  ->  x = W~ p with exact volumes
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from ..arrays import FloatArray
-from ..solver import GaussNewton, SolverOptions, SolverResult
+import numpy as np
+
+from ..arrays import FloatArray, largest_length
+from ..solver import (
+    LONGEST_MOVE,
+    GaussNewton,
+    ScaledSurface,
+    SolverOptions,
+    SolverResult,
+    Status,
+    VolumeConstraint,
+    are_met,
+    moved_along,
+    steps_to_volume,
+    waypoints,
+)
+from .constraints import Constraints
+from .problem import Problem
+
+_WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
+_SOLVES_PER_SCALING = 4  # at most
+_SCALED = 3e-5  # relative scale from which another solve follows
+_ROUNDING = 1e-7  # relative scale that counts as rounding
+_VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
+_CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
+_CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
+
+
+class Pose(NamedTuple):
+    """Where a solve ended."""
+
+    x: FloatArray
+    """(n, 3), in the coordinates of poses; see `frame`."""
+    result: SolverResult
+    """Of the last minimisation."""
+    steps: int
+    """Of all."""
 
 
 @dataclass(eq=False)
 class Path:
     """The last pose, and what the next solve continues with."""
 
+    constraints: Constraints
     solver: GaussNewton  # with its factor, its acceleration and the way of the last solves
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
     targets: FloatArray  # (k, 3)
 
-    def solve(self, places: FloatArray, options: SolverOptions) -> SolverResult:
-        """Minimise from the last pose, for *places* (s, 3)."""
-        result = self.solver.minimise(self.end, places, options)
-        self.p = self.end = result.p
-        return result
+    @classmethod
+    def begin(cls, constraints: Constraints, p: FloatArray, targets: FloatArray) -> Path:
+        """Return a path that begins at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
+        path = cls(constraints, constraints.solver.fresh(), p, p, targets)
+        is_rest = p is constraints.problem.rest_cages
+        if constraints.preserved.scaled is not None and not is_rest:
+            path._continue_from(p)
+        return path
 
-    def continue_from(self, p: FloatArray) -> None:
-        """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
-        self.p = self.end = p
-        self.solver.volumes = self.solver.volumes.preserved_at(p)
+    @property
+    def _problem(self) -> Problem:
+        return self.constraints.problem
 
     def copy(self) -> Path:
         """Return a path that continues from here independently."""
         return replace(self, solver=self.solver.copy())
+
+    def solve(self, goal: FloatArray, options: SolverOptions) -> Pose:
+        """Go on to the pose for *goal* (k, 3), with exact volumes.
+
+        For a large mesh the steps preserve the volumes of a coarse surface only, so it is scaled
+        to the exact ones.  If by more than `_SCALED`, they are taken again with the coarse volumes
+        of the scaled mesh.
+        """
+        steps = self._follow_waypoints(goal, options)
+        self.targets = goal
+        contact = self.constraints.contact
+        if contact is not None and contact.is_active(self.end):
+            options = replace(
+                options,
+                tolerance=max(options.tolerance, _CONTACT_TOLERANCE),
+                max_steps=min(options.max_steps, _CONTACT_STEPS),
+            )
+        for _ in range(1 + _SOLVES_PER_SCALING):
+            result = self._minimise(goal, options)
+            steps += result.steps
+            x, scaled_by = self._with_exact_volume(result)
+            if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
+                break
+        return Pose(x, result, steps)
+
+    def remaining(self) -> float:
+        """Return by how much Newton's step would move the surface, in mesh sizes."""
+        return self.solver.remaining(self.end, self.constraints.places(self.targets))
+
+    def _minimise(self, targets: FloatArray, options: SolverOptions) -> SolverResult:
+        result = self.solver.minimise(self.end, self.constraints.places(targets), options)
+        self.p = self.end = result.p
+        return result
+
+    def _continue_from(self, p: FloatArray) -> None:
+        """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
+        self.p = self.end = p
+        self.solver.volumes = self.solver.volumes.preserved_at(p)
+
+    def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
+        """Move through the waypoints before *goal*; return the number of steps."""
+        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
+        return sum(self._minimise(targets, options).steps for targets in self._way_to(goal))
+
+    def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
+        """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
+        handles, start = self.constraints.handles, self.targets
+        shortest = self._longest_leg(0.0)
+        if largest_length(goal - start) <= shortest * LONGEST_MOVE:
+            shortest = 1.0
+        way = [start, *waypoints(start, goal, handles, shortest)]
+        done, last, most = 0, len(way) - 1, round(1.0 / shortest)
+        while done + 1 < last:
+            ahead = min(most, last - done)
+            if ahead > 1 and most > 1:
+                longest = self._longest_leg(_CLEARANCE) * LONGEST_MOVE
+                while ahead > 1 and largest_length(way[done + ahead] - way[done]) > longest:
+                    ahead -= 1
+            done += ahead
+            if done < last:
+                yield way[done]
+
+    def _longest_leg(self, most: float) -> float:
+        """Return how far apart waypoints may be at this pose, as a share of the usual distance.
+
+        With contacts it is little more than the clearance between parts, which is looked for up to
+        *most*: a part that has crossed another by less is pushed back.
+        """
+        contact = self.constraints.contact
+        if contact is None or 0.0 < most <= contact.surface.spacing:
+            return 1.0
+        clearance = contact.clearance(self.end, most) if most else 0.0
+        spacing = contact.surface.spacing
+        return min(1.0, max(clearance + 0.5 * spacing, spacing) / LONGEST_MOVE)
+
+    def _with_exact_volume(self, result: SolverResult) -> tuple[FloatArray, float]:
+        """Restore the exact volumes; return the mesh and by how much it was scaled.
+
+        The latter is 0 if the mesh was moved along the directions of the solver instead.
+        """
+        directions = result.directions
+        if not directions:
+            return self._problem.map(self.p), 0.0
+        preserved, _, scaled = self.constraints.preserved
+        if scaled is not None:
+            return self._scaled(scaled)
+        lengths = np.array([np.abs(each).max() for each in directions])
+        if lengths.min() > _VANISHED * lengths.max():
+            x = self._moved_to_volume(preserved, directions)
+        else:
+            x = self._problem.map(self.p)
+        if len(preserved) > 1 and not are_met(preserved, x):
+            # Of small bodies the coarse volumes, and so these directions, may vanish.
+            slopes = [each.gradient(x) / self._problem.frame.size for each in preserved]
+            rows = self._problem.subspace.adjoints(slopes)
+            x = self._moved_to_volume(preserved, self.solver.directions(rows))
+        return x, 0.0
+
+    def _moved_to_volume(
+        self, preserved: Sequence[VolumeConstraint], directions: Sequence[FloatArray]
+    ) -> FloatArray:
+        """Move the cages along *directions* (m, 3) to the exact volumes; return the mesh."""
+        paths = self._problem.map(self.p, directions)
+        steps = steps_to_volume(preserved, paths)
+        self.p = self.p + sum(tk * z for tk, z in zip(steps, directions, strict=True))
+        return moved_along(paths, steps)
+
+    def _scaled(self, surface: ScaledSurface) -> tuple[FloatArray, float]:
+        """Scale the mesh and its cages to the exact volume; return the mesh and by how much."""
+        frame, anchors = self._problem.frame, self.constraints.anchors
+        moves = (self.p - self._problem.rest_cages) * frame.size
+        x, scales = surface.scaled(moves, frame.centre - frame.origin + anchors)
+        inside = (anchors / frame.size)[surface.body_of_column]
+        p = self.p = inside + scales[surface.body_of_column, None] * (self.p - inside)
+        scaled_by = float(np.abs(scales - 1.0).max())
+        if scaled_by > _ROUNDING:
+            self._continue_from(p)
+        return x, scaled_by

@@ -1,19 +1,16 @@
-"""Folders of the current user for caches and unsaved work.
+"""Folders of the current user for caches and unsaved work, where the system has them.
 
-                     bindings                             unsaved work
-    Linux            $XDG_CACHE_HOME or ~/.cache          $XDG_DATA_HOME or ~/.local/share
-    macOS            ~/Library/Caches                     ~/Library/Application Support
-    Windows          %LOCALAPPDATA%                       %LOCALAPPDATA%
-
-Both are subfolders of ``segdeform`` there.  Other settings, such as the list of recent files, are
-stored by Qt, and compiled kernels by numba.
+Other settings, such as the list of recent files, are stored by Qt, and compiled kernels by numba.
 """
 
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
+
+from platformdirs import user_cache_path, user_data_path
+
+_OURS = "segdeform"
 
 
 def cache_folder() -> Path | None:
@@ -24,23 +21,9 @@ def cache_folder() -> Path | None:
     chosen = os.environ.get("SEGDEFORM_CACHE", "")
     if chosen:
         return None if chosen == "0" else Path(chosen)
-    return _base("XDG_CACHE_HOME", ".cache", "Caches") / "segdeform" / "bindings"
+    return user_cache_path(_OURS, appauthor=False) / "bindings"
 
 
 def autosave_folder() -> Path:
     """Return the folder for unsaved work."""
-    base = _base("XDG_DATA_HOME", os.path.join(".local", "share"), "Application Support")
-    return base / "segdeform" / "unsaved"
-
-
-def _base(variable: str, default: str, in_library: str) -> Path:
-    """Return the folder that the system provides for files of one kind.
-
-    On Linux, an environment variable with a default under the home folder; on macOS, a folder in
-    the user's library.
-    """
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / in_library
-    return Path(os.environ.get(variable) or Path.home() / default)
+    return user_data_path(_OURS, appauthor=False) / "unsaved"

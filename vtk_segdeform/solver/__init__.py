@@ -3,7 +3,7 @@
 The files, in reading order:
 
     newton                  the iteration of both levels, eqs. (11) to (14) and (21)
-    gauss_newton            its problem over the cages: E, d, G and H
+    gauss_newton            its objective over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective

@@ -42,7 +42,7 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
 6. *Further terms* (`terms`), such as contact.  While one of them is active, its Hessian is in H.
 
-Long because the formulas of the iteration are explained here, and its problem is one class.
+Long because the formulas of the iteration are explained here, and its objective is one class.
 
 Source
 ------
@@ -60,7 +60,7 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 import numpy as np
 from scipy import linalg
 
-from ..arrays import FloatArray, is_number, is_whole
+from ..arrays import FloatArray, is_number, is_whole, largest_length
 from ..checks import shown
 from ..energy import Energy, Factor, full_factor, quadratic_factor, rotation_term
 from ..errors import ArgumentError, CageError
@@ -414,8 +414,7 @@ class GaussNewton:
 
     def farthest(self, step: FloatArray) -> float:
         """Return the largest distance by which a *step* moves the surface of the volumes."""
-        moves = self.volumes.surface.map(step)
-        return math.sqrt(float(np.einsum("ij,ij->i", moves, moves).max(initial=0.0)))
+        return largest_length(self.volumes.surface.map(step))
 
     def _length(self, step: FloatArray) -> float:
         """Return the root mean square of a *step* over the surface."""

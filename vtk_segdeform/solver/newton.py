@@ -2,13 +2,13 @@
 
     minimise  an objective   subject to  volumes, g = 0                                    (20)
 
-Every step is (21), with a Hessian that the problem chooses, and ends on the volumes.  So all poses
-have the same volumes, and the objective itself is the merit, which falls in every step:
+Every step is (21), with a Hessian that the objective chooses, and ends on the volumes.  So all
+poses have the same volumes, and the objective itself is the merit, which falls in every step:
 
 1. Anderson acceleration proposes a step.
 2. If the merit is not lower there, the plain step is tried, and shares 1/2, 1/4 ... of it: the
    epsilon of section 3.3.
-3. If no share helps, the problem may have a step with another Hessian.
+3. If no share helps, the objective may have a step with another Hessian.
 
 The iteration has converged if the step is short, or no gain beyond rounding is left.
 
@@ -68,7 +68,7 @@ class Step(NamedTuple):
 _Pose = TypeVar("_Pose", bound=Iterate)
 
 
-class Problem(Protocol[_Pose]):
+class Objective(Protocol[_Pose]):
     """An objective and its volumes."""
 
     @property
@@ -99,7 +99,7 @@ class Minimum(Generic[_Pose]):
 
 
 def minimise(
-    problem: Problem[_Pose],
+    objective: Objective[_Pose],
     here: _Pose,
     anderson: Anderson,
     *,
@@ -113,7 +113,7 @@ def minimise(
 
     Parameters
     ----------
-    problem : Problem
+    objective : Objective
         What to minimise.
     here : Iterate
         A pose on the volumes.
@@ -133,22 +133,22 @@ def minimise(
     merits, step, status = [here.merit], None, Status.STEP_LIMIT
     while len(merits) <= max_steps:
         tell(progress, (len(merits) - 1) / max_steps, message)
-        step = problem.step(here)
+        step = objective.step(here)
         gain = abs(float(np.vdot(here.slope, step.h)))  # twice that of the quadratic model
-        size = problem.constant + abs(here.merit)
+        size = objective.constant + abs(here.merit)
         if step.length <= tolerance or gain <= _EPSILON * size:
             status = Status.CONVERGED
             break
         ahead: _Pose | None = None
         trial: Step | None = step
         if step.is_whole:
-            guess = anderson.extrapolate(here.at, step.h, problem.residual(step.h))
-            ahead = _lower(problem.moved(guess, step.directions), here)
+            guess = anderson.extrapolate(here.at, step.h, objective.residual(step.h))
+            ahead = _lower(objective.moved(guess, step.directions), here)
         while ahead is None and trial is not None:
             anderson.forget()
-            ahead = _shortened(problem, here, trial)
+            ahead = _shortened(objective, here, trial)
             if ahead is None:
-                trial = problem.another(here)
+                trial = objective.another(here)
         if ahead is None or trial is None:
             is_rounding = gain <= _ROUNDING * size
             status = Status.CONVERGED if is_rounding else Status.STALLED
@@ -160,11 +160,11 @@ def minimise(
     return Minimum(here, status, tuple(merits), step)
 
 
-def _shortened(problem: Problem[_Pose], here: _Pose, step: Step) -> _Pose | None:
+def _shortened(objective: Objective[_Pose], here: _Pose, step: Step) -> _Pose | None:
     """Return the first of the steps h, h/2, h/4 ... that lowers the merit, or None."""
     epsilon = 1.0
     while epsilon >= _SHORTEST:
-        if ahead := _lower(problem.moved(here.at + epsilon * step.h, step.directions), here):
+        if ahead := _lower(objective.moved(here.at + epsilon * step.h, step.directions), here):
             return ahead
         epsilon *= 0.5
     return None

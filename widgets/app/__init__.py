@@ -11,13 +11,12 @@ The files, in reading order:
     saving        saving, and the questions asked before
     dialogs       the dialogs
     menus         the menus
-    keys_dialog   keys assigned to actions
+    stored_keys   the user's keys
     repairing repair_dialog repair_preview
                   repair and open: a closed copy of the surface as a new document
     drops         files dropped on the window
     recent        recent files
     autosaver     when to autosave
-    autosave      autosaved files, and recovery after a crash
 """
 
 from .window import Window

@@ -14,9 +14,8 @@ from qtpy import QtCore
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session import Change, Session
 
-from ..editor import Job
+from ..editor import About, Autosaves, Job, Slot
 from ..scene import Stop
-from .autosave import About, Autosaves, Slot
 from .qt_timer import qt_timer
 
 INTERVAL = 10.0  # seconds: the longest part of an ongoing drag that a crash may lose

@@ -10,8 +10,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import READABLE_FILES
-from .autosave import Autosaves, Slot
+from ..editor import READABLE_FILES, Autosaves, Slot
 
 Qt = QtCore.Qt
 

@@ -19,8 +19,7 @@ from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from ..editor import SessionFile, error_text, is_mesh, read_session
-from .autosave import About, Slot
+from ..editor import About, SessionFile, Slot, error_text, is_mesh, read_session
 
 SUFFIX = ".segdeform"
 

@@ -80,11 +80,10 @@ class Menus:
 
     def _help(self) -> None:
         menu = self._menu("&Help")
-        card = self._add(menu, "&Keyboard shortcuts", self._doing(actions.toggle_help))
+        card = self._add(menu, "&Keys ...", self._doing(actions.toggle_help))
         self._need_mesh.append(card)
         named = [(card, card.text(), "help")]
         menu.aboutToShow.connect(lambda: name_keys(named, self._window.keys))
-        self._add(menu, "&Change keys ...", self._window.choose_keys)
         self._need_mesh.append(self._add(menu, "&First steps", self._show_first_steps))
         self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
 

@@ -8,8 +8,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import SessionFile
-from .autosave import Slot
+from ..editor import SessionFile, Slot
 from .documents import Reader
 
 Qt = QtCore.Qt

@@ -21,16 +21,17 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.session import Session
 
 from ..editor import (
+    Autosaves,
     DeformEditor,
     Job,
     Neighbour,
+    Slot,
     expect_session,
     jumping_to,
     position_of,
     states_of,
 )
-from ..qt import DeformWidget
-from .autosave import Autosaves, Slot
+from ..qt import DeformWidget, menu_keys
 from .autosaver import INTERVAL, Autosaver, stops_of
 from .dialogs import ask_file, ask_repair_instead, choose_work, show_error
 from .documents import (
@@ -43,7 +44,6 @@ from .documents import (
     sample_model,
 )
 from .drops import Drops
-from .keys_dialog import choose_keys, menu_keys, read_keys, write_keys
 from .menus import Menus, connect_panel
 from .opening import Request
 from .pages import Pages
@@ -51,6 +51,7 @@ from .qt_timer import qt_timer
 from .recent import Recent
 from .repairing import ask_repair, ask_repair_of
 from .saving import may_discard
+from .stored_keys import read_keys, write_keys
 
 _SIZE = 1200, 800
 _REPAIR = "repair"
@@ -255,15 +256,10 @@ class Window(QtWidgets.QMainWindow):
             slot.release()
         return slot
 
-    def choose_keys(self) -> None:
-        """Ask for other keys; use and store them."""
-        keys = choose_keys(self, self.keys, menu_keys(self.menuBar()))
-        if keys is None:
-            return
-        self.keys = keys
-        write_keys(self._settings, keys)
-        if self.has_mesh:
-            self.editor.keys = keys
+    def _keep_keys(self) -> None:
+        """Store the keys that were assigned in the dialog."""
+        self.keys = self.editor.keys
+        write_keys(self._settings, self.keys)
 
     def clear_recent(self) -> None:
         """Clear the list of recent files."""
@@ -303,6 +299,8 @@ class Window(QtWidgets.QMainWindow):
         widget.editor.controller.file = file
         widget.editor.show_cube = True
         widget.editor.keys = self.keys
+        widget.taken_keys = lambda: menu_keys(self.menuBar())
+        widget.keys_changed.connect(self._keep_keys)
         own = self.document.session_path or self.document.source
         if (path := request.slot.path if request.slot else own) is not None:
             widget.editor.controller.restore_view(path)

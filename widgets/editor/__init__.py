@@ -6,7 +6,7 @@ The files, in reading order:
     controller       session, widgets, mode, job and file of the editor
     widget_set       the modes, and the widgets of each
     camera           navigation, views, up axis and orientation cube
-    actions recording_actions panel_actions
+    actions panel_actions
                      the actions behind keys, menus and panels
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
@@ -14,7 +14,7 @@ The files, in reading order:
     preparing        the preparation for pulls, while the editor remains usable
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to, and meshes that are written
-    recordings       recordings of input and video
+    autosave         autosaved work on disk, and recovery after a crash
     messages hints status_line help_card
                      messages, hints and the help card
     history neighbours
@@ -39,13 +39,14 @@ from .actions import (
     toggle_overlay,
     toggle_regions,
 )
+from .autosave import About, Autosaves, Slot
 from .bindings import PRESETS, KeyChoice, keys_of
 from .controller import Controller
 from .editor import DeformEditor
 from .hints import hint
 from .history import jumping_to, position_of, preview, states_of
 from .job import Job, Timer
-from .keys import Binding, Keys, key_cap, key_name
+from .keys import MOUSE, Binding, Keys, key_cap, key_name
 from .messages import error_text
 from .neighbours import Neighbour
 from .notices import Notice, Notices, notices_of
@@ -92,9 +93,12 @@ from .widget_set import Mode
 
 __all__ = [
     "MESH_FILES",
+    "MOUSE",
     "PRESETS",
     "READABLE_FILES",
+    "About",
     "Action",
+    "Autosaves",
     "Binding",
     "Controller",
     "DeformEditor",
@@ -107,6 +111,7 @@ __all__ = [
     "Notice",
     "Notices",
     "SessionFile",
+    "Slot",
     "Timer",
     "WrittenMesh",
     "actions",

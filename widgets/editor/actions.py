@@ -103,9 +103,8 @@ def finish(controller: Controller) -> None:
 
 def save(controller: Controller) -> None:
     """Save to the editor's file; another existing file is replaced only if confirmed."""
-    place = controller.place
-    question = f"{place} already exists. Save again to replace it"
-    if controller.file.may_replace(place) or controller.messages.confirms(question):
+    question = f"{controller.file.path} already exists. Save again to replace it"
+    if controller.file.may_overwrite or controller.messages.confirms(question):
         once_settled(Controller.save)(controller)
 
 
@@ -116,7 +115,7 @@ def once_settled(action: Action) -> Action:
 
 def open_file(controller: Controller) -> None:
     """Open the editor's file; unsaved changes are discarded only if confirmed."""
-    path = controller.place
+    path = controller.file.path
     question = f"Unsaved changes will be lost. Open again to continue with {path}"
     if not controller.is_modified or controller.messages.confirms(question):
         controller.open(path)
@@ -237,7 +236,7 @@ def toggle_notices(controller: Controller) -> None:
 
 def toggle_help(controller: Controller) -> None:
     """Show or hide the help card."""
-    controller.help.toggle()
+    controller.show_keys()
 
 
 def cancel(controller: Controller) -> None:

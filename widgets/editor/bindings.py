@@ -12,7 +12,7 @@ from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
 
 from ..region_selector import Paint, Tool
-from . import actions, panel_actions, recording_actions
+from . import actions, panel_actions
 from .keys import VIEW, Binding, Keys
 from .widget_set import Mode
 
@@ -54,8 +54,6 @@ BINDINGS = (
     ),
     Binding("save", ("ctrl+s",), ALL, "Save", actions.save),
     Binding("open", ("ctrl+o",), ALL, "Open", actions.open_file),
-    Binding("record_input", ("ctrl+r",), ALL, "Record input", recording_actions.record_input),
-    Binding("record_video", ("ctrl+m",), ALL, "Record video", recording_actions.record_video),
     Binding(
         "help", ("h", "f1", "question"), ALL, "Show keys", actions.toggle_help, while_busy=True
     ),

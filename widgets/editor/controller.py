@@ -20,7 +20,6 @@ from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, lo
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
 
-from ..recording import confined_path
 from ..scene import Draft, View, Widget
 from .camera import Camera, has_y_up
 from .finishing import Finishing
@@ -32,7 +31,6 @@ from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
-from .recordings import Recordings
 from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
 from .widget_set import Mode, WidgetSet
 
@@ -61,14 +59,14 @@ class Controller:
         The widgets over `session`; replaced when another session is opened.
     help : HelpCard
         The card with the keys.
+    show_keys : callable
+        Shows the keys or hides them: on the card, unless a toolkit has something better.
     messages : Messages
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
     neighbours : Neighbours
         The sessions before and after this one in the history.
-    recordings : Recordings
-        The current recording of input and of video.
     camera : Camera
         Navigation, views and the orientation cube.
     queue : Queue
@@ -80,12 +78,12 @@ class Controller:
     def __init__(self, view: View, session: Session, keys: Keys) -> None:
         load_late()
         self.view, self.keys = view, keys
-        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL), keys.cap("help"))
+        self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
+        self.show_keys: Callable[[], object] = self.help.toggle
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
         self.neighbours = Neighbours()
-        self.recordings = Recordings(view)
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
         self._left = False, False  # by turning off: as `_ahead`
@@ -150,7 +148,7 @@ class Controller:
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
         keys = self.keys
-        self.help.list_keys(keys.sections(), keys.sections(self._mode), keys.cap("help"))
+        self.help.list_keys(keys.sections(), keys.sections(self._mode))
 
     @property
     def is_on(self) -> bool:
@@ -200,7 +198,6 @@ class Controller:
         self.queue.stop()
         self._stop_listening()
         self._stop_failures()
-        self.recordings.remove()
         self.finishing.remove()
         self.camera.remove()
         self.widgets.remove()
@@ -230,7 +227,7 @@ class Controller:
 
     def refresh(self) -> None:
         """Update the status line."""
-        mode = " · ".join([f"{self._mode.value} {self._mode.name}", *self.recordings.labels])
+        mode = f"{self._mode.value} {self._mode.name}"
         job = self.queue.job
         if self.widgets.is_settling and self.queue.task(Kind.SETTLE) is None:
             may_begin = self._has_settled
@@ -522,11 +519,6 @@ class Controller:
 
     # Files.
 
-    @property
-    def place(self) -> Path:
-        """The path of `file`, or its counterpart in a replay; see `confined_path`."""
-        return confined_path(self.view.interactor, self.file.path)
-
     def once_settled(self, act: Callable[[], None]) -> None:
         """Call *act* once the pose has settled: what is saved is the pose that is to come.
 
@@ -557,9 +549,8 @@ class Controller:
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""
         self.finishing.interrupt()
-        place = self.place
-        self.file.write(self.session, place, self.view_settings)
-        self.say(f"Saved to {place}{self.pose_remark}")
+        self.file.write(self.session, self.view_settings)
+        self.say(f"Saved to {self.file.path}{self.pose_remark}")
 
     def read_again(self, written: WrittenMesh) -> None:
         """Read a mesh again in another thread, and say what the file has lost, if anything.

@@ -28,7 +28,6 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from ..recording import recorded_keys
 from ..scene import Phase, Stop, View
 from .actions import Action, show_pose, show_rest
 from .bindings import KeyChoice, keys_of
@@ -116,9 +115,8 @@ class DeformEditor:
     @keys.setter
     def keys(self, keys: KeyChoice | Keys) -> None:
         controller = self._controller
-        controller.keys = table = keys_of(keys)
+        controller.keys = keys_of(keys)
         controller.list_keys()
-        controller.recordings.assign(table.changes)
         controller.refresh()
 
     @property
@@ -272,23 +270,17 @@ class DeformEditor:
 
     # Keys.
 
-    @property
-    def _table(self) -> Keys:
-        """The keys that work now: those of a recording while it is replayed."""
-        recorded = recorded_keys(self.view.interactor)
-        return self.keys if recorded is None else keys_of(recorded)
-
     def _key(self) -> bool:
         key = pressed_key(self.view.interactor)
         # Even if the action fails.
-        self._took_key = self.view.is_addressed and bool(self._table.modes_of(key))
+        self._took_key = self.view.is_addressed and bool(self.keys.modes_of(key))
         if self._took_key:
             self._type(key)
         return self._took_key
 
     def _release(self) -> None:
         """Show the pose again, unless the release is followed by a press: a key that repeats."""
-        held = {key.rpartition("+")[2] for key in self._table["before_after"].keys}
+        held = {key.rpartition("+")[2] for key in self.keys["before_after"].keys}
         if pressed_key(self.view.interactor).rpartition("+")[2] in held:
             self._stop_waiting()
             self._stop_waiting = self.view.every(_REPEAT, self._show_pose)
@@ -309,11 +301,11 @@ class DeformEditor:
         show_pose(self._controller)
 
     def _type(self, key: str) -> None:
-        binding = self._table.binding_of(key, self.mode)
+        binding = self.keys.binding_of(key, self.mode)
         if binding is not None and binding.action is not None:
             self._do(binding.action, binding.while_busy)
             return
-        modes = ", ".join(f"{mode.value} ({label})" for mode, label in self._table.modes_of(key))
+        modes = ", ".join(f"{mode.value} ({label})" for mode, label in self.keys.modes_of(key))
         if self.is_busy:
             self._controller.refuse()
         else:  # no action, so a drag continues

@@ -6,8 +6,7 @@
     on the screen  ->  `Glide`, since the pose may move by some per cent of the diagonal
 
 The next press, every change of the session, and saving cancel it: a file contains what was shown,
-and stays up to date.  Large meshes are finished on request only.  A replay finishes where the
-recording did.
+and stays up to date.  Large meshes are finished on request only.
 """
 
 from __future__ import annotations
@@ -18,7 +17,6 @@ from vtk_segdeform.checks import as_flag
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, FinishedPose, Session
 
-from ..recording import announce_finish, on_finish_request, recorded_keys
 from ..scene import Glide, SurfaceDisplay, View
 from .queue import Kind, Queue, Task, Work
 
@@ -57,7 +55,6 @@ class Finishing:
         self._surface, self._is_free = surface, is_free
         self._is_wanted, self._is_accepting = True, False
         self.glide = Glide(view)
-        self._stop_requests = on_finish_request(view, self._finish_now)
 
     @property
     def is_wanted(self) -> bool:
@@ -82,13 +79,12 @@ class Finishing:
     def rest(self) -> None:
         """Finish the pose in a moment: a drag has just ended."""
         self.interrupt()
-        is_replayed = recorded_keys(self._view.interactor) is not None
         is_small = self._session().mesh.n_vertices <= MOST_VERTICES
-        if self._is_wanted and is_small and not is_replayed:
+        if self._is_wanted and is_small:
             task = Task(
                 kind=Kind.FINISH,
                 begin=self._begin,
-                done=self._accept_announced,
+                done=self.accept,
                 may_begin=lambda: self._is_free() and not self._session().is_unsettled,
                 may_end=self._is_free,
                 rest=_REST,
@@ -112,7 +108,6 @@ class Finishing:
     def remove(self) -> None:
         """Stop permanently."""
         self.interrupt()
-        self._stop_requests()
 
     def _begin(self) -> Work | None:
         session = self._session()
@@ -132,15 +127,6 @@ class Finishing:
         finally:
             self._is_accepting = False
         return is_accepted
-
-    def _accept_announced(self, result: FinishedPose) -> None:
-        if self.accept(result):
-            announce_finish(self._view.interactor)
-
-    def _finish_now(self) -> None:
-        session = self._session()
-        if session.can_finish or session.can_finish_further:
-            session.finish()
 
 
 def measured(finish: Callable[[Progress], FinishedPose]) -> Callable[[Progress], FinishedPose]:

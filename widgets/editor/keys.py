@@ -33,7 +33,7 @@ _HEADINGS = {
     frozenset({P, C, D}): "0 Pull, 2 Cages, 4 Deform",
 }
 # How the mouse moves the camera; see `scene.navigation`.
-_MOUSE = [
+MOUSE = [
     ("Alt+drag", "Orbit; beside the mesh without Alt"),
     ("Middle drag", "Pan"),
     ("Right drag", "Zoom"),
@@ -156,7 +156,7 @@ class Keys:
     def sections(self, mode: Mode | None = None) -> list[Section]:
         """Return the table for users, of *mode* or all, by modes; without actions without keys."""
         sections: dict[str, list[tuple[str, str]]] = {name: [] for name in _HEADINGS.values()}
-        sections[VIEW] = list(_MOUSE)
+        sections[VIEW] = list(MOUSE)
         for b in self.bindings:
             listed = [key for key in b.keys if key not in _UNLISTED] or b.keys
             caps = "  ".join(map(key_cap, listed))
@@ -172,11 +172,6 @@ class Keys:
             b for b in self.bindings
             if b.name != name and key in b.keys and b.modes & modes and (b.name or b.is_reserved)
         ]  # fmt: skip
-
-    def fixed_uses(self, name: str, key: str) -> list[str]:
-        """Return what *key* does besides, during drags, in modes of the action *name*: labels."""
-        modes = self._by_name[name].modes
-        return [b.label for b in self.bindings if not b.name and key in b.keys and b.modes & modes]
 
     def _require_distinct(self) -> None:
         for binding in self._by_name.values():

@@ -63,11 +63,7 @@ class SessionFile:
     @property
     def may_overwrite(self) -> bool:
         """Whether writing to `path` replaces nothing but this session's own file."""
-        return self.may_replace(self.path)
-
-    def may_replace(self, place: Path) -> bool:
-        """Return whether *place* is unused, or was written or read before."""
-        return self._written == place or not os.path.isfile(place)
+        return self._written == self.path or not os.path.isfile(self.path)
 
     def is_modified(self, session: Session) -> bool:
         """Return whether *session* has unsaved changes."""
@@ -87,10 +83,10 @@ class SessionFile:
             self.path = path
             self.mark_saved(session)
 
-    def write(self, session: Session, place: Path, view: Mapping[str, Any] | None = None) -> None:
-        """Save *session* to *place*, which differs from `path` in a replay; see `save_session`."""
-        save_session(place, session, view=view)
-        self._written, self._saved = place, session.state
+    def write(self, session: Session, view: Mapping[str, Any] | None = None) -> None:
+        """Save *session* to `path`; see `save_session`."""
+        save_session(self.path, session, view=view)
+        self.mark_saved(session)
 
     def mark_saved(self, session: Session) -> None:
         """Record that the file contains *session*."""

@@ -3,8 +3,7 @@
 Three steps from the last pose end near the converged one at almost every motion of a hand; where a
 body buckles, more of them follow it closer.  Their number per event follows from the measured time
 of the last steps.  If a solve stops at
-its step limit, a timer refines the pose until it has converged or makes no more progress.  A replay
-uses the recorded numbers of steps; see `StepBudget`.
+its step limit, a timer refines the pose until it has converged or makes no more progress.
 
 While targets move, pictures are drafts; see `Draft`.
 """
@@ -19,7 +18,7 @@ from statistics import median
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver import Solution
 
-from ..scene import Draft, StepBudget, Stop, View
+from ..scene import Draft, Stop, View
 
 _EVENT_TIME = 0.030  # seconds per event, about half the time of software rendering
 _REFINE_TIME = 0.080  # seconds per refinement, when no event is pending
@@ -81,7 +80,6 @@ class LiveSolve:
         self._pace = Pace()
         self._stop: Stop | None = None
         self._halted: Solution | None = None  # of the pose that is not to be refined
-        self._budget = StepBudget(view.interactor)
         self._draft = Draft.of(view)
 
     @property
@@ -157,7 +155,6 @@ class LiveSolve:
     def remove(self) -> None:
         """Stop permanently."""
         self.pause()
-        self._budget.stop()
 
     def _tick(self) -> None:
         self.resume()  # the pose may have changed since the last tick
@@ -181,5 +178,5 @@ class LiveSolve:
     def _measure(self, solve: Callable[..., Solution], steps: int) -> None:
         """Solve and record the time per step."""
         began = time.perf_counter()
-        solution = solve(max_steps=self._budget.steps(steps))
+        solution = solve(max_steps=steps)
         self._pace.measure(time.perf_counter() - began, solution.steps)

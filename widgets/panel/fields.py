@@ -170,8 +170,6 @@ class Word:
 class Status:
     """The status of the editor."""
 
-    labels: tuple[str, ...]
-    """Recordings in progress."""
     text: str
     """The error, the last result, or the progress of a job; may be ""."""
     is_error: bool

@@ -32,7 +32,6 @@ def status(editor: DeformEditor) -> Status:
         change = session.volume_change if session.has_volume else None
         volume = "No volume to preserve" if change is None else percent(change)
     return Status(
-        labels=() if busy else tuple(controller.recordings.labels),
         text=text[:1].upper() + text[1:],
         is_error=bool(messages.error) and not busy,
         words=words,

@@ -8,11 +8,13 @@ The files, in reading order:
                 the parts of the panel
     first_steps three cards for the first run
     view_menu   menu entries for the camera
+    keys_dialog the keys of all actions
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar
 """
 
 from .controls import check_box, shortcut
+from .keys_dialog import menu_keys
 from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
@@ -21,6 +23,7 @@ __all__ = [
     "add_view_entries",
     "check_box",
     "deform_dock",
+    "menu_keys",
     "name_keys",
     "shortcut",
 ]

@@ -1,8 +1,7 @@
 """The first steps, as three cards over the view: pin, pull, done.
 
 They are shown once to each user who has not seen them, in applications that ask for it, until a
-click on them, Escape, or the first pull; while the keys are listed they make room.  Pictures and
-videos of the view lack them.
+click on them, Escape, or the first pull.  Pictures of the view lack them.
 """
 
 from __future__ import annotations
@@ -52,7 +51,6 @@ class FirstSteps(QtWidgets.QWidget):
             _Card(self, _DRAWINGS[card.name], card.title, card.sentence) for card in first_steps()
         ]
         self._stop: Callable[[], None] = _nothing
-        self._makes_room = False  # for the list of keys
         self.hide()
         view.installEventFilter(self)
 
@@ -63,9 +61,8 @@ class FirstSteps(QtWidgets.QWidget):
 
     def dismiss(self) -> None:
         """Hide the cards, and do not show them to this user again."""
-        if self.isHidden() and not self._makes_room:
+        if self.isHidden():
             return
-        self._makes_room = False
         self.hide()
         self._stop()
         if self._settings is not None:
@@ -88,19 +85,17 @@ class FirstSteps(QtWidgets.QWidget):
         QtWidgets.QApplication.sendEvent(self._view, press)
 
     def showEvent(self, event: Any) -> None:  # noqa: N802
-        """Place the cards instead of the list of keys, and wait for a pull or for that list."""
+        """Place the cards, and wait for a pull."""
         super().showEvent(event)
-        self._editor.controller.help.hide()
         self._place()
         self.raise_()
         self._stop()
         self._stop = self._editor.controller.messages.on_change(self._follow)
 
     def hideEvent(self, event: Any) -> None:  # noqa: N802
-        """Unsubscribe from the editor, unless the cards will return."""
+        """Unsubscribe from the editor."""
         super().hideEvent(event)
-        if not self._makes_room:
-            self._stop()
+        self._stop()
 
     def eventFilter(self, watched: Any, event: Any) -> bool:  # noqa: N802
         """Follow the size of the view; dismiss the cards when Escape is pressed there."""
@@ -120,12 +115,9 @@ class FirstSteps(QtWidgets.QWidget):
             self._place()
 
     def _follow(self) -> None:
-        """Dismiss the cards at a pull; hide them while the keys are listed."""
+        """Dismiss the cards at a pull."""
         if self._editor.session.is_dragging or self._editor.widgets.puller.waiting.is_active:
             self.dismiss()
-        elif self._editor.controller.help.is_shown != self._makes_room:
-            self._makes_room = not self._makes_room
-            self.setVisible(not self._makes_room)
 
     def _place(self) -> None:
         """Put the cards where they hide least of the body; without sentences in a small view."""

@@ -74,8 +74,7 @@ class StatusPart(QtWidgets.QWidget):
         now = status(self._editor)
         ink = self.palette().color(QtGui.QPalette.ColorRole.WindowText).name()
         hint = "".join(_linked(word, ink) for word in now.words)
-        labels = (f"<b>{_escaped(label)}</b>" for label in now.labels)
-        text = " · ".join(filter(None, (*labels, _escaped(now.text), hint)))
+        text = " · ".join(filter(None, (_escaped(now.text), hint)))
         if self.words.text() != text:
             self.words.setText(text)
             self.words.setToolTip(text)  # which may be too long for its place

@@ -11,7 +11,7 @@ widgets.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -23,10 +23,11 @@ from vtk_segdeform.checks import require
 from vtk_segdeform.session import Session
 
 from .. import plugin  # noqa: F401 - registers `segdeform` on plotters even without entry points
-from ..editor import DeformEditor
+from ..editor import DeformEditor, Keys
 from ..hosting import session_of
 from ..scene import View, set_background, set_lights
 from .first_steps import FirstSteps
+from .keys_dialog import KeysDialog
 from .panel import DeformPanel
 
 _DARK = 128  # lightness of a window, 0 to 255, below which its palette is dark
@@ -55,9 +56,15 @@ class DeformWidget(QtWidgets.QWidget):
         The panel beside it.
     first_steps : FirstSteps
         The cards; ``first_steps.show()`` shows them again.
+    taken_keys : callable
+        Returns the keys that no action can have, with labels; the application's menus have them.
+    keys_changed : signal
+        Other keys were assigned: ``editor.keys``.
     deformed, regions_changed, session_changed, error : signals
         The signals of the panel.
     """
+
+    keys_changed = QtCore.Signal()
 
     def __init__(self, mesh: Any, parent: Any = None, *, first_run: Any = None) -> None:
         if first_run is not None:
@@ -72,6 +79,8 @@ class DeformWidget(QtWidgets.QWidget):
         self._set_background()
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
         self.destroyed.connect(_switch_off(self.editor))
+        self.taken_keys: Callable[[], Mapping[str, str]] = dict
+        self.editor.controller.show_keys = self.show_keys
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
@@ -98,6 +107,20 @@ class DeformWidget(QtWidgets.QWidget):
     def session(self) -> Session:
         """The session being edited; another one after `session_changed`."""
         return self.editor.session
+
+    def show_keys(self) -> None:
+        """Show the keys of all actions in a dialog, in which they can be changed, or close it."""
+        for shown in self.findChildren(KeysDialog):
+            shown.reject()
+            return
+        dialog = KeysDialog(self, self.editor.keys, self.taken_keys())
+        dialog.accepted.connect(lambda: self._use_keys(dialog.keys))
+        dialog.show()  # not modal: a drag may be going on
+
+    def _use_keys(self, keys: Keys) -> None:
+        if keys.changes != self.editor.keys.changes:
+            self.editor.keys = keys
+            self.keys_changed.emit()
 
     def deformed_polydata(self) -> pyvista.PolyData:
         """Return the surface in the current pose, as it was given apart from coordinates.

@@ -21,7 +21,6 @@ The files, in reading order:
     labels             rectangles and text in display coordinates
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked
-    step_budget        solver steps per event, recorded and replayed
 """
 
 from .backdrop import set_background, set_lights
@@ -35,7 +34,6 @@ from .labels import Panel, Text, set_font
 from .navigation import Navigation
 from .orientation_cube import OrientationCube
 from .projection import Projection
-from .step_budget import StepBudget, observe_steps, prescribe_steps
 from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
 from .viewpoint import TURN, VIEWS, Viewpoint
@@ -55,7 +53,6 @@ __all__ = [
     "Phase",
     "Pointer",
     "Projection",
-    "StepBudget",
     "Stop",
     "SurfaceDisplay",
     "SurfaceStyle",
@@ -67,8 +64,6 @@ __all__ = [
     "decimated_triangles",
     "drawn_triangles",
     "handle_colour",
-    "observe_steps",
-    "prescribe_steps",
     "set_background",
     "set_font",
     "set_lights",

@@ -136,11 +136,18 @@ class Text:
 
     def width(self) -> float:
         """Return the width of the text in pixels."""
+        return self._extent(0)
+
+    def height(self) -> float:
+        """Return the height of the text in pixels."""
+        return self._extent(1)
+
+    def _extent(self, axis: int) -> float:
         if not self.text:
             return 0.0
         box = [0.0] * 4
         self._actor.GetBoundingBox(self._renderer, box)
-        return box[1] - box[0] + 1.0
+        return box[2 * axis + 1] - box[2 * axis] + 1.0
 
     def show(self, shown: bool) -> None:
         """Show or hide the text."""

@@ -13,11 +13,11 @@ The files, in reading order:
     page_model  what the page shows, and the one way in which it uses the editor
     touch       hints for fingers
     transfer    uploads and downloads
-    client      a process for one person, for servers
+    access      a page behind a secret path
+    serving     ``segdeform serve``: one editor in one process
     notebook    the editor in the output of a cell, served by the kernel
     page/       the page: view.js, panel.js, page.js, page.html, page.css
     drawing/    the body drawn by the page, from the cages alone
-    serving/    ``segdeform serve``: one client process for each page
 
 It needs ``pip install 'vtk-segdeform[web]'``.
 """
@@ -31,19 +31,25 @@ from vtk_segdeform.importing import imported
 
 if TYPE_CHECKING:
     from .notebook import add_to_notebook, edit_in_notebook, shows_in_notebook
+    from .serving import serve_until_stopped
     from .web_editor import WebEditor
 
-__all__ = ["WebEditor", "add_to_notebook", "edit_in_notebook", "shows_in_notebook"]
+__all__ = [
+    "WebEditor",
+    "add_to_notebook",
+    "edit_in_notebook",
+    "serve_until_stopped",
+    "shows_in_notebook",
+]
+_FILES = {"WebEditor": "web_editor", "serve_until_stopped": "serving"}
 
 
 def __getattr__(name: str) -> Any:
-    """Import a name when it is first used: trame is optional, and `serving` loads no VTK."""
-    if name in {"add_to_notebook", "edit_in_notebook", "shows_in_notebook"}:
-        return getattr(imported(f"{__name__}.notebook"), name)
-    if name != "WebEditor":
+    """Import a name when it is first used: trame is optional."""
+    if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        return imported(f"{__name__}.web_editor").WebEditor
+        return getattr(imported(f"{__name__}.{_FILES.get(name, 'notebook')}"), name)
     except ModuleNotFoundError as fault:
         if (fault.name or "").startswith("vtk_segdeform"):
             raise

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from vtk_segdeform.arrays import is_number
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
-from ..recording import Input
 from ..scene import View
 from .key_names import vtk_key
 
@@ -30,6 +29,29 @@ _MODIFIERS = ("shift", "control", "alt")
 _FARTHEST = 4.0  # views, from the corner of this one
 _LONGEST = 40  # letters of the name of a key
 _MOST = 500  # events that wait: nobody types or clicks as fast
+
+
+@dataclass(frozen=True)
+class Input:
+    """An event of the mouse or the keyboard."""
+
+    name: str
+    x: int
+    y: int
+    shift: bool = False
+    control: bool = False
+    alt: bool = False
+    key: str | None = None
+    code: int = 0  # of the character of the key
+
+    def send(self, view: View) -> None:
+        """Send the event to a view."""
+        to = view.interactor
+        to.SetEventInformation(
+            self.x, self.y, self.control, self.shift, chr(self.code), 0, self.key
+        )
+        to.SetAltKey(self.alt)
+        to.InvokeEvent(f"{self.name}Event")
 
 
 class Inputs:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from aiohttp import web
+from aiohttp.http import HttpProcessingError
 
 from vtk_segdeform.errors import SegDeformError, SessionError
 from vtk_segdeform.files import replacing
@@ -32,6 +33,7 @@ _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
 _LONGEST = 80  # letters of a name
 _PERIOD = 0.05  # seconds between two looks at whether the pose has settled
+_PATIENCE = 30.0  # seconds to wait for the next part of an upload
 UPLOAD_LIMIT = 1 << 30  # bytes
 _COMMON = (".ply", ".obj", ".stl", ".glb", ".off")  # first in the list
 _LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
@@ -104,6 +106,10 @@ class Transfer:
             self._names.update(dict.fromkeys(map(str, (place, place.with_suffix(_SESSION))), name))
             error = self._editor.do(opening(place))
             is_open = error is None
+        except asyncio.TimeoutError:
+            return _refusal(408, "The upload stopped. Try it again.")
+        except (web.RequestPayloadError, HttpProcessingError):
+            return _refusal(400, "The upload is damaged. Try it again.")
         except OSError as fault:
             return _refusal(507, f"{name} could not be stored: {fault.strerror}.")
         finally:
@@ -115,7 +121,7 @@ class Transfer:
         """Write the body to *place*; return False if it is larger than the limit."""
         size = 0
         with replacing(place) as draft, draft.open("wb") as file:
-            async for data in request.content.iter_chunked(1 << 18):
+            while data := await asyncio.wait_for(request.content.readany(), _PATIENCE):
                 size += len(data)
                 if size > self.limit:
                     return False

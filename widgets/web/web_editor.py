@@ -36,18 +36,18 @@ from vtk_segdeform.session import Session
 from ..editor import DeformEditor, KeyChoice, keys_of
 from ..hosting import add_editor, session_of
 from ..scene import set_background, set_lights
+from .access import below
 from .page_drawing import PageDrawing, Surface, Update
 from .page_model import PageModel
 from .pictures import Picture
 from .protocol import ViewProtocol
-from .serving import below
 from .stream import Stream
 from .timers import Timers
 from .transfer import UPLOAD_LIMIT, Transfer, formats
 
 _PAGE = Path(__file__).with_name("page")
 # These write to files of the server, or read them: the page uploads and downloads instead.
-_NO_KEYS = dict.fromkeys(("save", "open", "record_input", "record_video"), ())
+_NO_KEYS = dict.fromkeys(("save", "open"), ())
 _COMPRESS = "WSLINK_WS_COMPRESS"
 _SIZE = 1000, 700  # pixels, until the page tells its own
 _SAMPLES = 8  # per pixel, for smooth edges
@@ -71,7 +71,7 @@ class WebEditor:
     name : str
         The name that the page shows for it.
     keys : str or mapping of str to str or sequence of str
-        As in `edit`.  Keys of files and recordings do nothing: the page uploads and downloads.
+        As in `edit`.  Keys of files do nothing: the page uploads and downloads.
     folder : Path, optional
         A private folder for uploads; by default a temporary one, which `close` deletes.
     upload_limit : int
@@ -136,7 +136,8 @@ class WebEditor:
         self._transfer = Transfer(
             self.editor, self._folder, upload_limit, names, self.model.changed
         )
-        self._secret, self._hidden = "", None  # the application behind the secret
+        self._secret, self._once = "", ""
+        self._hidden: Any = None  # the application behind the secret
         self._make_page()
 
     @property
@@ -157,10 +158,28 @@ class WebEditor:
         asyncio.run(self.serve(port=port, ready=ready))
 
     async def serve(
-        self, *, port: int = 0, secret: str = "", ready: Callable[[int], object] | None = None
+        self,
+        *,
+        port: int = 0,
+        host: str = "127.0.0.1",
+        secret: str = "",
+        once: str = "",
+        ready: Callable[[int], object] | None = None,
     ) -> None:
-        """Serve the page, as `start` does, in the running event loop; with a *secret*, below it."""
-        self._secret = secret
+        """Serve the page, as `start` does, in the running event loop.
+
+        Parameters
+        ----------
+        port, ready
+            As for `start`.
+        host : str
+            The address to listen on.
+        secret : str
+            Serve the page at ``/SECRET/``, and nothing elsewhere.
+        once : str
+            Redirect the first request for ``/ONCE`` there.
+        """
+        self._secret, self._once = secret, once
         own = asyncio.get_running_loop()
         if own.get_exception_handler() is None:
             own.set_exception_handler(_ignore_lost_pages)
@@ -176,7 +195,7 @@ class WebEditor:
         with _own_settings():
             running = self.server.start(
                 port=port,
-                host="127.0.0.1",
+                host=host,
                 exec_mode="coroutine",
                 backend="aiohttp",
                 open_browser=False,
@@ -196,14 +215,12 @@ class WebEditor:
         self,
         ended: asyncio.Event,
         *,
-        port: int = 0,
-        secret: str = "",
-        ready: Callable[[int], object] | None = None,
         last: Callable[[], object] | None = None,
+        **where: Any,
     ) -> None:
         """Serve the page, as `serve` does, until the event *ended* is set; call *last* before."""
         loop = asyncio.get_running_loop()
-        serving = loop.create_task(self.serve(port=port, secret=secret, ready=ready))
+        serving = loop.create_task(self.serve(**where))
         ending = loop.create_task(ended.wait())
         await asyncio.wait([serving, ending], return_when=asyncio.FIRST_COMPLETED)
         if last is not None:
@@ -274,7 +291,7 @@ class WebEditor:
         self._transfer.add_routes(server.app)
         if self._secret:
             self._hidden = server.app
-            server.set_app(below(self._secret, server.app))
+            server.set_app(below(self._secret, server.app, once=self._once))
 
     def _configure(self, root: Any) -> None:
         """Add the messages of the view; remove those by which a page could end this process."""

@@ -30,7 +30,7 @@ from app_hands import (
 from qt_hands import application, until
 
 from vtk_segdeform.session.store import load_session, save_session
-from vtk_segdeform.widgets.app.autosave import Autosaves
+from vtk_segdeform.widgets.editor import Autosaves
 
 MANY = pytest.mark.campaign
 

@@ -15,10 +15,9 @@ from qt_hands import Qt, QtCore, QtHand, QtTest, application, until
 from vtk_segdeform import load_session
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.io import Surface, read_polydata
-from vtk_segdeform.widgets.app.autosave import Autosaves
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
 from vtk_segdeform.widgets.app.repairing import _request
-from vtk_segdeform.widgets.editor import jumping_to, position_of, states_of
+from vtk_segdeform.widgets.editor import Autosaves, jumping_to, position_of, states_of
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 BLANK = pytest.mark.usefixtures("unpainted")
@@ -210,7 +209,10 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     comes(session)
     assert hand.window.editor.status.startswith("Redo: repair")
     assert hand.title == "bottle (repaired)* - segdeform"
-    assert (session.history.undo_label, session.history.redo_label) == (None, "set fixed vertices")
+    assert (session.history.undo_label, session.history.redo_label) == (
+        None,
+        "set fixed vertices",
+    )
     assert shows(2)
     hand.window.editor.do(jumping_to(0))
     comes(original)

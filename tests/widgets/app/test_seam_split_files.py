@@ -16,7 +16,7 @@ from solids import icosphere
 from vtk_segdeform import Regions
 from vtk_segdeform.io import read_polydata
 from vtk_segdeform.io.gltf.buffers import Document
-from vtk_segdeform.widgets.app.autosave import Autosaves
+from vtk_segdeform.widgets.editor import Autosaves
 
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(40))
 

@@ -100,8 +100,3 @@ def test_during_a_job_in_a_plotter(plotter, mode, key):
 @pytest.mark.parametrize("during", [True, False])
 def test_showing_local_volumes_for_the_first_time(plain, during):
     plain.first_overlay(during=during)
-
-
-@pytest.mark.parametrize("during", [True, False])
-def test_stopping_a_video(plain, during):
-    plain.film_that_ends(during=during)

@@ -6,13 +6,12 @@ import pytest
 from hands import Hand, plain_view
 from scenes import sausage
 
-from vtk_segdeform import Session, load_session
+from vtk_segdeform import Session
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.widgets.editor.bindings import BINDINGS, PRESETS, keys_of
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.hints import hint
 from vtk_segdeform.widgets.editor.keys import event_key, key_cap, key_name
-from vtk_segdeform.widgets.recording.recording import replay
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 
@@ -87,7 +86,7 @@ def test_the_keypad_is_the_same_without_num_lock(symbol, digit):
 
 def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
     editor, hand = editor
-    editor.keys = {"undo": "j", "next_handle": "Ctrl+J", "paint_handle": "f5", "record_video": []}
+    editor.keys = {"undo": "j", "next_handle": "Ctrl+J", "paint_handle": "f5", "finish": []}
     session = editor.session
     session.set_fixed([1, 2])
     hand.key("z")
@@ -101,40 +100,8 @@ def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
     hand.failures.clear()
     rows = [row for _, rows in editor.controller.help.sections for row in rows]
     assert ("J", "Undo") in rows
-    assert not any(label == "Record video" for _, label in rows)
+    assert not any(label == "Finish pose on the mesh" for _, label in rows)
     with pytest.raises(ArgumentError):
         editor.keys = {"undo": "y"}
     assert editor.keys.cap("undo") == "J"
-    assert editor.keys.cap("record_video") == "Record video"
-
-
-def test_a_replay_uses_the_recorded_keys_whatever_the_users_are(editor, tmp_path):
-    editor, hand = editor
-    editor.keys = {"undo": "j", "paint_handle": "z", "record_input": "F6"}
-    editor.path = tmp_path / "work.segdeform"
-    hand.key("F6")
-    hand.key("z")
-    hand.key("a", control=True)
-    editor.keys = "Blender"  # the recording goes on
-    hand.key("i", control=True)
-    hand.failures.clear()  # no vertex is left
-    hand.key("z", control=True)
-    hand.key("a")
-    hand.key("r", control=True)
-    assert "Recording saved" in editor.status
-    lines = (tmp_path / "work.recording.txt").read_text()
-    assert lines.count(" Keys ") == 2
-    assert "undo=j" in lines
-    assert "key=F6" not in lines
-
-    start = load_session(tmp_path / "work.recording.segdeform")
-    view = plain_view()
-    again = DeformEditor(view, start, keys={"undo": "w", "style": "z"})
-    again.On()
-    replay(view, tmp_path / "work.recording.txt")
-    assert [*again.session.handles] == [*editor.session.handles] == ["handle 1"]
-    assert len(again.session.handles["handle 1"]) == start.mesh.n_vertices
-    assert again.mode is Mode.HANDLES
-    assert again.widgets.surface.style is editor.widgets.surface.style
-    assert again.keys.cap("undo") == "W"
-    again.remove()
+    assert editor.keys.cap("finish") == "Finish pose on the mesh"

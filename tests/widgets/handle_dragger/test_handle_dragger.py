@@ -18,13 +18,12 @@ from vtk_segdeform import Session
 from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.rotations import rigid_fit
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.widgets.handle_dragger import live_solve
+from vtk_segdeform.widgets.handle_dragger import Pace, live_solve
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import FREE, PARTS, Kind, Part
 from vtk_segdeform.widgets.handle_dragger.handle_dragger import HandleDragger
 from vtk_segdeform.widgets.handle_dragger.handle_motion import Grip, Motion
 from vtk_segdeform.widgets.scene import draft
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
-from vtk_segdeform.widgets.scene.step_budget import prescribe_steps
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -1007,7 +1006,7 @@ def converged(session):
 def test_a_jerk_is_followed_and_ends_as_without_hurry(bench, monkeypatch):
     session, hand, window = bench.session, bench.hand, bench.view.window
     window.SetMultiSamples(4)
-    prescribe_steps(bench.view.interactor, (2,) * 8)
+    monkeypatch.setattr(Pace, "_steps_in", lambda self, seconds, fewest: 2)
     place, start, shown = bench.aim(FREE), bench.targets(), session.vertices
     hand.press(place)
     for way in (90.0, 90.0, -60.0, -60.0):

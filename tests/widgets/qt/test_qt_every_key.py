@@ -76,8 +76,3 @@ def test_during_a_job(stand, mode, key):
 @MOMENTS
 def test_showing_local_volumes_for_the_first_time(stand, during):
     stand.first_overlay(during=during)
-
-
-@MOMENTS
-def test_stopping_a_video(stand, during):
-    stand.film_that_ends(during=during)

@@ -36,8 +36,10 @@ from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.pictures.palette import HANDLE
 from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
+from vtk_segdeform.widgets.editor import keys_of
 from vtk_segdeform.widgets.panel.panel import all_sections
 from vtk_segdeform.widgets.panel.toolbar import toolbar
+from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
 
 MESH = models.cactus(500)
@@ -672,28 +674,57 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
     again.widget.close()
 
 
-def test_the_first_steps_make_room_for_the_list_of_keys(state, tmp_path):
-    settings = QtCore.QSettings(str(tmp_path / "a.ini"), QtCore.QSettings.Format.IniFormat)
-    seen = Seen(DeformWidget(Session(state[0], state=state[1]), first_run=settings))
-    cards, listed = seen.widget.first_steps, seen.editor.controller.help
-    seen.editor.run("help")
-    assert listed.is_shown
-    assert not cards.isVisible()
-    seen.editor.run("cancel")
-    assert not listed.is_shown
-    assert cards.isVisible()
-    seen.editor.run("help")
-    cards.show()
-    assert not listed.is_shown
-    assert cards.isVisible()
-    seen.editor.run("help")
-    bend(seen)
-    seen.editor.run("cancel")
-    assert not cards.isVisible()
-    assert settings.contains("first steps seen")
-    cards.show()
-    seen.editor.run("help")
-    seen.widget.close()
+def dialog_of(widget):
+    """Wait for the dialog with the keys, and return it."""
+    until(lambda: widget.findChildren(KeysDialog), "the dialog")
+    return widget.findChildren(KeysDialog)[0]
+
+
+def test_keys_are_listed_and_assigned_in_a_dialog(seen):
+    editor, changes = seen.editor, []
+    seen.widget.keys_changed.connect(lambda: changes.append(editor.keys.changes))
+    seen.widget.taken_keys = lambda: {"ctrl+q": "Quit"}
+    editor.run("help")
+    assert not editor.controller.help.is_shown
+    dialog = dialog_of(seen.widget)
+    rows = {dialog.table.topLevelItem(k).text(1): dialog.table.topLevelItem(k)
+            for k in range(dialog.table.topLevelItemCount())}  # fmt: skip
+    labels = {label for _, pairs in editor.keys.sections() for _, label in pairs}
+    assert labels <= set(rows)
+
+    def typed(label, key, held=Qt.NoModifier):
+        dialog.table.setCurrentItem(rows[label])
+        QtTest.QTest.keyClick(dialog.key, key, held)
+        dialog.key.editingFinished.emit()
+        return rows[label].text(0), dialog.message.text()
+
+    assert typed("Undo", Qt.Key_J, Qt.ControlModifier) == ("Ctrl+J", "")
+    assert typed("Redo", Qt.Key_F5) == ("F5", "")
+    shown, message = typed("Shrink by one ring", Qt.Key_V)
+    assert (shown, message[:21]) == ("-", "V is assigned to both")
+    shown, message = typed("Auto-segment", Qt.Key_Q, Qt.ControlModifier)
+    assert (shown, message) == ("G", "Ctrl+Q is assigned to 'Quit'; choose another key")
+    dialog.table.setCurrentItem(rows["Pan"])
+    assert not dialog.key.isEnabled()
+    dialog.table.setCurrentItem(rows["Cancel"])
+    dialog.remove.click()
+    assert rows["Cancel"].text(0) == ""
+    assert changes == []
+    dialog.accept()
+    wanted = {"undo": ("ctrl+j",), "redo": ("f5",), "cancel": ()}
+    assert changes == [wanted]
+    assert editor.keys.changes == wanted
+
+
+def test_the_dialog_with_the_keys_resets_them_to_a_preset_and_can_be_cancelled(seen):
+    editor = seen.editor
+    editor.run("help")
+    dialog = dialog_of(seen.widget)
+    dialog.preset.setCurrentText("Blender")
+    dialog.reset.click()
+    assert dialog.keys.changes == keys_of("Blender").changes
+    dialog.reject()
+    assert editor.keys.changes == {}
 
 
 @pytest.mark.campaign

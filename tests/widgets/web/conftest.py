@@ -1,8 +1,7 @@
-"""One browser for all tests of a process; an event loop for the tests of a module."""
+"""One browser for all tests of a process."""
 
 from __future__ import annotations
 
-import asyncio
 import os
 from collections.abc import Iterator
 
@@ -27,29 +26,3 @@ def browser() -> Iterator[Chromium]:
 def cactus() -> Mesh:
     """Return the mesh that the pages show."""
     return models.cactus(700)
-
-
-class Loop(asyncio.SelectorEventLoop):
-    """An event loop whose clock can be put forward, so that no test has to hurry or to wait."""
-
-    _ahead = 0.0
-
-    def time(self) -> float:
-        """Return the time in seconds."""
-        return super().time() + self._ahead
-
-    def put_forward(self, seconds: float) -> None:
-        """Let *seconds* pass at once."""
-        self._ahead += seconds
-
-
-@pytest.fixture(scope="module")
-def do():
-    """Run a coroutine, and the server with it; the server runs only then."""
-    loop = Loop()
-    yield loop.run_until_complete
-    if rest := asyncio.all_tasks(loop):  # connections that a visitor broke off
-        for task in rest:
-            task.cancel()
-        loop.run_until_complete(asyncio.wait(rest))
-    loop.close()

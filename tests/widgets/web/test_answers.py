@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from contextlib import asynccontextmanager
 
 import pytest
 
 pytest.importorskip("trame")
 import msgpack
-from aiohttp import ClientSession
 from solids import OCTAHEDRON
-from web_hands import Served
-from wslink.chunking import generate_chunks
+from web_hands import Served, call, connected
 
 from vtk_segdeform import Mesh
 
-HELLO = {"id": "system:c0:0", "method": "wslink.hello", "args": [{"secret": "wslink-secret"}]}
-STATE = {"id": "rpc:c0:9", "method": "trame.state.get", "args": []}
 MALFORMED = "The message is not a valid call."
 FAILED = "The call failed. See the log of the server for details."
-
-
-def call(method, *args, **more):
-    return {"id": "rpc:c0:1", "method": method, "args": [*args], **more}
 
 
 def nested(depth):
@@ -70,45 +61,11 @@ def served():
         yield served
 
 
-@asynccontextmanager
-async def connected(served, *, enters=True):
-    """Yield a function that sends a text, bytes or an object, and one that returns all answers.
-
-    It sends `STATE` and waits for that answer, too, so the connection still works.
-    """
-    url = f"http://127.0.0.1:{served.port}/ws"
-    async with ClientSession() as session, session.ws_connect(url) as socket:
-
-        async def send(message):
-            if isinstance(message, str):
-                await socket.send_str(message)
-            else:
-                data = message if isinstance(message, bytes) else msgpack.packb(message)
-                await socket.send_bytes(b"".join(generate_chunks(data, 0)))
-
-        async def answers():
-            await send(STATE)
-            found = []
-            while True:
-                data = (await socket.receive(20)).data
-                assert isinstance(data, bytes), (data, socket.close_code)
-                answer = msgpack.unpackb(data[12:])
-                if answer["id"] == STATE["id"]:
-                    return found
-                if not str(answer["id"]).startswith("publish:"):
-                    found.append(answer)
-
-        if enters:
-            await send(HELLO)
-            assert "error" not in (await answers())[0]
-        yield send, answers
-
-
 def tell(served, message, **keywords):
     """Return the answers to one message."""
 
     async def story():
-        async with connected(served, **keywords) as (send, answers):
+        async with connected(f"http://127.0.0.1:{served.port}/ws", **keywords) as (send, answers):
             await send(message)
             return await answers()
 

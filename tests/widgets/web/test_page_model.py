@@ -112,45 +112,6 @@ def settle(editor):
     raise AssertionError(editor.status)
 
 
-def test_input_of_the_page_ends_in_the_pose_of_the_same_recording_in_a_plain_view(web):
-    """To the bit; `test_recorded_pages` does this with a real page and more hosts."""
-    from hands import plain_view
-
-    from vtk_segdeform.widgets import DeformEditor
-    from vtk_segdeform.widgets.recording import Recorder, replay
-
-    editor = web.editor
-    editor.mode = Mode.PULL
-    session = web.session
-    session.history.jump(0)  # before the steps of other tests
-    start = Session(session.mesh, state=session.state)
-    web.plotter.render_window.Render()
-    settle(editor)
-    recorder = Recorder(editor.view)
-    vertices = session.vertices
-    near = vertices[vertices[:, 2] > np.quantile(vertices[:, 2], 0.9)]
-    x, y = editor.view.to_display(near[np.argmin(near[:, 1])][None])[0][:2]
-    width, height = editor.view.window.GetSize()
-    for k, name in enumerate(["MouseMove", "LeftButtonPress", *["MouseMove"] * 5]):
-        place = {"x": float((x + 8 * k) / width), "y": float(1 - y / height)}
-        web.stream.inputs.put({"name": name, **place})
-        while web.stream.inputs:
-            web.stream.inputs.send_next()
-    web.stream.inputs.put({"name": "LeftButtonRelease", **place})
-    web.stream.inputs.send_next()
-    settle(editor)
-    recorder.stop()
-    assert session.history.position == 1
-    again = DeformEditor(plain_view(), start)
-    again.On()
-    again.mode = Mode.PULL
-    settle(again)
-    replay(again.view, recorder.lines, busy=lambda: again.is_busy)
-    settle(again)
-    np.testing.assert_array_equal(start.vertices, session.vertices)
-    again.remove()
-
-
 def test_while_the_hand_drags_only_the_status_of_the_page_follows(web):
     """The rest follows after the release."""
     editor, state, inputs = web.editor, web.server.state, web.stream.inputs

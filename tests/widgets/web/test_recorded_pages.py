@@ -14,12 +14,12 @@ import pytest
 pytest.importorskip("trame")
 from chromium import CTRL, SHIFT, Chromium, needs_chromium
 from hands import plain_view
+from recorder import Recorder, steady
 from web_hands import Served, line
 
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.widgets import DeformEditor
-from vtk_segdeform.widgets.recording import Recorder, replay
 
 pytestmark = [
     pytest.mark.campaign,
@@ -35,19 +35,25 @@ def body() -> Mesh:
 
 
 @pytest.fixture(scope="module")
-def recorded(browser: Chromium) -> tuple[list[str], Size, list[Any]]:
-    """Return the recording of a story in a page, the size of its view, and its poses."""
+def recorded(browser: Chromium) -> Iterator[tuple[Recorder, Size, list[Any]]]:
+    """Yield the recorded events of a story in a page, the size of its view, and its poses."""
     compiled_kernels()  # before that, an editor sums small arrays in another order
-    with Served(body(), name="cactus.ply") as served:
+    with pytest.MonkeyPatch.context() as patch, Served(body(), name="cactus.ply") as served:
+        steady(patch)
         page, web = served.page(browser, size=(900, 640)), served.web
         size = served.call(lambda: web.editor.view.window.GetSize())
-        served.call(web.session.poses.start_afresh)
+        served.call(lambda: without_finishes(web.editor))
         recorder = served.call(lambda: Recorder(web.editor.view))
         tell(served, page)
         served.call(recorder.stop)
         poses = served.call(lambda: poses_of(web.session))
         page.close()
-    return recorder.lines, size, poses
+        yield recorder, size, poses
+
+
+def without_finishes(editor: DeformEditor) -> None:
+    """Finish no pose in the background."""
+    editor.controller.finishing.is_wanted = False
 
 
 def tell(served: Served, page: Any) -> None:
@@ -144,15 +150,16 @@ def ready(editor: DeformEditor, tick: Callable[[str], object]) -> None:
 
 @pytest.mark.parametrize("host", [plain, in_pyvista, in_qt])
 def test_the_input_of_a_page_gives_the_same_poses_to_the_bit(
-    recorded: tuple[list[str], Size, list[Any]],
+    recorded: tuple[Recorder, Size, list[Any]],
     host: Callable[[Size], AbstractContextManager[DeformEditor]],
 ) -> None:
-    lines, size, poses = recorded
+    recorder, size, poses = recorded
     with host(size) as editor:
-        replay(editor.view, lines, busy=lambda: editor.is_busy)
+        without_finishes(editor)
+        recorder.replay(editor.view, lambda: editor.is_busy)
         again = poses_of(editor.session)
     differ = [
         float(np.abs(a - b).max() / body().diagonal) for a, b in zip(again, poses, strict=True)
     ]
-    print(f"{host.__name__}: differences of {len(poses)} poses {differ}, {len(lines)} lines")
+    print(f"{host.__name__}: {len(poses)} poses differ by {differ}, {len(recorder.events)} events")
     np.testing.assert_array_equal(again, poses)

@@ -309,12 +309,11 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
     for key in "srom":
         served.call(lambda key=key: web.stream.put([{**event, "name": "KeyPress", "key": key}]))
         served.call(lambda key=key: web.stream.put([{**event, "name": "KeyRelease", "key": key}]))
-    for name in ("save", "save.session", "save.session_as", "open", "record_input"):
+    for name in ("save", "save.session", "save.session_as", "open"):
         served.call(lambda name=name: web.model.press(name, "/etc/passwd"))
         served.call(lambda name=name: web.model.press("hint", name))
     served.wait(lambda: not len(web.stream.inputs))
     assert [*tmp_path.iterdir()] == before[0]
-    assert not web.editor.controller.recordings.is_recording
     for path, method, header, status in (
         ("upload?name=a.ply", "POST", False, 403),
         ("upload?name=a.exe", "POST", True, 415),

@@ -1,9 +1,11 @@
 """Films of a deformation: a GIF, an MP4, or a folder of PNG pictures.
 
     film("bend.gif", session, targets)             a drag, one picture for each of its targets
-    film("turn.mp4", view, [turn_camera] * 90)     one picture after each call
-    film = Film(view); stop = film.watch()         every picture drawn from now on,
-    ...; stop(); film.save("work.gif")             by the user or by a replay
+    film("turn.mp4", view, [turn_camera] * 90)     one picture after each call: a turntable
+    jumps = [partial(session.history.jump, k) for k in range(len(session.history.labels))]
+    film("work.gif", session, jumps)               the history, one picture for each state
+    film = Film(view); stop = film.watch()         every picture drawn from now on
+    ...; stop(); film.save("work.gif")
 
 Pictures are kept compressed in memory until the film is saved; see `film_files` for the formats.
 """
@@ -21,7 +23,7 @@ from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from vtk_segdeform.arrays import as_points, is_whole
-from vtk_segdeform.checks import as_callable, require_sequence, shown
+from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.progress import Progress, tell
 from vtk_segdeform.session import Session
@@ -63,18 +65,12 @@ class Film:
         self.view.render()
         self._take()
 
-    def watch(self, when: Callable[[], bool] | None = None) -> Stop:
-        """Take a picture after each rendering of the window, until the returned function is called.
-
-        With *when*, only if ``when()`` returns True.
-        """
-        if when is not None:
-            as_callable(when, "when")
+    def watch(self) -> Stop:
+        """Take a picture after each rendering of the window, until the result is called."""
 
         def called(*_: object) -> None:
             with self.view.guarded():
-                if when is None or when():
-                    self._take()
+                self._take()
 
         window = self.view.window
         tag = window.AddObserver("EndEvent", called)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,16 +14,14 @@ from scenes import sausage
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.errors import (
-    ArgumentError,
     CageError,
     Cancelled,
     MissingDependencyError,
     SessionError,
 )
 from vtk_segdeform.pictures.canvas import require_offscreen
-from vtk_segdeform.widgets.recording.film import Film, film
-from vtk_segdeform.widgets.recording.film_files import require_film
-from vtk_segdeform.widgets.recording.recording import replay
+from vtk_segdeform.widgets.films.film import Film, film
+from vtk_segdeform.widgets.films.film_files import require_film
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -115,11 +114,10 @@ def test_a_gif_has_accurate_colours_and_a_white_background(tmp_path, ball):
         assert (shown[0] == 255).all()
 
 
-def test_watch_records_interaction_and_replays(tmp_path, ball):
+def test_watch_takes_what_the_hand_draws(tmp_path, ball):
     made = Film(ball)
     stop = made.watch()
-    replay(ball, ["vtk_segdeform recording 1", "0 LeftButtonPress 40 40", "0 MouseMove 50 45"])
-    Hand(ball).release((60, 60))
+    Hand(ball).drag([(40, 40), (50, 45), (60, 60)])
     stop()
     ball.render()
     assert len(made) >= 2
@@ -173,9 +171,15 @@ def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
     assert max(fraction for fraction, _ in reported) <= 1.0
 
 
-def test_the_condition_of_watch_is_checked_at_once(ball):
-    with pytest.raises(ArgumentError, match="when must be callable; got 3"):
-        Film(ball).watch(3)
+def test_the_history_becomes_a_picture_for_each_state(tmp_path, session):
+    film(tmp_path / "bend.gif", session, TURNS)
+    film(tmp_path / "reset.gif", session, [SCENE.turned(40.0)])
+    here, n_states = session.history.position, len(session.history.labels)
+    film(tmp_path / "all", session, [partial(session.history.jump, k) for k in range(n_states)])
+    pictures = read(tmp_path / "all")
+    assert len(pictures) == n_states
+    assert (session.history.position, len(session.history.labels)) == (here, n_states)
+    assert len({picture.tobytes() for picture in pictures[-3:]}) == 3
 
 
 def test_a_path_that_cannot_be_written_is_refused_before_the_first_frame(tmp_path, ball):

@@ -20,8 +20,8 @@ from vtk_segdeform import Session, Surface, models
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import lock
 from vtk_segdeform.files.lock import hold
-from vtk_segdeform.widgets.app import autosave
-from vtk_segdeform.widgets.app.autosave import About, Autosaves
+from vtk_segdeform.widgets.editor import autosave
+from vtk_segdeform.widgets.editor.autosave import About, Autosaves
 
 BALL = models.sphere(300)
 ABOUT = About("ball.ply", "/saved/ball.segdeform", "/meshes/ball.ply")

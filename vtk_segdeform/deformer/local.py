@@ -1,0 +1,104 @@
+"""Constraints that move the surface near a grabbed point only; see `locality`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray
+from ..energy import Energy, with_rotating_rows
+from ..mesh import SurfacePoint
+from ..solver import Anchors, GaussNewton
+from .constraints import Constraints, PulledPoints
+from .locality import Ring
+from .path import Path
+
+_ANCHOR_WEIGHT = 90.0  # kappa of `locality`, times the scale of the shape energy
+_SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
+_FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
+_BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
+
+
+class _HandlePoint(NamedTuple):
+    """A point of the surface that the target of a handle vertex moves."""
+
+    place: int  # among those of all sets
+    target: int
+    point: SurfacePoint
+
+
+def near_point(
+    path: Path, point: SurfacePoint, *, reach: float, spread: float, follows: float
+) -> Constraints:
+    """Return constraints that keep the surface far from *point* where it is on *path*.
+
+    The arguments are those of `Deformer.local`.  The pose is at rest under them.
+    """
+    constraints, p = path.constraints, path.p
+    problem, before = constraints.problem, constraints.solver
+    near = point, reach / problem.frame.size, follows
+    energy, samples = problem.energy, problem.samples
+    ids = np.concatenate([constraints.handle, constraints.fixed])
+    quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
+    quadratic += problem.anchors_of_loose_parts(ids)
+    anchors = Anchors(quadratic, p, np.zeros_like(p))
+    handles = _points_of_handles(constraints, point)
+    own_rows = np.array([problem.row_of(each.point) for each in handles])
+    own_rows = own_rows.reshape(-1, problem.subspace.n_columns)
+    targets = np.array([each.target for each in handles], dtype=np.int64)
+    pulled = PulledPoints(
+        places=np.array([each.place for each in handles], dtype=np.int64),
+        targets=targets,
+        points=tuple(each.point for each in handles),
+        levers=(own_rows - problem.subspace.at(constraints.handle[targets])) @ p,
+        spread=spread,
+    )
+    rows = before.positions.rows.copy()
+    rows[pulled.places] = own_rows
+    local = replace(constraints, pulled=pulled, keeps=samples.weights(*near))
+    solver = replace(before, energy=energy, positions=before.positions.local(rows, anchors))
+    solver = replace(solver, energy=_with_rings(local, own_rows, solver))
+    load = solver.unbalanced(p, local.places(path.targets))
+    is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
+    steady = solver.steadying(p, _FIRM * energy.scale) if is_loaded else 0.0
+    anchors = Anchors(quadratic + steady * energy.mass, p, load)
+    solver = replace(solver, positions=before.positions.local(rows, anchors))
+    return replace(local, solver=solver)
+
+
+def _points_of_handles(constraints: Constraints, point: SurfacePoint) -> list[_HandlePoint]:
+    """Return the points that handles of one vertex move, and *point* if its vertex is alone."""
+    found, set_of = [], constraints.solver.positions.set_of
+    for number, ids in enumerate(constraints.handles):
+        places = np.flatnonzero(set_of == number)
+        for place, target in zip(places, ids, strict=False):
+            vertex = int(constraints.handle[target])
+            is_grabbed = vertex == point.vertex and len(places) == len(ids)
+            own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
+            if len(ids) == 1 or not own.is_vertex:
+                found.append(_HandlePoint(int(place), int(target), own))
+    return found
+
+
+def _with_rings(constraints: Constraints, own_rows: FloatArray, solver: GaussNewton) -> Energy:
+    """Return the energy of *solver* with the rings of points that it would pull as spikes.
+
+    *own_rows* (q, m) are those of the points.
+    """
+    problem, energy = constraints.problem, solver.energy
+    held = np.concatenate([constraints.fixed, constraints.handle])
+    far = _FAR_PULL * problem.mesh.diagonal / problem.frame.size
+    most = _ANCHOR_WEIGHT * energy.scale
+    for point, row in zip(constraints.pulled.points, own_rows, strict=True):
+        ring = Ring.around(problem.mesh, problem.rest.vertices, point)
+        if ring is None or np.isin(ring.vertices, held[held != point.vertex]).any():
+            continue
+        rows = ring.combinations @ problem.subspace.at(ring.vertices)
+        (own, both), (_, offset) = solver.compliance(np.stack([row, rows[0]]))
+        excess = far / ring.edge * abs(both) / own / _SPIKE - 1.0  # to first order
+        if excess > 0.0:
+            strength = most * excess / max(excess, most * (offset - both * both / own))
+            energy = with_rotating_rows(energy, rows, ring.offsets, strength * ring.weights)
+    return energy

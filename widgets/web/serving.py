@@ -1,0 +1,210 @@
+"""``segdeform serve``: one editor in one process, at an address with a secret.
+
+Its unsaved work is autosaved beside that of the desktop program.  Ctrl+C discards it; after any
+other end, a crash as well, the next ``segdeform serve`` of the same file continues with it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from aiohttp import web
+from aiohttp.http import HttpProcessingError
+
+from vtk_segdeform.errors import SegDeformError
+from vtk_segdeform.models import cactus
+from vtk_segdeform.session import Session
+
+from ..editor import About, Autosaves, SessionFile, Slot, is_mesh, read_session
+from .web_editor import WebEditor
+
+_PAUSE = 1.0  # seconds after a change; changes meanwhile are saved with it
+_ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+def _is_own_fault(record: logging.LogRecord) -> bool:
+    """Return whether a message of aiohttp is about an error of this program, not of a visitor."""
+    error = record.exc_info[1] if record.exc_info else None
+    return not isinstance(error, HttpProcessingError | web.RequestPayloadError | ConnectionError)
+
+
+logging.getLogger("aiohttp.server").addFilter(_is_own_fault)
+
+Started = Callable[[int, str, str], object]
+"""``started(port, secret, once)``, once the page can be opened at ``/SECRET/``, or at ``/ONCE``."""
+
+
+class Autosaver:
+    """Saves the unsaved work on *web* in another thread, from `start` on.
+
+    Parameters
+    ----------
+    web : WebEditor
+        The editor.
+    autosaves : Autosaves
+        Where to save.
+    about : About
+        The document that *web* has opened.
+    slot : Slot, optional
+        The slot that it was recovered from.
+    """
+
+    def __init__(
+        self, web: WebEditor, autosaves: Autosaves, about: About, slot: Slot | None = None
+    ) -> None:
+        self._web, self._autosaves, self._about, self._slot = web, autosaves, about, slot
+        self._session, self._saved = web.session, web.session.state
+        self._saving: asyncio.Task[None] | None = None
+        self._lock = threading.Lock()
+
+    def start(self) -> None:
+        """Save after each change from now on, in the running event loop."""
+        self._loop = asyncio.get_running_loop()
+        self._web.editor.controller.messages.on_change(self._changed)
+
+    def save(self) -> None:
+        """Save now, if anything has changed; an error is shown in the page."""
+        with self._lock:
+            self._save()
+
+    def _save(self) -> None:
+        session, controller = self._web.session, self._web.editor.controller
+        state = session.state
+        if session is not self._session:  # the page has opened another file
+            self.discard()
+            self._session, self._about = session, About(self._web.model.name)
+        elif state is self._saved:
+            return
+        self._saved = state  # after an error, tried again after the next change
+        if not controller.file.is_modified(session):
+            self.discard()
+            return
+        try:
+            self._slot = self._slot or self._autosaves.new(self._about)
+            self._slot.write(session, controller.camera.settings(controller.mode))
+        except SegDeformError as error:
+            self._loop.call_soon_threadsafe(controller.messages.report_error, error)
+
+    def discard(self) -> None:
+        """Delete what was saved."""
+        slot, self._slot = self._slot, None
+        if slot is not None:
+            slot.remove()
+
+    def _changed(self) -> None:
+        is_saving = self._saving is not None and not self._saving.done()
+        if not is_saving and self._web.session.state is not self._saved:
+            self._saving = self._loop.create_task(self._save_soon())
+
+    async def _save_soon(self) -> None:
+        await asyncio.sleep(_PAUSE)
+        await self._loop.run_in_executor(None, self.save)
+        self._loop.call_soon(self._changed)
+
+
+def recoverable(autosaves: Autosaves, file: Path | None) -> Slot | None:
+    """Return the latest unsaved work on *file*, or on anything, that a crash has left."""
+    found = None
+    for slot in autosaves.abandoned():
+        if found is None and (file is None or str(file) in (slot.about.mesh, slot.about.session)):
+            found = slot
+        else:
+            slot.release()
+    return found
+
+
+def serve_until_stopped(
+    file: Path | None,
+    *,
+    host: str,
+    port: int,
+    upload_limit: int,
+    started: Started,
+    say: Callable[[str], None],
+) -> None:
+    """Serve *file*, or a sample model, until the process is interrupted or told to end.
+
+    Parameters
+    ----------
+    file : Path or None
+        A mesh or a session, as an absolute path.
+    host, port
+        Where to listen; port 0 is any that is free.
+    upload_limit : int
+        Largest upload, in bytes.
+    started : callable
+        See `Started`.
+    say : callable
+        Shows a sentence to the user.
+
+    Raises
+    ------
+    SegDeformError
+        If the file cannot be opened.
+    OSError
+        If the port is in use.
+    """
+    autosaves = Autosaves()
+    slot, session = recoverable(autosaves, file), None
+    about = _about(file) if slot is None else slot.about
+    if slot is not None:
+        try:
+            session = slot.read(lambda *_: None)
+            say(f"Recovered the unsaved work on {about.name} of {slot.when:%Y-%m-%d %H:%M}.")
+        except SegDeformError as error:
+            say(f"The unsaved work on {about.name} cannot be read: {error}")
+            slot.release()
+            slot, about = None, _about(file)
+    if session is None:
+        session = Session(cactus()) if file is None else read_session(file, lambda *_: None)
+    web = WebEditor(session, name=about.name, upload_limit=upload_limit)
+    if slot is not None:
+        web.editor.controller.file = SessionFile(web.editor.path, Session(session.mesh))
+    autosaver, is_kept = Autosaver(web, autosaves, about, slot), False
+    try:
+        is_kept = asyncio.run(_serve(web, autosaver, host, port, started))
+    except Exception:
+        is_kept = True
+        raise
+    finally:
+        if not is_kept:
+            autosaver.discard()
+
+
+def _about(file: Path | None) -> About:
+    if file is None:
+        return About("Sample model")
+    return About(file.name, **{"mesh" if is_mesh(file) else "session": str(file)})
+
+
+async def _serve(
+    web: WebEditor, autosaver: Autosaver, host: str, port: int, started: Started
+) -> bool:
+    """Serve the page until a signal; return whether the work is to be kept."""
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    secret, once = secrets.token_urlsafe(32), secrets.token_urlsafe(32)
+    came: list[str] = []
+
+    def end(name: str) -> None:
+        came.append(name)
+        for each in _ENDINGS:  # the second one ends at once
+            loop.remove_signal_handler(getattr(signal, each))
+        ended.set()
+
+    def ready(port: int) -> None:
+        autosaver.start()
+        started(port, secret, once)
+
+    for name in _ENDINGS if sys.platform != "win32" else ():  # there, Ctrl+C is an exception
+        loop.add_signal_handler(getattr(signal, name), end, name)
+    await web.serve_until(
+        ended, host=host, port=port, secret=secret, once=once, ready=ready, last=autosaver.save
+    )
+    return came != ["SIGINT"]
