@@ -386,14 +386,18 @@ class Stand:
         """Type *key* while another thread works; then let it end."""
         self.begin(mode)
         session = self.session
-        before = session.state, session.undo_label, session.redo_label
+        before = session.state, session.history.undo_label, session.history.redo_label
         with self.job() as delivered:
             self.hand.types(key)
             self.loop()
         assert delivered == ["counted"] * (key != "escape")
         assert "Cancelled" in self.editor.status or key != "escape"
         assert self.session is session
-        assert (session.state, session.undo_label, session.redo_label) == before
+        assert (
+            session.state,
+            session.history.undo_label,
+            session.history.redo_label,
+        ) == before
 
 
 def same_places(story: Story, dragged: Story, diagonal: float) -> None:

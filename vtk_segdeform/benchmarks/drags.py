@@ -154,7 +154,7 @@ def ready(
     session.accept(preparation)
     if handle:
         session.set_fixed(own.fixed)
-        session.add_handle(own.handle)
+        session.handles.add(own.handle)
     session.bind()
     return session
 

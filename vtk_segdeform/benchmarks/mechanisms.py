@@ -294,8 +294,8 @@ def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
     """Return `QUANTITIES` of the case "bend"."""
     session = ready(preparation, own, handle=True)
     began = time.process_time()
-    turn_and_finish(session, own)
-    seconds, steps = time.process_time() - began, session.effort.steps
+    steps = turn_and_finish(session, own)
+    seconds = time.process_time() - began
     solution = session.solution
     assert solution is not None
     return {
@@ -306,10 +306,13 @@ def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
     }
 
 
-def turn_and_finish(session: Session, own: Hand) -> None:
-    """Turn the handle by 90 degrees at once, and finish the pose."""
-    session.drag(own.targets(_TURN))
+def turn_and_finish(session: Session, own: Hand) -> int:
+    """Turn the handle by 90 degrees at once, and finish the pose; return the solver's steps."""
+    steps = session.drag(own.targets(_TURN)).steps
+    if session.is_unsettled:
+        steps += session.refine().steps
     session.finish()
+    return steps
 
 
 def improves(values: Values) -> bool:

@@ -136,7 +136,7 @@ def _ready(size: int, n_cage_vertices: int, progress: Progress | None) -> Sessio
     cages = fit_cages(mesh, session.regions, n_cage_vertices, progress=part(progress, 0.2, 0.5))
     session.set_cages(cages)
     session.set_fixed(pose.fixed)
-    session.add_handle(pose.handle)
+    session.handles.add(pose.handle)
     session.bind(part(progress, 0.5, 1.0))
     return session
 
