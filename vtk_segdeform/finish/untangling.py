@@ -92,7 +92,7 @@ def _opened(mesh: Mesh, x: FloatArray, free: BoolArray, own: BoolArray) -> Float
     moving[number[corners[own[corners]]]] = False
     faces = number[mesh.faces[inside.all(axis=1)]]
     joined = (mesh.adjacency[ids][:, ids] > 0.0).astype(float)
-    average = sparse.diags_array(1.0 / np.maximum(joined.sum(axis=1), 1.0)) @ joined
+    average = sparse.diags_array(1.0 / joined.sum(axis=1)) @ joined
     crossings = Crossings(mesh.vertices[ids], faces)
     for rounds in _AVERAGES:
 
