@@ -33,6 +33,11 @@ def test_the_map_is_exact_at_rest_and_has_the_motion_along_directions_beside_the
     assert_allclose(row @ moved, shares @ rows[corners] @ moved, atol=1e-12)
 
 
+def test_cells_of_the_finish_are_by_the_vertices_of_a_cage_vertex():
+    energy = SCENE.held()._problem.cell_energy
+    assert (energy._rounds, energy._share) == (1, pytest.approx(0.01 * 258 / 36))
+
+
 def test_parts_that_nothing_holds_have_anchors_and_the_others_none():
     """A body with a part beside it in the same region, and one in a region of its own."""
     (ball, faces), at = icosphere(1), np.array([[0.0, 0, 0], [2.5, 0, 0], [0, 9, 0]])
