@@ -57,8 +57,8 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
             rows += [(body, size, name, *_row(drag, arap)) for name, drag in drags.items()]
             if fault:
                 section.skipped.append(f"ARAP, {body}, {size} vertices: {fault}")
-    columns = ("body", "vertices", "regions", "cages", "binding", "total")
-    section.tables.append(Table(columns, set_up, "set-up, seconds"))
+    parts = ("body", "vertices", "regions", "cages", "binding", "total")
+    section.tables.append(Table(parts, set_up, "set-up, seconds"))
     columns = (
         "body", "vertices", "drag", "first, ms", "median", "95 %", "longest",
         "ARAP iteration, ms", "median / ARAP", "95 % / ARAP", "longest / ARAP",

@@ -234,7 +234,7 @@ def compared(
     mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
 ) -> Values:
     """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
-    ways = [(contextlib.nullcontext, preparations[0]), (mechanism.off, preparations[1])]
+    ways: Ways = [(contextlib.nullcontext, preparations[0]), (mechanism.off, preparations[1])]
     measure = _bends if case == "bend" else _drags
     with_it, without = measure(case, own, ways)
     return {name: (with_it[name], without[name]) for name in with_it}
@@ -295,11 +295,12 @@ def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
     _, seconds = timed(lambda: turn_and_finish(session, own))
     solution = session.solution
     assert solution is not None
+    shape = Shape.of(own.mesh, solution)
     return {
         "time": seconds,
         "steps": float(session.effort.steps),
         "volume": abs(solution.volume_change),
-        **{k: v for k, v in vars(Shape.of(own.mesh, solution)).items() if k != "away"},
+        **{name: float(value) for name, value in vars(shape).items() if name != "away"},
     }
 
 
