@@ -13,7 +13,6 @@
 #   make mutants    how many small faults in the code the tests find, in samples of each folder;
 #                   FOLDER="mesh io" N=60 SEED=1 for some
 #   make mutants-changed   the same for the lines changed since BASE=origin/main
-#   make bench-history   plot the timings of earlier runs of make bench
 #
 # The first call makes a virtual environment in .venv; choose its Python with
 # `make PYTHON=python3.12 test`.
@@ -30,20 +29,15 @@ ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 export VTK_DEFAULT_OPENGL_WINDOW ?= vtkEGLRenderWindow
 endif
 
-.PHONY: help demo test test-paraview test-lowest test-newest campaign soak mutants mutants-changed docs drag-film lint format types bench bench-history clean
+.PHONY: help demo test test-paraview test-lowest test-newest campaign soak mutants mutants-changed docs drag-film lint format types bench clean
 help:
-	@sed -n '3,17s/^# *//p' Makefile
+	@sed -n '3,16s/^# *//p' Makefile
 
 demo: $(VENV)/installed
 	$(BIN)/segdeform demo -o demo-output
 
 bench: $(VENV)/installed
-	$(BIN)/segdeform bench -o bench-output --record $(HISTORY)
-
-# Each `make bench` adds a line to this file: the speed over commits, of this machine.
-HISTORY ?= bench-history.jsonl
-bench-history: $(VENV)/installed
-	$(BIN)/segdeform bench -o bench-output --history $(HISTORY)
+	$(BIN)/segdeform bench -o bench-output
 
 # Workers keep the tests of a file together, so that its fixtures are created once, and take over
 # tests of others when they have finished.  Without bytecode files, every worker and every child

@@ -231,7 +231,7 @@ def test_many_points_are_inside_where_each_one_is(name, monkeypatch):
     assert_array_equal(cage.contains(x), expected)
     for boxes in (8, 32):
         monkeypatch.setattr("vtk_segdeform.cages.cage._BOXES", boxes)
-        monkeypatch.setattr("vtk_segdeform.cages.cage._MANY", 10)
+        monkeypatch.setattr("vtk_segdeform.cages.cage._BOXED_FROM", 10)
         assert_array_equal(cage.contains(x), expected)
 
 

@@ -15,7 +15,7 @@ from solids import OCTAHEDRON
 import vtk_segdeform
 from vtk_segdeform import models
 from vtk_segdeform.benchmarks import report
-from vtk_segdeform.benchmarks.sections import Ratio, Section
+from vtk_segdeform.benchmarks.results import Section, Table
 from vtk_segdeform.cli.main import ProgressBar, main
 from vtk_segdeform.geometry import turned_over
 from vtk_segdeform.geometry.volume import signed_volume
@@ -228,33 +228,14 @@ def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):
     assert (bent.vertices - rest.vertices)[tip, 0].mean() > 0.3 * rest.vertices[:, 2].max()
 
 
-@pytest.mark.campaign
-def test_the_interactive_bench_drags_in_a_window_and_splits_the_time_of_an_event():
-    pytest.importorskip("pyvista")
-    from vtk_segdeform.cli.interactive import interactive_table
-    from vtk_segdeform.errors import MissingDependencyError
-
-    try:
-        head, _, names, _, row = interactive_table(sizes=(800,), moves=4).splitlines()
-    except MissingDependencyError as missing:
-        pytest.skip(str(missing))
-    assert "4 moves of a drag" in head
-    cells = dict(zip(names.split("|"), row.split("|"), strict=True))
-    event, *parts = (float(cells[f" {k} "]) for k in ("event ms", "solve", "map", "overlay"))
-    assert min(parts) >= 0.0
-    assert 0.0 < sum(parts) < 1.2 * event
-    assert int(cells[" steps "]) >= 1
-
-
 def quick_table(scale, progress) -> Section:
-    """Return what table 1 prints, without its deformations."""
-    ratios = [Ratio(f"as printed: {each}", 2.0, 1.0) for each in "ab"]
+    """Return a table like that of the paper, without its deformations."""
     sizes = f"{scale.paper_size} vertices, {scale.n_cage_vertices} cage vertices"
-    return Section("Tables 1 and 2", text=[sizes], ratios=ratios)
+    return Section("Tables 1 and 2", sizes, [Table(("step, s",), [(0.25,)], "table 1")])
 
 
 @pytest.mark.parametrize("is_real", [False, pytest.param(True, marks=pytest.mark.campaign)])
-def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys, monkeypatch, is_real):
+def test_bench_writes_a_report_and_prints_its_tables(tmp_path, capsys, monkeypatch, is_real):
     if not is_real:
         monkeypatch.setattr(report, "EXPERIMENTS", {"paper": quick_table, "drag": None})
     monkeypatch.setattr(report, "warm_up", lambda: None)
@@ -265,29 +246,8 @@ def test_bench_writes_a_report_and_prints_the_ratios(tmp_path, capsys, monkeypat
     assert "500 vertices, 60 cage vertices" in written
     told = capsys.readouterr().out.splitlines()
     assert told[-1].endswith("report.md")
-    assert sum("as printed: " in line for line in told) == (5 if is_real else 2)
-
-
-def test_bench_records_a_run_and_plots_the_history(tmp_path, capsys, monkeypatch):
-    pytest.importorskip("matplotlib")
-    section = Section("Trial", ratios=[Ratio("trial", 0.5, 1.0)])
-    monkeypatch.setattr(report, "EXPERIMENTS", {"drag": lambda scale, progress: section})
-    monkeypatch.setattr(report, "warm_up", lambda: None)
-    file, out = tmp_path / "history.jsonl", tmp_path / "out"
-    for _ in range(2):
-        assert main(["bench", "--quick", "-o", str(out), "--record", str(file)]) == 0
-    assert file.read_text().count('"scale": "quick", "ratios": {"trial": 0.5}') == 2
-    assert main(["bench", "-o", str(out), "--history", str(file)]) == 0
-    assert capsys.readouterr().out.splitlines()[-1].endswith("history.png")
-    assert (out / "history.png").stat().st_size > 5000
-
-
-def test_bench_refuses_a_history_that_it_cannot_append_to_before_it_measures(tmp_path, capsys):
-    (tmp_path / "notes.txt").write_text("not JSON")
-    words = ["bench", "-o", str(tmp_path / "out"), "--record", str(tmp_path / "notes.txt")]
-    assert main(words) == 1
-    assert "line 1 of" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    assert any("step, s" in line for line in told)
+    assert set(told[:-1]) <= set(written.splitlines())
 
 
 @pytest.mark.parametrize(

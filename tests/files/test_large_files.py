@@ -13,7 +13,6 @@ from solids import OCTAHEDRON
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
-from vtk_segdeform.benchmarks.history import read_history
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.motion import read_matrix
 from vtk_segdeform.cli.selection import parse_selection
@@ -31,7 +30,7 @@ DOORS = {
     **dict.fromkeys(MESHES, read_polydata),
     ".segdeform": sd.load_session, ".mlp": read_project,
     ".def": read_matrix, ".txt": lambda path: parse_selection(str(path), POINTS),
-    ".sel": lambda path: parse_selection(str(path), POINTS, role="fixed"), ".jsonl": read_history,
+    ".sel": lambda path: parse_selection(str(path), POINTS, role="fixed"),
     ".any": open_regular,
 }  # fmt: skip
 OURS = (SegDeformError, OSError, ArgumentError)
@@ -69,7 +68,7 @@ def test_a_pipe_a_folder_and_a_device_are_refused_at_once(tmp_path, suffix):
 
 @pytest.mark.parametrize("name", ["/proc/self/environ", "/proc/self/mem", "/proc/kmsg"])
 def test_files_of_the_kernel_are_refused(tmp_path, suffix, name):
-    if not os.path.exists(name) or suffix in (".any", ".jsonl"):
+    if not os.path.exists(name) or suffix == ".any":
         pytest.skip("no such file, or nothing is read")
     link = tmp_path / f"kernel{suffix}"
     link.symlink_to(name)

@@ -109,7 +109,7 @@ def areas_of(vertices, faces):
 
 
 def test_flips_preserve_linear_functions_on_a_plane(monkeypatch):
-    monkeypatch.setattr(intrinsic, "_BAD", 5.0)
+    monkeypatch.setattr(intrinsic, "_BAD_COTANGENT", 5.0)
     # Two fans of needles in a square; C x is 0 inside a plane for any triangulation.
     line = np.linspace(0.0, 1.0, 12)
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])

@@ -23,7 +23,7 @@ def either(request, monkeypatch):
     if request.param:
         monkeypatch.setattr(sizes, "LOCAL_VOLUME_CELLS", 100)
         monkeypatch.setattr(sizes, "LOCAL_VOLUME_POINTS", 400)
-        monkeypatch.setattr(local_volume, "_AT_ONCE", 300)
+        monkeypatch.setattr(local_volume, "_VERTICES_AT_ONCE", 300)
 
 
 @pytest.mark.usefixtures("either")

@@ -47,8 +47,8 @@ def cactus():
 @pytest.fixture(params=["numpy", "torch", "gpu"])
 def arrays(request, monkeypatch):
     """Return each library in turn; meshes are divided into pieces, as large ones are."""
-    monkeypatch.setattr(gpu, "_FACES", 1000)
-    monkeypatch.setattr(subspace, "_DENSE", 5000)
+    monkeypatch.setattr(gpu, "_FACES_AT_ONCE", 1000)
+    monkeypatch.setattr(subspace, "_DENSE_NUMBERS", 5000)
     if request.param == "numpy":
         return np
     if request.param == "torch":
@@ -183,12 +183,12 @@ def test_a_vertex_without_faces_has_no_normal(arrays):
 
 
 def test_no_call_takes_more_memory_than_documented(monkeypatch):
-    monkeypatch.setattr(gpu, "_FACES", 1 << 10)
+    monkeypatch.setattr(gpu, "_FACES_AT_ONCE", 1 << 10)
     points, faces = torus(240, 120)
     n, m = len(points), len(faces)
     whole = np.arange(n)
     subspace = Subspace(n, (whole,), (np.ones((n, 2), dtype=np.float32),))
-    piece = 300 * gpu._FACES
+    piece = 300 * gpu._FACES_AT_ONCE
 
     def taken(call):
         tracemalloc.start()

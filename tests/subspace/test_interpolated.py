@@ -28,7 +28,7 @@ def exact():
 def interpolate(monkeypatch):
     """Interpolate the rows of a small mesh."""
     monkeypatch.setattr(sizes, "INTERPOLATED", 250)
-    monkeypatch.setattr(interpolated, "_WORTHWHILE", np.inf)
+    monkeypatch.setattr(interpolated, "_MOST_NODES", np.inf)
     monkeypatch.setattr(interpolated, "_SPACING", 0.16)
     monkeypatch.setattr(interpolated, "_TOLERANCE", 0.1)
 

@@ -47,7 +47,7 @@ def test_single_rows_agree_with_the_map():
 @pytest.mark.parametrize("directions", [0, 1])
 def test_a_map_adds_to_its_base_at_every_vertex(monkeypatch, compiled, directions):
     """Vertices in several blocks, in one, and in none; more of them than in a piece."""
-    monkeypatch.setattr(subspace_module, "_CACHED", 200)
+    monkeypatch.setattr(subspace_module, "_CACHED_NUMBERS", 200)
     rng, n = np.random.default_rng(3), 5000
     rows = tuple(np.sort(rng.permutation(n - 10)[:k]) for k in (900, 2500))
     subspace = Subspace(n, rows, tuple(rng.normal(size=(len(own), 7)) for own in rows))

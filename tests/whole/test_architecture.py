@@ -80,9 +80,7 @@ GRANTED = {
     "widgets.web.web_editor": {"pyvista", "trame", "trame_client", "trame_server", "wslink"},
     "widgets.web.access": {"aiohttp"},
     "widgets.web.serving": {"aiohttp"},
-    "benchmarks.charts": {"matplotlib"},
-    "benchmarks.experiments": {"pyvista"},
-    "benchmarks.programs": {"igl", "open3d", "bpy"},
+    "benchmarks.peers": {"igl"},
     "cli.application": {"qtpy"},
     "cli.outputs": {"pyvista"},
 }
@@ -410,10 +408,9 @@ def test_scipy_starts_no_threads():
     )
 
 
-# A browser, git, ldd, and a command from `interpreter`; io.confined sets its child's path itself.
+# ldd, and a command from `interpreter`; io.confined sets its child's path itself.
 START_PROCESSES = {
-    "interpreter", "benchmarks.chromium", "benchmarks.history", "cli.application", "io.confined",
-    "kernels.compilation", "pictures.canvas",
+    "interpreter", "cli.application", "io.confined", "kernels.compilation", "pictures.canvas",
 }  # fmt: skip
 
 

@@ -58,8 +58,6 @@ def is_printed(expected: str, output: str) -> bool:
 
 @pytest.mark.parametrize(("command", "expected"), marks())
 def test_the_commands_beside_numbers_print_them(tmp_path, command, expected):
-    if "--interactive" in command and not os.environ.get("DISPLAY"):
-        pytest.skip("needs a screen")
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
         command.replace("FOLDER", str(tmp_path)), shell=True, cwd=ROOT,

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from solids import rotation, torus, two_components
 
 import vtk_segdeform as sd
-from vtk_segdeform.benchmarks.programs import iterate_to_convergence
+from vtk_segdeform.benchmarks.peers import iterate_to_convergence
 from vtk_segdeform.cages.simplify import simplify
 from vtk_segdeform.geometry.distortion import distortion
 from vtk_segdeform.geometry.volume import signed_volume

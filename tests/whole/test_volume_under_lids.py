@@ -114,7 +114,7 @@ def test_the_volume_is_exact_at_every_size(monkeypatch, way, per_region):
         monkeypatch.setattr(sizes, "SCALED_VOLUME", 200)
     if way == "interpolated":
         monkeypatch.setattr(sizes, "INTERPOLATED", 200)
-        monkeypatch.setattr(interpolated, "_WORTHWHILE", np.inf)
+        monkeypatch.setattr(interpolated, "_MOST_NODES", np.inf)
     if way == "gpu":
         monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
     deformer = bind(*caged("body with 12 holes", 3), preserve_region_volumes=per_region)

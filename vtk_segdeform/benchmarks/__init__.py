@@ -1,39 +1,21 @@
-"""Benchmarks: the experiments of the paper and comparisons with other programs.
+"""Benchmarks: what a person feels, the paper's tables, and a comparison with libigl.
 
 The files, in reading order:
 
-    report                run the experiments and write the report
-    sections              text, tables, figures and ratios of an experiment
-    scale                 problem sizes: quick, usual and full
-    history               record and plot the ratios of many runs
-    tasks                 meshes, handles and targets
-    bodies                bodies that are no sample meshes, and a hand on one of their limbs
-    drags                 drags as a hand makes them, frame by frame
-    measuring             time, memory and child processes
-    felt                  what drags feel like, for 5 to 500 thousand vertices
-    mechanisms            what each mechanism of the solver buys
-    paper                 tables 1 and 2 of the paper
-    experiments           figures 7, 8 and 9 of the paper
-    peers programs        deformation by other programs
-    browser               drags in the browser and in process
-    chromium              the browser
-    charts                plots
+    report        run the experiments and write the report
+    results       problem sizes, tables and sections
+    measuring     processor time, child processes and the conditions of a run
+    tasks         meshes, handles and targets; a hand on a limb of any body
+    drags         drags as a hand makes them, frame by frame
+    felt          what drags feel like, for 5 to 500 thousand vertices
+    opening       from opening a file to a surface that follows the pointer
+    mechanisms    what each mechanism of the solver buys
+    paper         tables 1 and 2 of the paper
+    peers         the same poses by libigl
 """
 
-from .history import plot_history, read_history, record
 from .measuring import in_own_process
 from .report import EXPERIMENTS, NAME, write_report
-from .scale import FULL, QUICK, USUAL
+from .results import FULL, QUICK, USUAL
 
-__all__ = [
-    "EXPERIMENTS",
-    "FULL",
-    "NAME",
-    "QUICK",
-    "USUAL",
-    "in_own_process",
-    "plot_history",
-    "read_history",
-    "record",
-    "write_report",
-]
+__all__ = ["EXPERIMENTS", "FULL", "NAME", "QUICK", "USUAL", "in_own_process", "write_report"]

@@ -2,15 +2,15 @@
 
 A drag calls `Session.drag` or `Session.pull` as the widgets do, without a window: at each move with
 as many steps as fit between two events, and while the hand rests `Session.refine` until the pose
-has settled.  How far a shown pose is from the converged one is measured on another session, which
-is solved to the end from there.
+has settled.  Some of the poses are measured, and compared with the converged one, to which another
+session solves from there.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -21,37 +21,26 @@ from ..mesh import Mesh, SurfacePoint
 from ..session import Preparation, Session
 from ..solver import Solution
 from ..widgets.handle_dragger import Pace
-from .bodies import Hand
+from .tasks import Hand
 
-_WORST = 10
-_CHECKED = 9  # every ninth pose is compared with the converged one
+_WORST = 10  # triangles
 _LEAST_MOTION = 1e-3  # diagonals: of shorter motions no jump is computed
 _MOST_STEPS = 200  # to the converged pose: far more than it takes
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """A frame of a drag."""
-
-    seconds: float  # of the processor
-    steps: int
-    jump: float  # farthest that a vertex moves, over how far the hand does; NaN if it rests
-    volume: float  # relative change
-    solution: Solution
 
 
 @dataclass(frozen=True)
 class Shape:
     """How good a pose is."""
 
-    error: float  # of handles, diagonals
+    error: float  # of handles or of the pulled point, diagonals
     distortion: float
     worst: float  # distortion of ten triangles
     detail: float  # change of dihedral angles, root mean square, degrees
     folds: int  # triangles
+    away: float = np.nan  # farthest vertex from the converged pose, diagonals
 
     @classmethod
-    def of(cls, mesh: Mesh, solution: Solution) -> Shape:
+    def of(cls, mesh: Mesh, solution: Solution, away: float = np.nan) -> Shape:
         """Measure *solution*, a pose of *mesh*."""
         x, (first, second) = solution.vertices, _adjacent_faces(mesh.faces)
         turned = [_angles(p[mesh.faces], first, second) for p in (mesh.vertices, x)]
@@ -63,70 +52,42 @@ class Shape:
             worst=float(np.sort(triangle_distortion(mesh, x))[-_WORST:].mean()),
             detail=float(np.degrees(np.sqrt(np.average(change**2, weights=weights)))),
             folds=len(solution.folds()),
+            away=away,
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass
 class Drag:
-    """What a drag feels like; times in seconds of the processor."""
+    """The frames of a drag, and the shapes of those poses that were measured."""
 
-    first: float
-    times: FloatArray  # of all frames but the first
-    steps: FloatArray  # of all frames
-    away: FloatArray  # largest distance from the converged pose, diagonals, of the checked frames
-    jump: float  # the largest
-    error: float  # of the handle or the pulled point, diagonals, largest of the checked frames
-    distortion: float  # mean of these frames
-    worst: float  # of ten triangles, the largest of these frames
-    detail: float  # change of dihedral angles, root mean square, degrees, mean of these frames
-    folds: int  # triangles that are turned over, most of these frames
-    volume: float  # largest relative change
+    seconds: list[float] = field(default_factory=list)  # of the processor
+    steps: list[int] = field(default_factory=list)
+    jumps: list[float] = field(default_factory=list)  # motion of the farthest vertex / of the hand
+    volumes: list[float] = field(default_factory=list)  # relative change
+    shapes: list[Shape] = field(default_factory=list)
 
     @property
     def felt(self) -> tuple[float, float, float]:
-        """Median, 95 % and longest of `times`."""
-        median, most, longest = np.quantile(self.times, [0.5, 0.95, 1.0]).tolist()
+        """Median, 95 % and longest of all frames but the first, in seconds."""
+        median, most, longest = np.quantile(self.seconds[1:], [0.5, 0.95, 1.0]).tolist()
         return median, most, longest
 
-
-class Record:
-    """Collects the frames of a drag of *session*, and checks one in *every* so many.
-
-    These are compared with converged poses.
-    """
-
-    def __init__(self, session: Session, preparation: Preparation, every: int = _CHECKED) -> None:
-        self._session, self._preparation, self._every = session, preparation, every
-        self._frames: list[Frame] = []
-        self._away: list[float] = []
-        self._shapes: list[Shape] = []
-
-    def add(self, frame: Frame) -> None:
-        """Add the current frame."""
-        self._frames.append(frame)
-        if len(self._frames) % self._every == 0:
-            mesh, x = self._session.mesh, self._session.vertices
-            off = np.linalg.norm(converged(self._session, self._preparation) - x, axis=1).max()
-            self._away.append(float(off) / mesh.diagonal)
-            self._shapes.append(Shape.of(mesh, frame.solution))
-
     @property
-    def drag(self) -> Drag:
-        """All frames."""
-        times = [frame.seconds for frame in self._frames]
-        return Drag(
-            first=times[0],
-            times=np.array(times[1:]),
-            steps=np.array([frame.steps for frame in self._frames]),
-            away=np.array(self._away),
-            jump=float(np.nanmax([frame.jump for frame in self._frames])),
-            error=max(shape.error for shape in self._shapes),
-            distortion=float(np.mean([shape.distortion for shape in self._shapes])),
-            worst=max(shape.worst for shape in self._shapes),
-            detail=float(np.mean([shape.detail for shape in self._shapes])),
-            folds=max(shape.folds for shape in self._shapes),
-            volume=max(frame.volume for frame in self._frames),
-        )
+    def jump(self) -> float:
+        """The largest of `jumps`."""
+        return float(np.nanmax(self.jumps))
+
+    def each(self, name: str) -> FloatArray:
+        """Return a quantity of `shapes`."""
+        return np.array([vars(shape)[name] for shape in self.shapes], dtype=float)
+
+    def measure(self, session: Session, preparation: Preparation) -> None:
+        """Measure the present pose of *session*."""
+        x, solution = session.vertices, session.solution
+        assert solution is not None
+        away = np.linalg.norm(converged(session, preparation) - x, axis=1).max()
+        away = float(away) / session.mesh.diagonal
+        self.shapes.append(Shape.of(session.mesh, solution, away))
 
 
 def hand(*, is_short: bool = False) -> list[tuple[float, FloatArray]]:
@@ -145,27 +106,16 @@ def hand(*, is_short: bool = False) -> list[tuple[float, FloatArray]]:
     return list(zip(turns.tolist(), aside, strict=True))
 
 
-def ready(
-    preparation: Preparation, own: Hand, *, handle: bool, avoid_contact: bool = False
-) -> Session:
+def ready(preparation: Preparation, own: Hand, *, handle: bool, **options: bool) -> Session:
     """Return a bound session; with *handle* it has the fixed vertices and the handle of *own*."""
     session = Session(own.mesh)
-    session.change_options(avoid_contact=avoid_contact)
+    session.change_options(**options)
     session.accept(preparation)
     if handle:
         session.set_fixed(own.fixed)
         session.handles.add(own.handle)
     session.bind()
     return session
-
-
-def dragged(session: Session, own: Hand, preparation: Preparation, *, pulls: bool) -> Drag:
-    """Drag the handle of *session*, or pull the tip, along the path of `hand`; see `Drag`."""
-    record = Record(session, preparation)
-    goals = way_of_tip(session, own) if pulls else way_of_handle(own)
-    for frame in frames(session, goals, own.point if pulls else None):
-        record.add(frame)
-    return record.drag
 
 
 def way_of_handle(own: Hand, *, is_short: bool = False) -> list[FloatArray]:
@@ -184,18 +134,18 @@ def frames(
     goals: Sequence[FloatArray],
     pulled: SurfacePoint | None,
     limit: int | None = None,
-) -> Iterator[Frame]:
-    """Drag the handle of *session* along its targets, or the point *pulled*, frame by frame.
+) -> Iterator[Drag]:
+    """Drag the handle of *session* along its targets, or the point *pulled*.
 
-    *limit* is the number of steps of a frame, at most; None: that of the widgets, which depends on
-    the time that the last ones took.
+    After each frame the drag so far is given.  *limit* is the number of steps of a frame, at most;
+    None: that of the widgets, which depends on the time that the last ones took.
     """
     x = session.vertices
     move: Callable[..., Solution] = session.drag
     before = x[session.state.handle] if pulled is None else pulled.at(x)
     if pulled is not None:
         move = partial(session.pull, pulled)
-    pace, diagonal, last = Pace(), session.mesh.diagonal, x
+    drag, pace, diagonal, last = Drag(), Pace(), session.mesh.diagonal, x
     for goal in goals:
         moved = float(np.linalg.norm(goal - before, axis=-1).max())
         if moved == 0.0 and not session.is_unsettled:
@@ -205,13 +155,15 @@ def frames(
             solution = move(goal, max_steps=limit or pace.of_event)
         else:
             solution = session.refine(max_steps=limit or pace.of_rest)
-        seconds = time.process_time() - began
+        drag.seconds.append(time.process_time() - began)
         pace.measure(time.perf_counter() - clock, solution.steps)
         x, before = session.vertices, goal
         jump = float(np.linalg.norm(x - last, axis=1).max()) / max(moved, 1e-300)
-        jump = jump if moved > _LEAST_MOTION * diagonal else np.nan
+        drag.jumps.append(jump if moved > _LEAST_MOTION * diagonal else np.nan)
+        drag.steps.append(solution.steps)
+        drag.volumes.append(abs(session.volume_change))
         last = x
-        yield Frame(seconds, solution.steps, jump, abs(session.volume_change), solution)
+        yield drag
 
 
 def converged(session: Session, preparation: Preparation) -> FloatArray:

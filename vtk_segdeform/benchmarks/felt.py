@@ -10,9 +10,7 @@ jump      farthest that a vertex moves between two frames, over how far the hand
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -23,95 +21,73 @@ from ..mesh import Mesh
 from ..models import cactus, random_limbs
 from ..progress import Progress, tell
 from ..session import Preparation, Session
-from . import charts
-from .bodies import Hand
-from .drags import Drag, dragged, ready
-from .measuring import run_in
-from .programs import arap_iteration_seconds
-from .scale import Scale
-from .sections import Cell, Figure, Ratio, Section, Table
-from .tasks import Task, warm_up
+from .drags import Drag, frames, ready, way_of_handle, way_of_tip
+from .measuring import in_own_process, timed
+from .peers import arap_iteration_seconds
+from .results import Cell, Scale, Section, Table
+from .tasks import Hand, Task, warm_up
 
-SEED = 1
 BODIES: dict[str, Callable[[int], Mesh]] = {
     "cactus": cactus,
-    "random limbs": partial(random_limbs, seed=SEED),
+    "random limbs": partial(random_limbs, seed=1),
 }
-# Vertices: median, 95 % and longest of frames, in iterations of ARAP.
-_MOST = {5430: (1.0, 2.0, 4.0), 50_000: (0.33, 0.6, 1.0), 500_000: (0.1, 0.15, 0.25)}
-_APART = "handle, avoiding contact"
-_MOST_AWAY, _MOST_VOLUME, _MOST_CONTACT = 1e-3, 1e-12, 1.1
-
-
-@dataclass(frozen=True, eq=False)
-class Felt:
-    """A body set up, dragged by a handle, and pulled; times in seconds of the processor."""
-
-    body: str
-    vertices: int
-    segment: float
-    cages: float
-    bind: float
-    drags: dict[str, Drag]
-    arap: float  # one iteration; NaN without libigl
-    without_arap: str  # why
+_CHECKED = 9  # every ninth pose is measured
+_TEXT = """\
+A hand turns the end of a limb by 84 degrees, turns back through the start to 48 degrees on the \
+other side, flicks, hesitates and returns; or it pulls the tip as far. *Random limbs* is a solid \
+made at run time. A frame is one call of `Session.drag` or `Session.pull` with as many steps as \
+the widgets take (3 to 8, by the time of the last ones), or while the hand hesitates of \
+`Session.refine`, until the pose has settled. All times are of the processor, summed over its \
+cores. *ARAP* is one iteration of libigl's as-rigid-as-possible deformation of the same mesh, in \
+the same process. *Away* is the largest distance of a shown pose from the converged one, in \
+diagonals, of every ninth frame: median and largest. *Jump* is the farthest that a vertex moves \
+between two frames, over how far the hand does."""
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
-    """Return the measurements for every size of *scale*, with ratios and limits."""
-    found = []
+    """Return the measurements for every size of *scale*."""
+    set_up: list[tuple[Cell, ...]] = []
+    rows: list[tuple[Cell, ...]] = []
+    section = Section("Drags as they are felt", _TEXT)
     for k, size in enumerate(scale.drag_sizes):
         for body in BODIES:
             tell(progress, k / len(scale.drag_sizes), f"drags of {body}, {size} vertices")
-            found.append(run_in(scale.own_process, felt, body, size, scale))
-    return Section(
-        "Drags as they are felt",
-        text=[
-            (
-                "A hand turns the end of a limb by 84 degrees, turns back through the start to 48 "
-                "degrees on the other side, flicks, hesitates and returns; or it pulls the tip as "
-                "far. *Random limbs* is a solid made at run time. A frame is one call of "
-                "`Session.drag` or `Session.pull` with as many steps as the widgets take (3 to 8, "
-                "by the time of the last ones), or while the hand hesitates of `Session.refine`, "
-                "until the pose has settled. All times are of the processor, summed over its "
-                "cores. *ARAP* is one iteration of libigl's as-rigid-as-possible deformation of "
-                "the same mesh, in the same process. *Away* is the "
-                "largest distance of a shown pose from the converged one, in diagonals, of every "
-                "ninth frame: median and largest. *Jump* is the farthest that a vertex moves "
-                "between two frames, over how far the hand does."
-            )
-        ],
-        tables=[_set_up_table(found), _frame_table(found)],
-        figures=[_figure(found)],
-        ratios=_ratios(found),
-        skipped=[
-            f"ARAP, {each.body}, {each.vertices} vertices: {each.without_arap}"
-            for each in found
-            if each.without_arap
-        ],
-    )
+            times, drags, arap, fault = in_own_process(felt, body, size, scale)
+            set_up.append((body, size, *times, sum(times)))
+            rows += [(body, size, name, *_row(drag, arap)) for name, drag in drags.items()]
+            if fault:
+                section.skipped.append(f"ARAP, {body}, {size} vertices: {fault}")
+    parts = ("body", "vertices", "regions", "cages", "binding", "total")
+    section.tables.append(Table(parts, set_up, "set-up, seconds"))
+    columns = (
+        "body", "vertices", "drag", "first, ms", "median", "95 %", "longest",
+        "ARAP iteration, ms", "median / ARAP", "95 % / ARAP", "longest / ARAP",
+        "steps", "most", "away", "largest", "jump", "volume change",
+    )  # fmt: skip
+    section.tables.append(Table(columns, rows, "frames"))
+    return section
 
 
-def felt(body: str, size: int, scale: Scale) -> Felt:
-    """Return the measurements of one of `BODIES` with *size* vertices."""
+def felt(body: str, size: int, scale: Scale) -> tuple[list[float], dict[str, Drag], float, str]:
+    """Set up one of `BODIES` with *size* vertices, drag it by a handle, and pull it.
+
+    Returned are the seconds of the parts of the set-up, the drags by name, and the seconds of an
+    iteration of ARAP, or NaN and the reason.
+    """
     warm_up()
     mesh = BODIES[body](size)
     own, session = Hand.on(mesh), Session(mesh)
     session.change_options(n_cage_vertices=scale.n_cage_vertices)
-    times = [time.process_time()]
-    session.segment()
-    times.append(time.process_time())
-    session.fit_cages()
-    times.append(time.process_time())
+    _, segment = timed(session.segment)
+    _, cages = timed(session.fit_cages)
     assert session.regions is not None
     # Not by the session, which would find an earlier binding on the disk.
-    deformer = Deformer(mesh, session.regions, session.cages)
+    deformer, bind = timed(partial(Deformer, mesh, session.regions, session.cages))
     preparation = Preparation(session.regions, session.cages, deformer)
-    session = ready(preparation, own, handle=True)
-    times.append(time.process_time())
+    session, bind_handle = timed(lambda: ready(preparation, own, handle=True))
     drags = {"handle": dragged(session, own, preparation, pulls=False)}
     session = ready(preparation, own, handle=True, avoid_contact=True)
-    drags[_APART] = dragged(session, own, preparation, pulls=False)
+    drags["handle, avoiding contact"] = dragged(session, own, preparation, pulls=False)
     session = ready(preparation, own, handle=False)
     drags["pull"] = dragged(session, own, preparation, pulls=True)
     arap, fault = math.nan, ""
@@ -120,70 +96,23 @@ def felt(body: str, size: int, scale: Scale) -> Felt:
         arap = arap_iteration_seconds(task, scale.repeats)
     except MissingDependencyError as missing:
         fault = str(missing)
-    segment, cages, bind = np.diff(times).tolist()
-    return Felt(body, mesh.n_vertices, segment, cages, bind, drags, arap, fault)
+    return [segment, cages, bind + bind_handle], drags, arap, fault
 
 
-def _set_up_table(found: list[Felt]) -> Table:
-    columns = ("body", "vertices", "regions", "cages", "binding", "total")
-    rows = [
-        (f.body, f.vertices, f.segment, f.cages, f.bind, f.segment + f.cages + f.bind)
-        for f in found
-    ]
-    return Table(columns, rows, "set-up, seconds")
+def dragged(session: Session, own: Hand, preparation: Preparation, *, pulls: bool) -> Drag:
+    """Drag the handle of *session*, or pull the tip, along the path of `drags.hand`."""
+    goals = way_of_tip(session, own) if pulls else way_of_handle(own)
+    drag = Drag()
+    for k, drag in enumerate(frames(session, goals, own.point if pulls else None), 1):
+        if k % _CHECKED == 0:
+            drag.measure(session, preparation)
+    return drag
 
 
-def _frame_table(found: list[Felt]) -> Table:
-    columns = (
-        "body", "vertices", "drag", "first, ms", "median", "95 %", "longest",
-        "ARAP iteration, ms", "median / ARAP", "95 % / ARAP", "longest / ARAP",
-        "steps", "most", "away", "largest", "jump", "volume change",
+def _row(drag: Drag, arap: float) -> tuple[Cell, ...]:
+    away = drag.each("away")
+    return (
+        1e3 * drag.seconds[0], *(1e3 * t for t in drag.felt), 1e3 * arap,
+        *(t / arap for t in drag.felt), int(np.median(drag.steps)), max(drag.steps),
+        float(np.median(away)), float(away.max()), drag.jump, max(drag.volumes),
     )  # fmt: skip
-    rows: list[tuple[Cell, ...]] = [
-        (
-            f.body, f.vertices, name, 1e3 * d.first, *(1e3 * t for t in d.felt), 1e3 * f.arap,
-            *(t / f.arap for t in d.felt), int(np.median(d.steps)), int(d.steps.max()),
-            float(np.median(d.away)), float(d.away.max()), d.jump, d.volume,
-        )
-        for f in found
-        for name, d in f.drags.items()
-    ]  # fmt: skip
-    return Table(columns, rows, "frames")
-
-
-def _figure(found: list[Felt]) -> Figure:
-    panels = {f"{body}, ms": lines([f for f in found if f.body == body]) for body in BODIES}
-    sizes = sorted({float(each.vertices) for each in found})
-    return Figure(
-        "drag-times.png",
-        "Median and longest frame of a drag and a pull, and one ARAP iteration, by mesh size.",
-        lambda path: charts.line_plot(path, sizes, panels, across="vertices", logarithmic=True),
-    )
-
-
-def lines(own: list[Felt]) -> dict[str, list[float]]:
-    """Return the lines of a body in the figure, milliseconds for each size."""
-    times = {}
-    for name in ("handle", "pull"):
-        felt = [each.drags[name].felt for each in own]
-        times[f"{name}, median"] = [1e3 * median for median, _, _ in felt]
-        times[f"{name}, longest"] = [1e3 * longest for _, _, longest in felt]
-    return times | {"ARAP iteration": [1e3 * each.arap for each in own]}
-
-
-def _ratios(found: list[Felt]) -> list[Ratio]:
-    ratios = []
-    for each in found:
-        for name, d in each.drags.items():
-            what = f"{each.body}, {each.vertices:,} vertices, {name}"
-            for part, time_of, most in zip(
-                ("median", "95 %", "longest"), d.felt, _MOST.get(each.vertices, ()), strict=False
-            ):
-                ratios.append(Ratio(f"{what}: {part} frame / ARAP", time_of / each.arap, most))
-            ratios.append(Ratio(f"{what}: away", float(d.away.max()), _MOST_AWAY))
-            ratios.append(Ratio(f"{what}: volume change", d.volume, _MOST_VOLUME))
-        if _APART in each.drags:
-            plain, apart = (each.drags[name].felt[0] for name in ("handle", _APART))
-            what = f"{each.body}, {each.vertices:,} vertices: frame that avoids contact / not"
-            ratios.append(Ratio(what, apart / plain, _MOST_CONTACT))
-    return ratios

@@ -1,7 +1,4 @@
-"""Measuring time, and running in a child process.
-
-Programs that may crash or compete for threads run in a child process, by `in_own_process`.
-"""
+"""Processor time, child processes, and the conditions of a run."""
 
 from __future__ import annotations
 
@@ -29,29 +26,30 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA
 
 
 def timed(work: Callable[[], _T]) -> tuple[_T, float]:
-    """Return the result of *work* and its seconds."""
-    start = time.perf_counter()
+    """Return the result of *work* and its processor time in seconds, over all cores."""
+    start = time.process_time()
     result = work()
-    return result, time.perf_counter() - start
+    return result, time.process_time() - start
 
 
 def by_turns(works: Sequence[Callable[[], object]], repeats: int) -> list[float]:
-    """Return the median processor time of each of *works*, in seconds, run alternately."""
-    rounds = [[processor_seconds(work, 1) for work in works] for _ in range(repeats)]
-    return [statistics.median(times) for times in zip(*rounds, strict=True)]
+    """Return the median processor time of each of *works*, in seconds.
 
+    They run alternately, each twice, and the first one, which fills the caches, is not timed.
+    """
 
-def processor_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the processor time of one run of *work*, over all cores."""
-    work()
-    start = time.process_time()
-    for _ in range(repeats):
+    def warm(work: Callable[[], object]) -> float:
         work()
-    return (time.process_time() - start) / repeats
+        return timed(work)[1]
+
+    rounds = [[warm(work) for work in works] for _ in range(repeats)]
+    return [statistics.median(times) for times in zip(*rounds, strict=True)]
 
 
 def in_own_process(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
     """Return the result of *work*, a function of a module, run in a new process.
+
+    It has memory, threads and OpenGL of its own.
 
     Raises
     ------
@@ -68,17 +66,13 @@ def in_own_process(work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwarg
         raise MissingDependencyError("its process crashed") from None
 
 
-def run_in(own_process: bool, work: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-    """Return the result of *work*, run in a new process or in this one."""
-    return in_own_process(work, *args, **kwargs) if own_process else work(*args, **kwargs)
-
-
 def conditions() -> list[str]:
     """Describe the machine and the software, one line each."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     limits = ", ".join(f"{name}={os.environ[name]}" for name in _THREADS if name in os.environ)
+    load = f"; load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return [
-        f"{processor()}; {cores} cores for this process; {platform.system()}{_load()}",
+        f"{_processor()}; {cores} cores for this process; {platform.system()}{load}",
         f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, "
         f"vtk_segdeform {__version__}",
         f"{n_threads()} threads, with{'' if compiled_kernels() else 'out'} compiled kernels; "
@@ -86,17 +80,7 @@ def conditions() -> list[str]:
     ]
 
 
-def _load() -> str:
-    """Return the load of the machine, with a warning if it is too high to measure time."""
-    if not hasattr(os, "getloadavg"):
-        return ""
-    load, cores = os.getloadavg()[0], os.cpu_count() or 1
-    warning = "; **the machine is busy: times are unreliable**" if load > cores + 0.5 else ""
-    return f"; load {load:.1f} in the last minute{warning}"
-
-
-def processor() -> str:
-    """Return the name of the processor."""
+def _processor() -> str:
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text().splitlines():

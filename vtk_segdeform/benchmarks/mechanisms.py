@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,11 +28,10 @@ from ..models import cactus, random_limbs
 from ..progress import Progress, tell
 from ..session import Preparation, Session
 from ..solver import Anderson
-from .bodies import Hand, with_loose_parts
-from .drags import Record, Shape, frames, ready, way_of_handle, way_of_tip
-from .measuring import run_in
-from .scale import Scale
-from .sections import Cell, Section, Table
+from .drags import Drag, Shape, frames, ready, way_of_handle, way_of_tip
+from .measuring import in_own_process, timed
+from .results import Cell, Scale, Section, Table
+from .tasks import Hand, with_loose_parts
 
 _DRAGS, _PULLS, _SECOND = ("handle", "pull"), ("pull", "second"), ("second",)
 _EVERY, _SHAPE, _BEND = (*_DRAGS, "bend"), (*_DRAGS, "twist", "bend"), ("bend",)
@@ -43,19 +41,28 @@ _LIMIT = 8  # steps of a frame, as the widgets take on a machine that is not bus
 _TURN = 0.5 * np.pi
 _TWIST = np.radians(np.arange(5.0, 275.0, 5.0))
 _REPEATS = 3  # of the bend
-_CHECKED = 15  # one frame of so many is compared with the converged pose
+_CHECKED = 15  # one frame of so many is measured
 _BUYS = 1.05  # less is hardly felt
 # By how much others must differ to be seen: motions of the hand, diagonals, triangles, relative.
 _SEEN = {"jump": 1.0, "away": 1e-4, "error": 1e-4, "folds": 1.0, "volume": 1e-9}
-_IN_TIME = "steps", "slow"  # which explain the time; 90 % of few frames is inexact
-QUANTITIES = ("time", "slow", "steps", "distortion", "worst", "detail", *_SEEN)
-_MEASURED = "jump", "error", "distortion", "worst", "detail", "folds", "volume"  # of a `Drag`
+QUANTITIES = ("time", "steps", "distortion", "worst", "detail", *_SEEN)
+Ways = list[tuple[Callable[[], contextlib.AbstractContextManager[None]], Preparation]]
 Values = dict[str, tuple[float, float]]  # by quantity, with a mechanism and without it
 BODIES: dict[str, Callable[[], Mesh]] = {
+    "random limbs, loose parts": lambda: with_loose_parts(random_limbs(5000, 4), 4),
     "cactus": cactus,
     "random limbs": lambda: random_limbs(22_000, 1),
-    "random limbs, loose parts": lambda: with_loose_parts(random_limbs(5000, 4), 4),
 }
+_TEXT = """\
+Each mechanism is turned off alone; a number is that without it over that with it, so that 1 makes \
+no difference. *Time* is of the processor, all frames together; *distortion* the mean of the \
+poses, *worst* that of ten triangles, *detail* the change of dihedral angles. Of *jump* (farthest \
+that a vertex moves between two frames, over how far the hand does), *away* (of a shown pose from \
+the converged one, diagonals), *error* (of handles and pulled points, diagonals), *folds* \
+(triangles turned over) and *volume* (relative) it is the difference, or 0 if nobody sees it: less \
+than once the motion of the hand, 1e-4 diagonals, a triangle, or 1e-9 of the volume. The first \
+table has the range of all bodies and cases, and in how many of these the mechanism improves \
+something by 5 %, or by what is seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,29 +200,13 @@ MECHANISMS = (
 def run(scale: Scale, progress: Progress | None = None) -> Section:
     """Return a summary and all ratios, for every mechanism, body and case."""
     found: dict[tuple[str, str, str], Values] = {}
-    for k, body in enumerate(BODIES):
-        tell(progress, k / len(BODIES), f"mechanisms: {body}")
-        for (name, case), values in run_in(scale.own_process, measured, body).items():
+    bodies = list(BODIES)[: scale.mechanism_bodies]
+    for k, body in enumerate(bodies):
+        tell(progress, k / len(bodies), f"mechanisms: {body}")
+        for (name, case), values in in_own_process(measured, body).items():
             found[name, body, case] = values
-    return Section(
-        "What the mechanisms buy",
-        text=[
-            (
-                "Each mechanism is turned off alone; a number is that without it over that with "
-                "it, so that 1 makes no difference. *Time* is of the processor, all frames "
-                "together; *slow* the 90 % of frames; *distortion* the mean of the poses, *worst* "
-                "that of ten triangles, *detail* the change of dihedral angles. Of *jump* "
-                "(farthest that a vertex moves between two frames, over how far the hand does), "
-                "*away* (of a shown pose from the converged one, diagonals), *error* (of handles "
-                "and pulled points, diagonals), *folds* (triangles turned over) and *volume* "
-                "(relative) it is the difference, or 0 if nobody sees it: less than once the "
-                "motion of the hand, 1e-4 diagonals, a triangle, or 1e-9 of the volume. The first "
-                "table has the range of all bodies and cases, and in how many of these the "
-                "mechanism improves something by 5 %, or by what is seen."
-            )
-        ],
-        tables=[_summary(found), *(_table(found, body) for body in BODIES)],
-    )
+    tables = [_summary(found), *(_table(found, body) for body in bodies)]
+    return Section("What the mechanisms buy", _TEXT, tables)
 
 
 def measured(body: str) -> dict[tuple[str, str], Values]:
@@ -243,32 +234,40 @@ def compared(
     mechanism: Mechanism, case: str, own: Hand, preparations: tuple[Preparation, Preparation]
 ) -> Values:
     """Return both values of each of `QUANTITIES`, with *mechanism* and without it."""
-    ways: list[Callable[[], contextlib.AbstractContextManager[None]]]
-    ways = [contextlib.nullcontext, mechanism.off]
-    if case == "bend":
-        bends: list[list[dict[str, float]]] = [[], []]
-        for _ in range(_REPEATS):
-            for way, preparation, own_bends in zip(ways, preparations, bends, strict=True):
-                with way():
-                    own_bends.append(bend(own, preparation))
-        pair = [{name: min(each[name] for each in b) for name in b[0]} for b in bends]
-    else:
-        records, drags = [], []
-        for way, preparation in zip(ways, preparations, strict=True):
+    ways: Ways = [(contextlib.nullcontext, preparations[0]), (mechanism.off, preparations[1])]
+    measure = _bends if case == "bend" else _drags
+    with_it, without = measure(case, own, ways)
+    return {name: (with_it[name], without[name]) for name in with_it}
+
+
+def _drags(case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
+    """Return the quantities of two drags, with each frame of one after that of the other."""
+    drags, running = [Drag(), Drag()], []
+    for way, preparation in ways:
+        with way():
+            session, goals, pulled = begun(case, own, preparation)
+        running.append((way, preparation, session, frames(session, goals, pulled, _LIMIT)))
+    is_going = [True, True]
+    while any(is_going):
+        for k, (way, preparation, session, drag) in enumerate(running):
             with way():
-                session, goals, pulled = begun(case, own, preparation)
-            records.append(Record(session, preparation, _CHECKED))
-            drags.append(frames(session, goals, pulled, _LIMIT))
-        is_going = [True, True]
-        while any(is_going):
-            for k, (way, record, drag) in enumerate(zip(ways, records, drags, strict=True)):
-                with way():
-                    frame = next(drag, None)
-                    is_going[k] = frame is not None
-                    if frame is not None:
-                        record.add(frame)
-        pair = [_quantities(record) for record in records]
-    return {name: (pair[0][name], pair[1][name]) for name in pair[0]}
+                so_far = next(drag, None)
+                is_going[k] = so_far is not None
+                if so_far is not None:
+                    drags[k] = so_far
+                    if len(so_far.steps) % _CHECKED == 0:
+                        so_far.measure(session, preparation)
+    return [_quantities(drag) for drag in drags]
+
+
+def _bends(_: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
+    """Return the quantities of a pose that is reached in one jump and finished."""
+    found: list[list[dict[str, float]]] = [[], []]
+    for _ in range(_REPEATS):
+        for (way, preparation), bends in zip(ways, found, strict=True):
+            with way():
+                bends.append(bend(own, preparation))
+    return [{name: min(bend[name] for bend in bends) for name in bends[0]} for bends in found]
 
 
 def begun(
@@ -291,18 +290,17 @@ def begun(
 
 
 def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
-    """Return `QUANTITIES` of the case "bend"."""
+    """Return the quantities of the case "bend"."""
     session = ready(preparation, own, handle=True)
-    began = time.process_time()
-    steps = turn_and_finish(session, own)
-    seconds = time.process_time() - began
+    steps, seconds = timed(lambda: turn_and_finish(session, own))
     solution = session.solution
     assert solution is not None
+    shape = Shape.of(own.mesh, solution)
     return {
         "time": seconds,
         "steps": float(steps),
         "volume": abs(solution.volume_change),
-        **vars(Shape.of(own.mesh, solution)),
+        **{name: float(value) for name, value in vars(shape).items() if name != "away"},
     }
 
 
@@ -320,14 +318,11 @@ def improves(values: Values) -> bool:
     return any(
         without - given >= _SEEN[name] if name in _SEEN else without >= _BUYS * given
         for name, (given, without) in values.items()
-        if name not in _IN_TIME
+        if name != "steps"  # which explain the time
     )
 
 
-def _effect(name: str, values: Values) -> float | None:
-    if name not in values:
-        return None
-    given, without = values[name]
+def _effect(name: str, given: float, without: float) -> float:
     return without - given if name in _SEEN else without / given
 
 
@@ -335,36 +330,35 @@ def _summary(found: Mapping[tuple[str, str, str], Values]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for each in MECHANISMS:
         own = [values for (name, _, _), values in found.items() if name == each.name]
-        ranges = [_range(name, [_effect(name, values) for values in own]) for name in QUANTITIES]
+        ranges = [_range(name, [v[name] for v in own if name in v]) for name in QUANTITIES]
         rows.append((each.name, each.what, *ranges, f"{sum(map(improves, own))} of {len(own)}"))
     return Table(("mechanism", "what it is", *QUANTITIES, "improves"), rows, "all bodies and cases")
 
 
-def _range(name: str, effects: Sequence[float | None]) -> str:
-    known = [effect for effect in effects if effect is not None]
-    if not known:
+def _range(name: str, pairs: list[tuple[float, float]]) -> str:
+    effects = [_effect(name, *pair) for pair in pairs]
+    if not effects:
         return "–"
-    least, most = min(known), max(known)
     if name in _SEEN:
-        return f"{most:.0e}" if most >= _SEEN[name] else "0"
-    return f"{least:.2f} to {most:.2f}"
+        return f"{max(effects):.0e}" if max(effects) >= _SEEN[name] else "0"
+    return f"{min(effects):.2f} to {max(effects):.2f}"
 
 
 def _table(found: Mapping[tuple[str, str, str], Values], body: str) -> Table:
     rows: list[tuple[Cell, ...]] = [
-        (name, case, *(_effect(quantity, values) for quantity in QUANTITIES))
+        (name, case, *(_effect(q, *values[q]) if q in values else None for q in QUANTITIES))
         for (name, own, case), values in found.items()
         if own == body
     ]
     return Table(("mechanism", "case", *QUANTITIES), rows, body, mixed=True)
 
 
-def _quantities(record: Record) -> dict[str, float]:
-    drag = record.drag
+def _quantities(drag: Drag) -> dict[str, float]:
     return {
-        "time": float(drag.times.sum()),
-        "slow": float(np.quantile(drag.times, 0.9)),
-        "steps": float(drag.steps.sum()),
-        "away": float(drag.away.max()),
-        **{name: float(vars(drag)[name]) for name in _MEASURED},
+        "time": sum(drag.seconds[1:]),
+        "steps": float(sum(drag.steps)),
+        "jump": drag.jump,
+        "volume": max(drag.volumes),
+        **{name: float(drag.each(name).mean()) for name in ("distortion", "detail")},
+        **{name: float(drag.each(name).max()) for name in ("worst", "away", "error", "folds")},
     }

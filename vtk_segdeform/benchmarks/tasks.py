@@ -1,30 +1,33 @@
-"""Tasks of the experiments: meshes with fixed vertices, handles and targets.
+"""Meshes with fixed vertices, handles and targets.
 
 bent_cactus      the trunk is bent, as in `segdeform demo`
-raised_neck      the dinosaur's head is turned back, its feet are fixed
 benchmark_pose   a pose of Botsch and Sorkine's benchmark, in the folder SEGDEFORM_DATA
+Hand             the end of the longest limb of any body, so that it needs no choice for a body
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.spatial.transform import Rotation
 
-from ..arrays import BoolArray, FloatArray, IntArray
-from ..cages import Cage, fit_cages
+from ..arrays import FloatArray, IntArray
+from ..cages import fit_cages
 from ..deformer import Deformer
 from ..io import read_mesh
-from ..mesh import Mesh
-from ..models import cactus, dinosaur
+from ..mesh import Mesh, SurfacePoint
+from ..models import cactus, sphere
 from ..regions import Regions, segment
-from .measuring import timed
 
-CONVERGED = 1e-4  # mesh diagonals: largest movement of a step that counts as converged
+_HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
+_RING = 0.03  # half the width of the ring around the root
+_PULL = 0.25  # diagonals that a pull moves while a handle would turn by a radian
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,108 +40,143 @@ class Task:
     handle: IntArray
     targets: FloatArray
 
-    def shifted(self, share: float) -> Task:
-        """Return the task with targets moved sideways by *share* of the mesh diagonal."""
-        shift = share * self.mesh.diagonal * np.array([0.6, 0.8, 0.0])
-        return replace(self, targets=self.targets + shift)
+
+def bent_cactus(n_vertices: int) -> Task:
+    """Return the cactus with its trunk bent by 60 degrees."""
+    mesh = cactus(n_vertices)
+    x = mesh.vertices
+    low, high = x.min(axis=0), x.max(axis=0)
+    height = (x[:, 2] - low[2]) / (high[2] - low[2])
+    fixed, handle = np.flatnonzero(height < 0.08), np.flatnonzero(height > 0.92)
+    pivot = 0.5 * (low + high)
+    pivot[2] = low[2] + 0.4 * (high[2] - low[2])
+    turn = Rotation.from_euler("y", 60.0, degrees=True)
+    return Task("cactus", mesh, fixed, handle, turn.apply(x[handle] - pivot) + pivot)
 
 
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """A bound deformer, and the seconds of each part of the set-up."""
-
-    deformer: Deformer
-    segment: float
-    cages: float
-    bind: float
-
-    @property
-    def seconds(self) -> float:
-        """Total of the set-up."""
-        return self.segment + self.cages + self.bind
+def benchmark_poses() -> list[Task]:
+    """Return two poses of Botsch and Sorkine's benchmark; none if SEGDEFORM_DATA has it not."""
+    folder = Path(os.environ.get("SEGDEFORM_DATA") or "/nowhere") / "botsch-sorkine"
+    return [_pose(folder / name) for name in ("cactus", "cylinder")] if folder.is_dir() else []
 
 
-def prepare(task: Task, n_regions: int | None, n_vertices: int, **options: Any) -> Prepared:
+def _pose(path: Path) -> Task:
+    mesh = read_mesh(path.with_suffix(".off"))
+    roles = np.loadtxt(path.with_suffix(".sel"))
+    matrix = np.loadtxt(path.with_suffix(".def"))
+    fixed, handle = np.flatnonzero(roles == 0), np.flatnonzero(roles == 2)
+    targets = mesh.vertices[handle] @ matrix[:3, :3].T + matrix[:3, 3]
+    return Task(f"Botsch-Sorkine {path.name}", mesh, fixed, handle, targets)
+
+
+def make_regions(mesh: Mesh, n_regions: int) -> Regions:
+    """Return *n_regions* regions."""
+    return Regions.single(mesh) if n_regions == 1 else segment(mesh, n_regions)
+
+
+def prepare(task: Task, n_regions: int, n_vertices: int, **options: Any) -> Deformer:
     """Return a deformer for *task* with given numbers of regions and cage vertices.
 
     *options* are those of `Deformer`.
     """
-    mesh = task.mesh
-    regions, t_segment = timed(lambda: make_regions(mesh, n_regions))
-    cages, t_cages = timed(lambda: fit_cages(mesh, regions, n_vertices))
-    deformer, t_bind = timed(lambda: make_deformer(task, regions, cages, **options))
-    return Prepared(deformer, t_segment, t_cages, t_bind)
-
-
-def make_regions(mesh: Mesh, n_regions: int | None) -> Regions:
-    """Return *n_regions* regions; if None, `segment` chooses the number."""
-    return Regions.single(mesh) if n_regions == 1 else segment(mesh, n_regions)
-
-
-def make_deformer(task: Task, regions: Regions, cages: Sequence[Cage], **options: Any) -> Deformer:
-    """Return a deformer with the fixed vertices and the handle of *task*."""
+    regions = make_regions(task.mesh, n_regions)
+    cages = fit_cages(task.mesh, regions, n_vertices)
     return Deformer(task.mesh, regions, cages, fixed=task.fixed, handle=task.handle, **options)
-
-
-def bent_cactus(n_vertices: int, degrees: float = 60.0) -> Task:
-    """Return the cactus with its trunk bent by *degrees*."""
-    mesh = cactus(n_vertices)
-    height = _shares(mesh.vertices)[:, 2]
-    middle = 0.5 * (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0))
-    middle[2] = mesh.vertices[:, 2].min() + 0.4 * np.ptp(mesh.vertices[:, 2])
-    return _turned("cactus", mesh, (height < 0.08, height > 0.92), (middle, degrees))
-
-
-def raised_neck(n_vertices: int, degrees: float = 50.0) -> Task:
-    """Return the dinosaur with its head turned back by *degrees* about its shoulders."""
-    mesh = dinosaur(n_vertices)
-    share = _shares(mesh.vertices)
-    head = (share[:, 0] > 0.88) & (share[:, 2] > 0.8)
-    shoulders = np.array([0.35, 0.0, 0.45]) * mesh.vertices.max(axis=0)
-    return _turned("dinosaur", mesh, (share[:, 2] < 0.06, head), (shoulders, -degrees))
 
 
 def warm_up() -> None:
     """Load the compiled kernels, or compile them, so that no measurement includes this."""
     task = bent_cactus(2500)
-    prepare(task, 1, 40).deformer.solve(task.targets, max_steps=2)
+    prepare(task, 1, 40).solve(task.targets, max_steps=2)
 
 
-def benchmark_folder() -> Path | None:
-    """Return the folder of the benchmark, or None if SEGDEFORM_DATA does not contain it."""
-    folder = Path(os.environ.get("SEGDEFORM_DATA", "")) / "botsch-sorkine"
-    return folder if "SEGDEFORM_DATA" in os.environ and folder.is_dir() else None
+def with_loose_parts(body: Mesh, seed: int, count: int = 4) -> Mesh:
+    """Return *body* with *count* small spheres close to its surface, as separate components."""
+    rng, x = np.random.default_rng(seed), body.vertices
+    a, b, c = x[body.faces.T]
+    normals = np.cross(b - a, c - a)
+    vertices, faces = [x], [body.faces]
+    for face in rng.choice(len(body.faces), count, replace=False):
+        normal, ball = normals[face] / np.linalg.norm(normals[face]), sphere(100)
+        centre = x[body.faces[face]].mean(axis=0) + 0.025 * body.diagonal * normal
+        faces.append(ball.faces + sum(map(len, vertices)))
+        vertices.append(0.02 * body.diagonal * ball.vertices + centre)
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 
-def benchmark_pose(folder: Path, name: str) -> Task:
-    """Return the pose "cactus" or "cylinder" of Botsch and Sorkine's benchmark."""
-    mesh = read_mesh(folder / f"{name}.off")
-    roles = np.array(_rows(folder / f"{name}.sel"), dtype=float).ravel()
-    matrix = np.array(_rows(folder / f"{name}.def"), dtype=float)
-    fixed, handle = np.flatnonzero(roles == 0), np.flatnonzero(roles == 2)
-    targets = mesh.vertices[handle] @ matrix[:3, :3].T + matrix[:3, 3]
-    return Task(f"Botsch-Sorkine {name}", mesh, fixed, handle, targets)
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """A handle at the end of a limb, the vertices that are fixed, and how the handle turns.
 
-
-def _turned(
-    name: str, mesh: Mesh, masks: tuple[BoolArray, BoolArray], turn: tuple[FloatArray, float]
-) -> Task:
-    """Return the task with *masks* of fixed and handle vertices; *turn* is a pivot and degrees.
-
-    The handle is rotated about the y direction.
+    Parameters
+    ----------
+    mesh : Mesh
+        The body.
+    fixed, handle : (f,) int, (k,) int
+        Vertices.
+    tip : int
+        The vertex at the end of the limb.
+    root, axis : (3,) float
+        The handle turns about the line through *root* along *axis*.
     """
-    pivot, angle = turn[0], np.radians(turn[1])
-    c, s = np.cos(angle), np.sin(angle)
-    matrix = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    fixed, handle = (np.flatnonzero(mask) for mask in masks)
-    targets = (mesh.vertices[handle] - pivot) @ matrix.T + pivot
-    return Task(name, mesh, fixed, handle, targets)
 
+    mesh: Mesh
+    fixed: IntArray
+    handle: IntArray
+    tip: int
+    root: FloatArray
+    axis: FloatArray
 
-def _shares(points: FloatArray) -> FloatArray:
-    return np.asarray((points - points.min(axis=0)) / np.ptp(points, axis=0))
+    @classmethod
+    def on(cls, mesh: Mesh) -> Hand:
+        """Return the hand on the limb of *mesh* whose tip is farthest along the surface."""
+        x = mesh.vertices
+        i, j = np.concatenate(
+            [mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]
+        ).T
+        lengths = np.linalg.norm(x[i] - x[j], axis=1)
+        graph = sparse.coo_array((lengths, (i, j)), shape=(len(x),) * 2).tocsr()
+        largest = mesh.components == np.bincount(mesh.components).argmax()
+        middle = np.where(largest, np.linalg.norm(x - x.mean(axis=0), axis=1), np.inf).argmin()
 
+        def distances(start: int) -> FloatArray:
+            found = csgraph.dijkstra(graph, directed=False, indices=np.array(start))
+            return np.asarray(np.where(np.isfinite(found), found, -1.0))
 
-def _rows(path: Path) -> list[list[str]]:
-    lines = path.read_text().splitlines()
-    return [line.split() for line in lines if line.strip() and not line.startswith("#")]
+        tip = int(distances(int(middle)).argmax())
+        away = distances(tip) / distances(tip).max()
+        handle = np.flatnonzero((away >= 0.0) & (away < _HANDLE))
+        root = x[np.abs(away - _ROOT) < _RING].mean(axis=0)
+        along = x[handle].mean(axis=0) - root
+        side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+        return cls(
+            mesh, np.flatnonzero(away > _FIXED), handle, tip, root, side / np.linalg.norm(side)
+        )
+
+    @property
+    def point(self) -> SurfacePoint:
+        """The point that is pulled: in a face at the tip, as a pointer hits it."""
+        face = self.mesh.faces[np.flatnonzero((self.mesh.faces == self.tip).any(axis=1))[0]]
+        return SurfacePoint.of(face, np.where(face == self.tip, 0.6, 0.2))
+
+    def targets(self, radians: float, aside: FloatArray | float = 0.0) -> FloatArray:
+        """Return the targets (k, 3) of the handle, turned and moved *aside* (3,), in diagonals."""
+        turn = Rotation.from_rotvec(radians * self.axis)
+        places = turn.apply(self.mesh.vertices[self.handle] - self.root) + self.root
+        return np.asarray(places + self.mesh.diagonal * np.asarray(aside))
+
+    def twisted(self, radians: float) -> FloatArray:
+        """Return the targets (k, 3) of the handle, turned about the limb."""
+        x = self.mesh.vertices[self.handle]
+        along = x.mean(axis=0) - self.root
+        turn = Rotation.from_rotvec(radians * along / np.linalg.norm(along))
+        return np.asarray(turn.apply(x - self.root) + self.root)
+
+    def pulled_to(
+        self, radians: float, aside: FloatArray | float = 0.0, *, start: FloatArray | None = None
+    ) -> FloatArray:
+        """Return where `point` is pulled to from *start* (3,), about as far as the handle moves."""
+        start = self.point.at(self.mesh.vertices) if start is None else start
+        way = np.cross(self.axis, start - self.root)
+        moved = _PULL * radians * way / np.linalg.norm(way) + np.asarray(aside)
+        return np.asarray(start + self.mesh.diagonal * moved)

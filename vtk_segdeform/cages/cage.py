@@ -34,8 +34,8 @@ MOST_CAGE_VERTICES = 1600
 """Most vertices of all cages together: the solver factors matrices of three rows per vertex."""
 
 _LONGEST_NAME = 100  # characters of a cage's name in a message
-_MANY, _BOXES = 20_000, 64  # points that are tested box by box; boxes along the longest side
-_LARGEST = 1e70  # coordinate, as for a mesh
+_BOXED_FROM, _BOXES = 20_000, 64  # points from which boxes are tested; along the longest side
+_LARGEST_COORDINATE = 1e70  # coordinate, as for a mesh
 
 _known: WeakKeyDictionary[Cage, WeakKeyDictionary[Regions, dict[int, bool]]] = WeakKeyDictionary()
 
@@ -104,7 +104,7 @@ class Cage(Described, Frozen):
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = ((x >= low) & (x <= high)).all(axis=1)
         near = x[inside]
-        if len(near) > _MANY:
+        if len(near) > _BOXED_FROM:
             inside[inside] = _inside_of_many(near, self.vertices, self.faces)
         else:
             inside[inside] = inside_points(near, self.vertices, self.faces)
@@ -114,9 +114,9 @@ class Cage(Described, Frozen):
         """Raise a CageError if any of *points* (n, 3) are outside; *name* describes them."""
         name = require(name, str, "name")[:_LONGEST_NAME]
         x = as_points(points, name)
-        if np.abs(x).max(initial=0.0) > _LARGEST:
+        if np.abs(x).max(initial=0.0) > _LARGEST_COORDINATE:
             raise CageError(
-                f"{name} are too large to compute with: above {_LARGEST:.0e}; scale down"
+                f"{name} are too large to compute with: above {_LARGEST_COORDINATE:.0e}; scale down"
             )
         outside = x[~self.contains(x)]
         if len(outside):
@@ -182,8 +182,8 @@ def cage_faults(vertices: ArrayLike, faces: ArrayLike) -> tuple[str, ...]:
     """
     points = as_points(vertices, "vertices")
     triangles = as_faces(faces, len(points), "faces")
-    if np.abs(points).max(initial=0.0) > _LARGEST:
-        return (f"its coordinates exceed {_LARGEST:.0e}; scale it down",)
+    if np.abs(points).max(initial=0.0) > _LARGEST_COORDINATE:
+        return (f"its coordinates exceed {_LARGEST_COORDINATE:.0e}; scale it down",)
     faults = connectivity_faults(len(points), triangles)
     return tuple(faults or _flat_faults(points, triangles) or _solid_faults(points, triangles))
 

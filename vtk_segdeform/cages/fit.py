@@ -44,24 +44,21 @@ from .region_solid import Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
 from .spacing import bending_density, cage_spacing
 
-_OFFSET = 0.4  # of sqrt(area of the region / vertices of its cage)
-_STEP = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
+_OFFSET_SHARE = 0.4  # of sqrt(area of the region / vertices of its cage)
+_STEP_SHARE = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
 _LARGER = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offset:
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
-_ROUND, _NEAR = 0.2, 0.2  # least roundness, and distance in offsets, of a good cage
-_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
-_FEWER = 3.0  # by which nodes are fewer if spacing varies: half the time, and as good poses
-_FEWEST = 8  # vertices of a cage
-_SUGGESTED, _SUGGESTED_EACH, _SUGGESTED_ALONE = 155, 30, 15  # cage vertices in total, and each
-_SHELL = 6  # fewest vertices of each component of a cage with several
-_FLOOR = 12  # vertices of each cage before the rest is distributed
-_CLOSE, _WIDEST = 0.05, 11.9  # quantile of spacings that is the unit; largest, in that unit
-_THINNEST = 1e-3  # width over length that a region counts with, at least
-_CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
-_PUSHES, _NEAREST = 30, 200  # rounds; nearest vertices whose exact distance is computed
-_CLOSEST, _FARTHEST = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
-_MEASURED = 0.25  # fraction of the progress for measuring regions
-_SIEVE = 16  # every 16th vertex gives an upper bound for the nearest distances
+_GOOD = 0.2  # least roundness of faces, and least distance in offsets, of a good cage
+_MOST_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
+_FEWER_NODES = 3.0  # times, if spacing varies: half the time, and as good poses
+_FEWEST = 8  # vertices of a cage, and of each component of a cage with several
+_SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each part; half alone
+_UNIT_QUANTILE, _MOST_STRETCH = 0.05, 12.0  # of spacings: the unit, and the largest in that unit
+_LEAST_WIDTH = 1e-3  # width over length that a region counts with, at least
+_LEAST_CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
+_PUSHES = 30  # rounds of moving faces away
+_MEASURED_VERTICES = 200  # nearest ones, whose exact distance is computed
+_LEAST_GAP, _MOST_GAP = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 # Barycentric coordinates of samples of a face.
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
 
@@ -76,7 +73,7 @@ def suggested_size(regions: Regions) -> int:
     """
     has = regions.components
     is_part = (has & (has.sum(axis=0) > 1)).any(axis=1)
-    size = _SUGGESTED_EACH * is_part.sum() + _SUGGESTED_ALONE * (~is_part).sum()
+    size = _SUGGESTED_EACH * is_part.sum() + _SUGGESTED_EACH // 2 * (~is_part).sum()
     return int(min(max(_SUGGESTED, size), MOST_CAGE_VERTICES))
 
 
@@ -154,12 +151,11 @@ def fit_cages(
     if by_thickness and not held.all():
         wanted = bending_density(shape)
     spacing = None if wanted is None else _spacing(shape, held, wanted, n_vertices)
-    patches = _patches(shape, membership, progress)
+    patches = _patches(shape, membership, part(progress, 0.0, 0.25))
     numbers = _distributed(patches, n_vertices, spacing)
-    cages = []
+    cages, fitting = [], part(progress, 0.25, 1.0)
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
-        ends = _MEASURED + (1.0 - _MEASURED) * np.array([r, r + 1]) / n_regions
-        piece = part(progress, *map(float, ends))
+        piece = part(fitting, r / n_regions, (r + 1) / n_regions)
         cage = _fit(patch, int(number), offset, piece, spacing)
         if cluster is not None and not encloses_region(cage, regions, r):
             patch = Patch.of(Surface.of(mesh), regions.membership[r])
@@ -197,7 +193,7 @@ def _patches(mesh: Mesh, membership: BoolArray, progress: Progress | None) -> li
     """Return the patch of each region, *membership* (r, n)."""
     patches, surface = [], Surface.of(mesh)
     for r, members in enumerate(membership):
-        tell(progress, _MEASURED * r / len(membership), "measuring regions")
+        tell(progress, r / len(membership), "measuring regions")
         patches.append(Patch.of(surface, members))
     return patches
 
@@ -245,9 +241,9 @@ def _check_offset(offset: float | None, mesh: Mesh) -> None:
         return
     if not (is_number(offset) and offset > 0.0):
         raise CageError(f"offset must be a positive length; got {shown(offset)}")
-    if not _CLOSEST <= offset / mesh.diagonal <= _FARTHEST:
+    if not _LEAST_GAP <= offset / mesh.diagonal <= _MOST_GAP:
         raise CageError(
-            f"offset must be {_CLOSEST:.0e} to {_FARTHEST:.0e} diagonals of the mesh, of length "
+            f"offset must be {_LEAST_GAP:.0e} to {_MOST_GAP:.0e} diagonals of the mesh, of length "
             f"{mesh.diagonal:.3g}; got {shown(offset)}"
         )
 
@@ -263,17 +259,15 @@ def _distributed(patches: list[Patch], n_vertices: int, spacing: FloatArray | No
     """
     if spacing is not None:
         need = np.array([patch.weights @ spacing**-2.0 for patch in patches])
-        floor = _FEWEST
     else:
         area = np.array([patch.area for patch in patches])
         spread = np.array([patch.spread for patch in patches])
         length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
-        width = np.maximum(spread[:, 1:].sum(axis=1), _THINNEST * length)
+        width = np.maximum(spread[:, 1:].sum(axis=1), _LEAST_WIDTH * length)
         need = np.sqrt(area * length / width)
-        floor = min(_FLOOR, n_vertices // len(patches))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
-    ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
-    return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
+    ends = np.rint((n_vertices - _FEWEST * len(patches)) * np.cumsum(share) / share.sum())
+    return np.asarray(_FEWEST + np.diff(ends, prepend=0.0).astype(np.int64))
 
 
 def _fit(
@@ -289,21 +283,21 @@ def _fit(
     """
     length, stretch = float(np.sqrt(patch.area / n)), None
     if spacing is not None:
-        least = np.quantile(spacing[patch.members], _CLOSE)
-        stretch = np.clip(spacing / least, 1.0, _WIDEST)
+        least = np.quantile(spacing[patch.members], _UNIT_QUANTILE)
+        stretch = np.clip(spacing / least, 1.0, _MOST_STRETCH)
         length = float(np.sqrt(patch.weights @ stretch**-2.0 / n))
-    offset = _OFFSET * length if offset is None else offset
+    offset = _OFFSET_SHARE * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []
     for attempt in range(_ATTEMPTS):
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
         larger = _LARGER ** (attempt * (attempt + 1) / 2)
-        nodes = max(_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER)
+        nodes = max(_MOST_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER_NODES)
         field = solid_field(
-            patch, offset * larger, _STEP * length * larger, most_nodes=nodes, stretch=stretch
+            patch, offset * larger, _STEP_SHARE * length * larger, most_nodes=nodes, stretch=stretch
         )
         tell(progress, (attempt + 0.5) / _ATTEMPTS, message)
-        if _SHELL * field.n_shells > n:
+        if _FEWEST * field.n_shells > n:
             fault = f"it has {field.n_shells} components"
             continue
         share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
@@ -347,7 +341,7 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
     """
     vertices = vertices.copy()
     slope = [np.gradient(field.smooth, axis=axis) for axis in range(3)]
-    least = _CLEARANCE * field.offset
+    least = _LEAST_CLEARANCE * field.offset
     for _ in range(_PUSHES):
         at = (_SAMPLES @ vertices[faces]).reshape(-1, 3).T
         distance = ndimage.map_coordinates(field.distance, at, order=1)
@@ -370,12 +364,9 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
 def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     """Return the quality of a cage, 1 or more if no face is a needle or close to the surface."""
     tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
-    x, bound, unit = field.members, np.inf, field.stretch_at(field.members)
-    if field.stretch is None and len(x) > _SIEVE * _NEAREST:  # a subset bounds the nearest gaps
-        few = nearest(tree, x[::_SIEVE])[0][:, 0]
-        bound = np.partition(few, _NEAREST)[_NEAREST] * (1.0 + 1e-12)
-    gap = nearest(tree, x, within=bound)[0][:, 0]
-    closest = np.argsort(gap / unit, kind="stable")[:_NEAREST]
+    x, unit = field.members, field.stretch_at(field.members)
+    gap = nearest(tree, x)[0][:, 0]
+    closest = np.argsort(gap / unit, kind="stable")[:_MEASURED_VERTICES]
     clearance = distance_to_surface(x[closest], vertices, faces) / unit[closest]
     clearance = clearance.min() / field.offset
-    return float(min(roundness(vertices, faces).min() / _ROUND, clearance / _NEAR))
+    return float(min(roundness(vertices, faces).min(), clearance) / _GOOD)

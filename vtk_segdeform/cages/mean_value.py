@@ -59,11 +59,11 @@ from ..mesh import connectivity_faults, counted, face_edges, flat_faces
 from ..progress import Progress
 
 # Lengths are relative to the diagonal of the cage.
-_ON = 1e-14  # points at this distance are on the vertex or edge
-_OFF = 1e-30  # added to h, so that it is never exactly 0
-_NEAR = 1e-3  # of max |a|: for smaller |h|, S is the sum of psi_i
+_ON_EDGE = 1e-14  # points at this distance are on the vertex or edge
+_OFF_PLANE = 1e-30  # added to h, so that it is never exactly 0
+_NEAR_PLANE = 1e-3  # of max |a|: for smaller |h|, S is the sum of psi_i
 _FARTHEST = 1e60  # diagonals; fourth powers of larger distances overflow
-_BLOCK = 1 << 15  # numbers per temporary array: a quarter of a megabyte, which fits into the cache
+_NUMBERS_AT_ONCE = 1 << 15  # per temporary array: a quarter of a megabyte, which fits the cache
 
 
 def mean_value_coordinates(
@@ -133,7 +133,7 @@ def mean_value_coordinates(
             weights[start:stop] = _weights(cage, local.T).T
 
     # With fewer than 16 rows, calls cost more time than the cache saves.
-    rows = max(16, _BLOCK // faces.size)
+    rows = max(16, _NUMBERS_AT_ONCE // faces.size)
     in_parallel(work, len(x), rows, progress=progress, message="mean value coordinates")
     return weights
 
@@ -192,7 +192,7 @@ def _as_arrays(cage: _Cage, faces: IntArray) -> tuple[FloatArray | IntArray, ...
     """Return the arguments of the compiled kernel."""
     planes, starts = cage.planes.reshape(4, len(faces), 4), np.stack([cage.start, cage.along])
     numbers = np.stack([cage.length, cage.cosine[..., 0], cage.halved[..., 0]])
-    limits = np.array([_ON, _OFF, _NEAR])
+    limits = np.array([_ON_EDGE, _OFF_PLANE, _NEAR_PLANE])
     return cage.p, cage.edges, cage.edge_of.T, faces, planes, starts, numbers, limits
 
 
@@ -200,7 +200,7 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
     """Return the weights (m, n) of the points *x* (3, n), given as columns."""
     n = x.shape[1]
     distances = (cage.planes @ np.vstack([x, np.ones(n)])).reshape(4, -1, n)
-    distances[3] += _OFF
+    distances[3] += _OFF_PLANE
     a, h = distances[:3], distances[3]
     A = np.sqrt(a * a + h * h)
     d2 = ((cage.p[:, :, None] - x) ** 2).sum(axis=1)
@@ -211,7 +211,7 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
     b = theta[cage.edge_of] / A
 
     S = np.einsum("ikn,ikn->kn", a, b)
-    cancels = (np.abs(h) < _NEAR * np.abs(a).max(axis=0)) & (a.min(axis=0) < 0.0)
+    cancels = (np.abs(h) < _NEAR_PLANE * np.abs(a).max(axis=0)) & (a.min(axis=0) < 0.0)
     face, k = np.nonzero(cancels)
     S[face, k] = _sum_near_plane(cage, face, x[:, k], distances[:, face, k])
     S /= h
@@ -224,11 +224,11 @@ def _weights(cage: _Cage, x: FloatArray) -> FloatArray:
     weights = np.add.reduceat(w.reshape(-1, n)[cage.by_vertex], cage.begins)
 
     # On edges and vertices the faces give different rounding errors; set the weights directly.
-    edge, k = np.nonzero((from_edge <= _ON) & (dot < 0.0))
+    edge, k = np.nonzero((from_edge <= _ON_EDGE) & (dot < 0.0))
     i, j = i[edge], j[edge]
     weights[:, k] = 0.0
     weights[i, k], weights[j, k] = np.sqrt(d2[j, k]), np.sqrt(d2[i, k])
-    vertex, k = np.nonzero(d2 <= _ON**2)
+    vertex, k = np.nonzero(d2 <= _ON_EDGE**2)
     weights[:, k] = 0.0
     weights[vertex, k] = 1.0
     return np.asarray(weights / weights.sum(axis=0))

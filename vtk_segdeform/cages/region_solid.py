@@ -17,7 +17,7 @@ On the nodes y of a regular grid, with its spacing as the unit of length:
 The surface g = offset is closed for any region.
 
 The grid is aligned with the principal axes of the region, so that a cage rotates with its mesh; for
-symmetric shapes the vertex indices determine axes and signs (`principal_axes`).
+symmetric shapes the vertex indices determine axes and signs (`geometry.principal_axes`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from scipy import ndimage
 from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..geometry import lids_of
+from ..geometry import lids_of, principal_axes
 from ..kernels import in_parallel
 from ..mesh import Mesh, inside_nodes, ragged_arange
 
@@ -38,10 +38,10 @@ _STEPS_PER_OFFSET = 1.5  # at least, so that every point of S has a node inside 
 _MARGIN = 3.7183  # steps around the offset surface; uneven, so that no extreme is on a node
 _BLUR = 0.5  # standard deviation, relative to the offset
 _FIRST_OF_EQUALS = 1.0 - 1e-6 * np.arange(3)  # breaks ties between equal edges
-_PIECE = 20_000  # faces per task
-_FLAT = 1e-12  # area of faces relative to the square of their length
-_SHORTEST = 1e-2  # length of a face without any, relative to the mesh
-_SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
+_FACES_AT_ONCE = 50_000  # of a task
+_FLAT_AREA = 1e-12  # area of faces relative to the square of their length
+_LEAST_LENGTH = 1e-2  # length of a face without any, relative to the mesh
+_SAMPLE_SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class Surface:
             square = ((x - x[:, [1, 2, 0]]) ** 2).sum(axis=2).max(axis=1)
             longest[start:stop] = np.sqrt(square)
 
-        in_parallel(work, mesh.n_faces, _PIECE)
+        in_parallel(work, mesh.n_faces, _FACES_AT_ONCE)
         points = mesh.vertices - centre
         walls = points, mesh.faces
         if not mesh.is_closed:
@@ -107,8 +107,10 @@ class Patch:
         touching = members[surface.faces].any(axis=1)
         corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
         length = surface.longest[touching]
-        least = _SHORTEST * np.ptp(surface.points, axis=0).max()
-        if thirds.sum() <= _FLAT * (length @ length):  # count flat faces by their length instead
+        least = _LEAST_LENGTH * np.ptp(surface.points, axis=0).max()
+        if thirds.sum() <= _FLAT_AREA * (
+            length @ length
+        ):  # count flat faces by their length instead
             thirds = np.maximum(length, least) ** 2 / 12.0
         weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
@@ -192,21 +194,6 @@ class SolidField:
         return np.asarray(ndimage.map_coordinates(self.stretch, x.T, order=1, mode="nearest"))
 
 
-def principal_axes(points: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return right-handed principal axes as rows, longest first, that rotate with *points* (n, 3).
-
-    The weight of each vertex is scaled by a random number that depends on its index.  This
-    separates axes of equal length and determines their signs, in the same way for any rotation.
-    """
-    scale, sign = np.random.default_rng(0).uniform(0.0, 2.0, (2, len(points)))
-    mass = weights * scale
-    centred = points - mass @ points / mass.sum()
-    axes = np.linalg.eigh((centred.T * mass) @ centred)[1].T[::-1]
-    axes = axes * np.where(axes @ ((sign - 1.0) @ centred) < 0.0, -1.0, 1.0)[:, None]
-    axes[2] = np.cross(axes[0], axes[1])
-    return np.asarray(axes)
-
-
 def solid_field(
     patch: Patch,
     offset: float,
@@ -239,7 +226,9 @@ def solid_field(
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 
     nodes = grid.to_nodes(surface.points)
-    large = surface.faces[surface.longest > 0.99 * _SPACING * step]  # smaller faces need no samples
+    large = surface.faces[
+        surface.longest > 0.99 * _SAMPLE_SPACING * step
+    ]  # smaller faces need no samples
     samples = np.concatenate([nodes[members], _samples(nodes[large[members[large].all(axis=1)]])])
     corners, faces = surface.walls
     inside = np.argwhere(inside_nodes(grid.to_nodes(corners), faces, grid.shape))
@@ -306,14 +295,14 @@ def _filled(values: FloatArray, offset: float, members: FloatArray) -> tuple[Flo
 def _samples(triangles: FloatArray) -> FloatArray:
     """Return points at most a step apart on the *triangles* (m, 3, 3) that are larger."""
     length = np.linalg.norm(triangles - triangles[:, [1, 2, 0]], axis=2)
-    large = np.flatnonzero(length.max(axis=1) > _SPACING)
+    large = np.flatnonzero(length.max(axis=1) > _SAMPLE_SPACING)
     longest = (length[large] * _FIRST_OF_EQUALS).argmax(axis=1)
     order = (longest[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles[large], order[..., None], axis=1).transpose(1, 0, 2)
     base = length[large, longest]
     height = np.linalg.norm(np.cross(b - a, c - a), axis=1) / base
-    rows = np.ceil(height / _SPACING).astype(np.int64) + 1
-    columns = np.ceil(base / _SPACING).astype(np.int64) + 1
+    rows = np.ceil(height / _SAMPLE_SPACING).astype(np.int64) + 1
+    columns = np.ceil(base / _SAMPLE_SPACING).astype(np.int64) + 1
     t, k = ragged_arange(rows * columns)
     up = (k // columns[t] / np.maximum(rows - 1, 1)[t])[:, None]
     along = (k % columns[t] / np.maximum(columns - 1, 1)[t])[:, None]

@@ -2,7 +2,7 @@
 
 Collapsing edge (i, j) to a point p costs
 
-    C(i, j) = Q(p) + LAMBDA (a_i + a_j) |x_i - x_j|^2        p near the minimum of Q
+    C(i, j) = Q(p) + k (a_i + a_j) |x_i - x_j|^2        p near the minimum of Q
 
     Q(p)    sum of a_f (distance of p from the plane of f)^2 over the faces f accumulated in i
             and j: the quadric of [GH97]
@@ -39,12 +39,12 @@ from ..kernels import compiled_checks, inputs, scratch
 from ..mesh import cross_rows
 from ..progress import Progress, tell
 
-_ROUNDNESS = 0.01  # least `roundness` of a changed face
-_LAMBDA = 0.05
-_STIFFNESS = 0.05  # weight that attracts p to the midpoint of the edge, relative to Q's trace
-_CHEAPEST = 0.3  # fraction of the edges considered in one round
+_LEAST_ROUNDNESS = 0.01  # least `roundness` of a changed face
+_LENGTH_WEIGHT = 0.05  # k
+_MIDPOINT_WEIGHT = 0.05  # attracts p to the midpoint of the edge, relative to the trace of Q
+_SHARE_OF_ROUND = 0.3  # of the edges, that are considered in one round
 _PASSES = 2  # of the search for independent edges
-_TURN = 0.3  # cosine of the largest rotation of a face
+_LEAST_COSINE = 0.3  # between the normals of a face before and after
 
 
 @dataclass
@@ -168,7 +168,9 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
         ends = np.empty((m, 2), dtype=np.int64)
         kernels.sorted_edges(i, j, ends, *scratch(np.int64, n + 2, 2 * m, 2 * m), *inputs(s.faces))
         read = inputs(i, j, known.i, known.j, known.cost, known.place, is_moved)
-        kernels.collapse_costs(cost, place, *read, _STIFFNESS, _LAMBDA, *inputs(s.points, s.sums))
+        kernels.collapse_costs(
+            cost, place, *read, _MIDPOINT_WEIGHT, _LENGTH_WEIGHT, *inputs(s.points, s.sums)
+        )
     else:
         tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
         up = tail < head
@@ -189,7 +191,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
     xx, xy, xz, yy, yz, zz, bx, by, bz, c, area, need = (s.sums[i] + s.sums[j]).T
     x, y, z = (0.5 * (s.points[i] + s.points[j])).T
-    more = _STIFFNESS * ((xx + yy) + zz)
+    more = _MIDPOINT_WEIGHT * ((xx + yy) + zz)
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
     pull_x = bx - ((xx * x + xy * y) + xz * z)
     pull_y = by - ((xy * x + yy * y) + yz * z)
@@ -205,7 +207,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     quadratic += ((xz * x + yz * y) + zz * z) * z
     error = (quadratic - 2.0 * ((bx * x + by * y) + bz * z)) + c
     d = s.points[i] - s.points[j]
-    cost = (error + _LAMBDA * area * _dot(d, d)) * (need / area) ** 2
+    cost = (error + _LENGTH_WEIGHT * area * _dot(d, d)) * (need / area) ** 2
     return cost, np.stack([x, y, z], axis=1)
 
 
@@ -216,7 +218,7 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     with its own; a second pass considers the edges that overlap with no chosen one.
     """
     i, j = edges.i, edges.j
-    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(_CHEAPEST * len(cost))
+    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(_SHARE_OF_ROUND * len(cost))
     if len(cheapest) > most:
         cheapest = cheapest[cost[cheapest] <= np.partition(cost[cheapest], most - 1)[most - 1]]
     cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]
@@ -271,9 +273,11 @@ def _valid(s: _Surface, edges: _Edges) -> BoolArray:
     if kernels := compiled_checks(len(s.faces)):
         good, common = np.empty(len(i), dtype=bool), np.zeros(len(i), dtype=np.int64)
         count, of = np.zeros_like(owner), np.empty_like(owner)
-        least = np.full(len(i), np.inf), np.full(len(i), _ROUNDNESS)
+        least = np.full(len(i), np.inf), np.full(len(i), _LEAST_ROUNDNESS)
         read = inputs(place, s.points, s.faces)
-        kernels.valid_collapses(good, *inputs(owner), count, of, common, *least, _TURN, *read)
+        kernels.valid_collapses(
+            good, *inputs(owner), count, of, common, *least, _LEAST_COSINE, *read
+        )
         return good
     moved = s.points.copy()
     moved[i] = moved[j] = place
@@ -297,9 +301,9 @@ def _valid(s: _Surface, edges: _Edges) -> BoolArray:
     before, old_roundness = _normals(s.points[around[is_kept]])
     after, new_roundness = _normals(moved[around[is_kept]])
     of_face = of_corner[kept].max(axis=1)
-    worst = np.full(len(i), _ROUNDNESS)
+    worst = np.full(len(i), _LEAST_ROUNDNESS)
     np.minimum.at(worst, of_face, old_roundness)
-    fine = _dot(before, after) > _TURN
+    fine = _dot(before, after) > _LEAST_COSINE
     fine &= new_roundness >= worst[of_face]
     good[of_face[~fine]] = False
     return np.asarray(good)

@@ -3,10 +3,9 @@
 A density rho of cage vertices per area asks for a spacing of (c rho)^(-1/2).  Spacing must not grow
 too fast along the surface, or cages have needles:
 
-    h(x) = min over y of  (c rho(y))^(-1/2) + s d(x, y)
+    h(x) = min over y of  (c rho(y))^(-1/2) + d(x, y)
 
     d       distance along edges
-    s       slope
     c       such that the integral of h^-2 is the number of cage vertices
 
 Where rho is zero, in a fixed part, the spacing grows from its border inwards: there are cage
@@ -36,13 +35,12 @@ from ..arrays import FloatArray
 from ..kernels import nearest
 from ..mesh import Mesh
 
-_SLOPE = 1.0
-_ROUNDS, _CLOSE = 6, 0.03  # of the search for c, and the error of the number at which it ends
-_SHORTEST = 1e-12  # edge, in diagonals: a sparse graph has no edges of length 0
-_CONTRAST = 8.0  # largest ratio of a density to the median one
-_SHRINKS = 12  # rounds
-_ACROSS = 0.3  # cosine of the normal to the direction of the other side; smaller is a bump
-_SMOOTH = 6  # rounds that average the thickness of neighbours, in the logarithm
+_ROUNDS, _ENOUGH = 6, 0.03  # of the search for c, and the error of the number at which it ends
+_SHORTEST_EDGE = 1e-12  # edge, in diagonals: a sparse graph has no edges of length 0
+_MOST_CONTRAST = 8.0  # largest ratio of a density to the median one
+_MOST_SHRINKS = 12  # of a ball
+_LEAST_COSINE = 0.3  # cosine of the normal to the direction of the other side; smaller is a bump
+_SMOOTHINGS = 6  # rounds that average the thickness of neighbours, in the logarithm
 
 
 def cage_spacing(mesh: Mesh, density: FloatArray, n_vertices: int) -> FloatArray:
@@ -53,7 +51,7 @@ def cage_spacing(mesh: Mesh, density: FloatArray, n_vertices: int) -> FloatArray
     area = np.maximum(mesh.vertex_areas, np.finfo(float).tiny)
     i, j = mesh.edges.T
     length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
-    length = _SLOPE * np.maximum(length, _SHORTEST * mesh.diagonal)
+    length = np.maximum(length, _SHORTEST_EDGE * mesh.diagonal)
     # h is the distance from a further vertex that is (c rho)^(-1/2) away from every other one
     n, some = mesh.n_vertices, np.flatnonzero(density > 0.0)
     first = density[some] ** -0.5
@@ -65,7 +63,7 @@ def cage_spacing(mesh: Mesh, density: FloatArray, n_vertices: int) -> FloatArray
         spacing = csgraph.dijkstra(graph, directed=False, indices=np.array([n]))[0, :n]
         spacing = np.where(np.isfinite(spacing), spacing, mesh.diagonal)  # fixed components
         ratio = (area @ spacing**-2.0) / n_vertices
-        if abs(ratio - 1.0) < _CLOSE:
+        if abs(ratio - 1.0) < _ENOUGH:
             break
         scale *= float(np.sqrt(ratio))
     return np.asarray(spacing)
@@ -75,7 +73,7 @@ def bending_density(mesh: Mesh) -> FloatArray:
     """Return the inverse of the local thickness, (n,), without extreme values."""
     density = 1.0 / thickness(mesh)
     middle = np.median(density)
-    return np.asarray(np.clip(density, middle / _CONTRAST, middle * _CONTRAST))
+    return np.asarray(np.clip(density, middle / _MOST_CONTRAST, middle * _MOST_CONTRAST))
 
 
 def thickness(mesh: Mesh) -> FloatArray:
@@ -92,13 +90,13 @@ def thickness(mesh: Mesh) -> FloatArray:
     tree = cKDTree(x)
     radius = np.full(len(x), 0.5 * mesh.diagonal)
     active = np.arange(len(x))
-    for _ in range(_SHRINKS):
+    for _ in range(_MOST_SHRINKS):
         centre = x[active] - radius[active, None] * normal[active]
         other = nearest(tree, centre)[1][:, 0]
         chord = x[active] - x[other]
         square = np.einsum("ij,ij->i", chord, chord)
         height = np.einsum("ij,ij->i", chord, normal[active])
-        is_across = height > _ACROSS * np.sqrt(square)
+        is_across = height > _LEAST_COSINE * np.sqrt(square)
         smaller = square[is_across] / (2.0 * height[is_across])
         active, shrinks = active[is_across], smaller < (1.0 - 1e-3) * radius[active[is_across]]
         active = active[shrinks]
@@ -108,7 +106,7 @@ def thickness(mesh: Mesh) -> FloatArray:
     area = np.maximum(area, np.finfo(float).tiny * 1e6)
     log = np.log(2.0 * radius / mesh.diagonal)
     total = area + near @ area
-    for _ in range(_SMOOTH):
+    for _ in range(_SMOOTHINGS):
         log = (area * log + near @ (area * log)) / total
     return np.asarray(np.exp(log) * mesh.diagonal)
 

@@ -15,8 +15,6 @@ The files, in reading order:
     bench           ``segdeform bench``
     application     ``segdeform app``
     serving         ``segdeform serve``
-    interactive     ``segdeform bench --interactive``
-    opening         ``segdeform bench --interactive --open``
     progress_bar    progress bar in the terminal
 """
 

@@ -52,7 +52,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "mechanisms", "paper", "figures", "peers", "browser")
+EXPERIMENTS = ("drag", "open", "mechanisms", "paper", "peers")
 
 _SELECTION = """\
 selections (SEL):
@@ -335,15 +335,6 @@ def _bench(parser: argparse.ArgumentParser) -> None:
     add("--size", type=_count, default=None, metavar="N", help="one mesh size, in vertices")
     text = "total cage vertices (default: 155)"
     add("--cage-vertices", type=_count, default=155, metavar="N", help=text)
-    task = parser.add_mutually_exclusive_group()
-    text = "only time a drag in a window"
-    task.add_argument("--interactive", action="store_true", help=text)
-    text = "with --interactive: open files, and drag as soon as they are drawn; --full: 1M vertices"
-    add("--open", action="store_true", help=text)
-    text = "append the ratios, date and commit to a JSON lines file"
-    task.add_argument("--record", type=Path, metavar="FILE", help=text)
-    text = "only plot the runs recorded in FILE"
-    task.add_argument("--history", type=Path, metavar="FILE", help=text)
 
 
 def _input_output(

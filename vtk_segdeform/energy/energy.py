@@ -7,10 +7,9 @@ delta_i(x) is the mean-curvature normal at x, delta_i that of the rest shape, R_
 rotation of vertex i (or of its rotation cluster), J_T the gradient over triangle T of the map
 from rest to x.  The paper has the first term only, and weights all its rows alike; weighting by
 the vertex area A_i makes the energy independent of how finely the surface is meshed.  The second
-term is ours: with bending alone limbs are almost unconstrained and triangles shear (area-weighted
-distortion 0.16 on a 70 degree bend against 0.09).  It compares each triangle with the rotations of
-its three corners ("spokes and rims"), which is never negative, however bad the triangle; the edge
-form sum cot_ij |x_ij - R_i v_ij|^2 is not.
+term is ours: with bending alone limbs are almost unconstrained and triangles shear.  It compares
+each triangle with the rotations of its three corners ("spokes and rims"), which is never negative,
+however bad the triangle; the edge form sum cot_ij |x_ij - R_i v_ij|^2 is not.
 
 For given R the energy is quadratic.  Both terms depend on R through one 3 x 3 matrix per cluster:
 
@@ -21,22 +20,17 @@ mesh; those of a large mesh are computed from a weighted sample of its vertices 
 
 *Borders.*  The sum of the detail goes over inner vertices only (`geometry.inner_vertices`), the
 natural boundary condition; the stretch and its rotations go over all.  With one-sided rows at the
-borders instead, the energy of a stretched plate grows like 1 / edge: from 80 to 160 edges along its
-side, the pose of a twisted plate moved by 6.4 thousandths and took 23, then 29 steps; with the
-natural condition it moved by 0.6 thousandths and took 19, then 17.
+borders instead, the energy of a stretched plate would grow like 1 / edge.
 
 *Stiffness of the cages.*  The mesh hardly depends on a cage vertex far from it, so the shape energy
-leaves it free, and the solver takes many steps to find where it goes: cages 1.75 times as large as
-their regions, bent by 60 degrees, ended hundreds of mesh sizes away after 86 steps; with this
-third term they stay near the mesh, after 21.  It is the change of every cage edge but for rotation,
+leaves it almost free, and the solver takes many steps to find where it goes, which may be far away.
+A third term keeps it near the mesh: the change of every cage edge but for rotation,
 
     e sum_a sum_{b ~ a}  1/2 sum_g omega_ag |(p_a - p_b) - R_g (q_a - q_b)|^2,    q the rest cages,
 
 with the rotations of the mesh nearby: omega_ag is the share of cluster g in the motion of cage
 vertex a, sum_{i in g} W~_ia^2 over the same sum of all i.  So it needs no rotations of its own and
-only adds to Q, K and c; a step costs as much as without it.  e is 3e-4 of the shape energy, by
-their traces: with fitted cages, at bends of 60 and 120 degrees, distortion rose by 0 to 1.2 % of
-itself.  The paper has no such term.
+only adds to Q, K and c; a step costs as much as without it.  The paper has no such term.
 
 Source
 ------
@@ -62,10 +56,7 @@ from ..subspace import Subspace
 from .cubature import Sample
 from .operators import reduced_operators, surface_operators
 
-# A density above 300 times its 90th percentile by area is an outlier; on good meshes the maximum is
-# 2 to 80 times that percentile.
-_USUAL, _OUTLIER = 0.9, 300.0
-_CAGE_STIFFNESS = 3e-4  # e, as a share of the shape energy by their traces
+_CAGE_STIFFNESS = 3e-4  # e by traces, as a share of the shape energy: the distortion rises by 1 %
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +65,7 @@ class Energy:
 
     quadratic: FloatArray  # Q, (m, m)
     constant: float
-    scale: float  # trace of `quadratic`, without outliers
+    scale: float  # trace of `quadratic`
     mass: FloatArray  # W~^T diag(A) W~, (m, m), A summing to 1: mean square over the surface
     rotation_operator: FloatArray  # K, (3G, m)
     subspace: Subspace
@@ -176,7 +167,7 @@ def shape_energy(
     shape = surface_operators(surface, own, weights, inner=inner)
     tell(progress, 0.5, "computing the energy")
     areas = shape.weights * shape.areas
-    bending, stretching, mass, traces = reduced_operators(
+    bending, stretching, mass = reduced_operators(
         rows,
         shape.laplacian,
         0.25 * shape.bends / shape.areas,
@@ -185,7 +176,7 @@ def shape_energy(
         clusters=own,
     )
     tell(progress, 0.9, "factoring")
-    scale = _without_outliers(traces, areas)
+    scale = float(np.trace(bending))
     unit = scale / np.trace(stretching)
     bent = float((shape.bends * shape.areas) @ (shape.delta**2).sum(axis=1))
     flat = float(np.vdot(surface.vertices, shape.stiffness @ surface.vertices))  # twice the area
@@ -272,20 +263,3 @@ def _cage_edges(energy: Energy, faces: Sequence[IntArray]) -> tuple[IntArray, In
     ]
     tail, head = np.concatenate(directed).T
     return tail, head
-
-
-def _without_outliers(traces: FloatArray, areas: FloatArray) -> float:
-    """Return the sum of *traces* (n,), clipped where their density over *areas* (n,) is an outlier.
-
-    The sum scales the weights of the method.  Unclipped, it is not robust: a needle's density can
-    be a million times the maximum of a good mesh.  Without this function and `intrinsic`, ten bad
-    triangles among 100,000 of a koala multiplied it by 37, and with it the stretch: poses had up to
-    4 % less distortion, but the change of their dihedral angles was 5 to 23 % larger.
-    """
-    has_detail = (areas > 0.0) & (traces > 0.0)  # not at borders
-    traces, areas = traces[has_detail], areas[has_detail]
-    density = traces / areas
-    order = np.argsort(density)
-    covered = np.cumsum(areas[order])
-    usual = density[order[np.searchsorted(covered, _USUAL * covered[-1])]]
-    return float(areas @ np.minimum(density, _OUTLIER * usual))

@@ -36,11 +36,17 @@ from scipy.linalg import blas, lapack
 from ..arrays import FloatArray
 from ..geometry import closest_rotations
 from ..kernels import compiled_kernels
+from ..subspace import NUMBERS_PER_FACE
 from .energy import Energy
 
-_SHARES = 0.999, 0.99, 0.96, 0.8, 0.5  # of the rotations' term; the first that leaves H convex
-_SOFTEST = 1e-3  # least stiffness of a cluster about an axis, as a share of its largest
-_PER_FACE = 10  # numbers of a factor that take as long as a face of a volume
+_ROTATION_SHARES = (
+    0.999,
+    0.99,
+    0.96,
+    0.8,
+    0.5,
+)  # of the rotations' term; the first that leaves H convex
+LEAST_STIFFNESS = 1e-3  # of a cluster, along or about an axis, as a share of its largest
 _MOST_SIDES = 8  # right-hand sides; with more LAPACK is as fast
 # eps_kic as (k, c, i): axis of rotation, column of dp, row of R S; k and c side by side.
 _EPSILON = np.zeros((9, 3))
@@ -66,7 +72,9 @@ class Factor:
             return []
         n = len(self.triangle)
         solved = np.ascontiguousarray(np.concatenate([y.T for y in ys])).reshape(-1, n)
-        kernels = compiled_kernels(n * n // _PER_FACE) if len(solved) <= _MOST_SIDES else None
+        kernels = (
+            compiled_kernels(n * n // NUMBERS_PER_FACE) if len(solved) <= _MOST_SIDES else None
+        )
         if kernels:
             kernels.solve_factored(np.ascontiguousarray(self.triangle.T), solved)
         else:
@@ -97,7 +105,7 @@ def full_factor(
     """
     m = len(hessian)
     term = np.zeros((3 * m, 3 * m)) if rotations is None else rotations
-    shares = (_SHARES if rotations is not None else ()) + (0.0,) * (
+    shares = (_ROTATION_SHARES if rotations is not None else ()) + (0.0,) * (
         rotations is None or added is not None
     )
     for share in shares:
@@ -148,7 +156,9 @@ def _twists(covariances: FloatArray) -> FloatArray:
     symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
     trace = np.trace(symmetric, axis1=1, axis2=2)
     stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
-    stiffness = np.maximum(stiffness, _SOFTEST * np.abs(stiffness).max(axis=1, keepdims=True))
+    stiffness = np.maximum(
+        stiffness, LEAST_STIFFNESS * np.abs(stiffness).max(axis=1, keepdims=True)
+    )
     root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
     turned = (_EPSILON @ rotations).reshape(-1, 3, 9)  # T^T for each axis c of dp: eps_kic R_i.
     return np.asarray((np.swapaxes(root, 1, 2) @ turned).reshape(-1, 9, 3))

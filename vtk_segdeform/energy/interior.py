@@ -7,8 +7,7 @@ linear in p; here it is taken by central differences, and blended as the surface
 the volume around the point.  This is the elasticity of a solid, as rigid as possible, with few
 samples: each is one more rotation cluster, of three rows.
 
-Without it, bars and a cactus that were twisted in steps of 5 degrees to 270 and back jumped by .12
-to .17 of the diagonal, several times; with it the longest step is .012.
+Without it a limb that is twisted buckles in jumps.
 
 The points are below patches of the surface, in the largest balls inside the body that touch it.
 
@@ -33,12 +32,10 @@ from ..mesh import Mesh
 from ..subspace import Subspace
 from .energy import Energy
 
-# Share of the trace of the energy.  With 0.1 twists of a bar jump and with 0.2 a short one unwinds;
-# with 1 poses of a dog are 4 % farther from the true ones.
-_SHARE = 0.3
+_SHARE = 0.3  # of the trace of the energy; with 0.1, the twist of a bar jumps
 _PATCHES = 200  # with 100, the twist of a bar jumps
 _DEPTH = 0.75  # of the points, in radii of their balls
-_STEP = 1e-3  # of the central differences, in radii
+_DIFFERENCE = 1e-3  # of the central differences, in radii
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +89,7 @@ class Interior:
         found = np.zeros((len(self.points), 3, subspace.n_columns))
         for cage, own, alpha in zip(cages, subspace.columns, self.weights, strict=True):
             some = np.flatnonzero(alpha > 0.0)
-            step = _STEP * self.radii[some, None]
+            step = _DIFFERENCE * self.radii[some, None]
             for axis in range(3):
                 way = step * np.eye(3)[axis]
                 sides = np.concatenate([self.points[some] + way, self.points[some] - way])

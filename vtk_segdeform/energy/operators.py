@@ -27,8 +27,8 @@ from ..geometry import (
 from ..kernels import in_parallel
 from ..subspace import Subspace
 
-_CHUNK = 400_000  # faces
-_PIECE, _BATCH = 1 << 19, 32  # numbers of W~ multiplied together; such pieces computed at once
+_NUMBERS_AT_ONCE = 1 << 19  # of W~, that are multiplied together
+_PIECES_SUMMED = 32  # such pieces that are computed before they are added up
 
 
 class SurfaceOperators(NamedTuple):
@@ -100,15 +100,12 @@ def _fans(
     axes = (np.bincount(faces.ravel(), (own * g).ravel(), n) for g in np.moveaxis(gradients, 2, 0))
     fans = _summed(np.stack(list(axes), axis=1), clusters)
     border = np.flatnonzero(~alike.all(axis=(1, 2)))  # faces with corners in several clusters
-    for start in range(0, len(border), _CHUNK):
-        some = border[start : start + _CHUNK]
-        other = ~alike[some] & (weight[some] > 0.0)[:, :, None]
-        face, seen, corner = np.nonzero(other)
-        rows = 3 * at[some[face], seen][:, None] + np.arange(3)
-        columns = np.repeat(faces[some[face], corner], 3)
-        share = gradients[some[face], corner] * weight[some[face], seen][:, None]
-        fans = fans + sparse.coo_array((share.ravel(), (rows.ravel(), columns)), shape).tocsr()
-    return sparse.csr_array(fans)
+    face, seen, corner = np.nonzero(~alike[border] & (weight[border] > 0.0)[:, :, None])
+    face = border[face]
+    rows = 3 * at[face, seen][:, None] + np.arange(3)
+    share = gradients[face, corner] * weight[face, seen][:, None]
+    entries = share.ravel(), (rows.ravel(), np.repeat(faces[face, corner], 3))
+    return sparse.csr_array(fans + sparse.coo_array(entries, shape).tocsr())
 
 
 def reduced_operators(
@@ -119,10 +116,8 @@ def reduced_operators(
     *,
     stiffness: sparse.csr_array | None = None,
     clusters: IntArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return W~^T C diag(strength) C W~, W~^T B W~ and W~^T diag(mass) W~, (m, m) each.
-
-    And (n,), the contribution of each vertex to the trace of the first.
 
     C and B (n, n) are the symmetric *laplacian* and *stiffness*; without *stiffness*, B is C.
     The sums go over pieces of the mesh, of vertices that lie together: few cages move a piece and
@@ -133,9 +128,8 @@ def reduced_operators(
     both = [laplacian] if stiffness is None or stiffness is laplacian else [laplacian, stiffness]
     m = subspace.n_columns
     order = np.argsort(_last_region(subspace) if clusters is None else clusters, kind="stable")
-    size = max(_PIECE // m, 1)
+    size = max(_NUMBERS_AT_ONCE // m, 1)
     found: dict[int, tuple[IntArray, list[FloatArray]]] = {}
-    traces = np.zeros(subspace.n_vertices)
 
     def work(first: int, start: int, stop: int) -> None:
         vertices = order[first + start : first + stop]
@@ -152,24 +146,23 @@ def reduced_operators(
             compact = ring.data, at, ring.indptr.astype(np.int32)
             products.append(sparse.csr_array(compact, (ring.shape[0], len(used))) @ w)
         normals = products[0] if len(both) > 1 else products[0][bent]
-        scaled = normals * strength[vertices[bent], None]
-        traces[vertices[bent]] = np.einsum("ij,ij->i", scaled, normals)
-        squares, plain = scaled.T @ normals, w[own].T @ products[-1]
+        squares = (normals * strength[vertices[bent], None]).T @ normals
+        plain = w[own].T @ products[-1]
         heavy = np.flatnonzero(mass[vertices])
         here = w[own[heavy]]
         masses = (here * mass[vertices[heavy], None]).T @ here
         found[start] = columns, [squares, plain, masses]
 
     totals = np.zeros((3, m, m))
-    for first in range(0, subspace.n_vertices, _BATCH * size):  # summed in a fixed order
-        stop = min(first + _BATCH * size, subspace.n_vertices)
+    for first in range(0, subspace.n_vertices, _PIECES_SUMMED * size):  # summed in a fixed order
+        stop = min(first + _PIECES_SUMMED * size, subspace.n_vertices)
         in_parallel(partial(work, first), stop - first, size)
         for start in sorted(found):
             columns, products = found.pop(start)
             for total, product in zip(totals, products, strict=True):
                 total[np.ix_(columns, columns)] += product
     squares, plain, masses = 0.5 * (totals + np.swapaxes(totals, 1, 2))
-    return squares, plain, masses, traces
+    return squares, plain, masses
 
 
 def _last_region(subspace: Subspace) -> IntArray:

@@ -23,9 +23,6 @@ that was rotation, not stretch, when the body was pulled, is subtracted from Q, 
 Each share is below 1, so that E is still a sum of squares, and turning the body still costs
 nothing.
 
-Bends and twists by 40 to 70 degrees, and pulls, of ten bodies with 300 clusters: the distance to
-the pose with a rotation for each vertex, root mean square, is 0.6 of the distance with clusters of
-position alone (0.4 to 0.8 by body), and the energy of that pose is off by some 5 % instead of 20 %.
 The mesh is traversed once, for some 2000 patches; clusters sum up their rows of K.
 
 Source
@@ -42,22 +39,20 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import cluster_within_parts, farthest_points
+from ..geometry import cluster_within_parts, farthest_points, tie_breakers
 from ..progress import Progress, tell
 from .energy import Energy
-from .hessian import full_factor, rotation_term
+from .hessian import LEAST_STIFFNESS, full_factor, rotation_term
 
-_PULLS = 12  # places
+_PULLED_PLACES = 12
 _ANCHOR = 1e-9  # of the stiffness, against motion of a free body
 _DISTANCE_WEIGHT = 0.3  # of distance, relative to rotation
 _ROUNDS = 3  # of k-means
 # Poses differ from the few pulls, so only this share of their rotation is subtracted; and of all
 # variation, this share at most.
-_SUBTRACTED, _MOST = 0.9, 0.95
+_SUBTRACTED, _MOST_SUBTRACTED = 0.9, 0.95
 _MESSAGE = "clustering rotations"
 _ROUNDING = 1e-13  # of a sum over the patches of a cluster
-_SOFTEST = 1e-3  # least eigenvalue of N and M, as a share of the largest
-_TIE_BREAK = 1e-6  # as in `kmeans`
 
 
 class _Response(NamedTuple):
@@ -117,7 +112,7 @@ def join_rotations(
     share = _SUBTRACTED * np.clip(turned / np.where(alike, np.inf, varied), 0.0, 1.0)
     # Of a variation over n vertices, k equal patches show only (1 - 1 / k) / (1 - 1 / n).
     n, k = np.bincount(clusters, counts), np.bincount(clusters).clip(min=2)
-    share = np.minimum(share * (1.0 - 1.0 / n) / (1.0 - 1.0 / k), _MOST)
+    share = np.minimum(share * (1.0 - 1.0 / n) / (1.0 - 1.0 / k), _MOST_SUBTRACTED)
     tell(progress, 0.9, _MESSAGE)
     excess = _squares(one.roots, share[clusters]) - _squares(whole.roots, share)
     quadratic = energy.quadratic - _invariant(rest, excess)
@@ -147,7 +142,7 @@ def _pulls(energy: Energy, rest: FloatArray, progress: Progress | None) -> Float
     fields = np.concatenate([shifts, np.cross(axes[:, None], rest)])
     rigid, inertia = fields.reshape(6, -1), (mass @ fields).reshape(6, -1)
     rigid_share = np.linalg.solve(inertia @ rigid.T, inertia)  # of a motion, (6, 3m)
-    where = farthest_points(rest, min(_PULLS, m))
+    where = farthest_points(rest, min(_PULLED_PLACES, m))
     forces = np.einsum("pm,ab->pamb", mass[where], axes).reshape(-1, 3 * m)
     forces -= forces @ rigid.T @ rigid_share
     moves = np.stack(factor.solve_all(list(forces.reshape(-1, m, 3)))).reshape(-1, 3 * m)
@@ -199,7 +194,7 @@ def _reassigned(
     of_clusters = [-2.0 * turns.reshape(len(turns), -1), squares, -2.0 * near * middles, away]
     left, right = np.hstack([*of_patches, weights[:, None]]), np.hstack(of_clusters)
     own = patches.turned + near * weights * (apart**2).sum(axis=1)
-    favour = 1.0 + _TIE_BREAK * np.random.default_rng(0).random(len(turns))
+    favour = tie_breakers(len(turns))
     home = np.empty(len(turns), dtype=np.int64)
     home[clusters] = parts
     found = np.empty_like(clusters)
@@ -214,7 +209,7 @@ def _reassigned(
 
 def _floored(values: FloatArray) -> FloatArray:
     most = np.abs(values).max(axis=1, keepdims=True)
-    least = np.maximum(_SOFTEST * most, np.finfo(float).tiny)
+    least = np.maximum(LEAST_STIFFNESS * most, np.finfo(float).tiny)
     return np.asarray(np.maximum(values, least))
 
 

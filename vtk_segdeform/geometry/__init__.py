@@ -7,6 +7,7 @@ The files, in reading order:
     differential    mean-curvature normals, eq. (5)
     intrinsic       intrinsic triangulation: the surface without bad triangles
     rotations       local rotations
+    ties            decisions between equals, and principal axes
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     decimation      a mesh with one vertex for each cluster of neighbours
@@ -37,6 +38,7 @@ from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
 from .sampling import distinct_lengths, faces_between, nearest_source, unique_edges, voronoi_cells
+from .ties import principal_axes, tie_breakers
 from .turned_over import turned_over
 from .up_axis import guess_up_axis
 from .volume import (
@@ -79,9 +81,11 @@ __all__ = [
     "nearest_pairs",
     "nearest_source",
     "outer_components",
+    "principal_axes",
     "rigid_fit",
     "signed_volume",
     "step_to_volume",
+    "tie_breakers",
     "triangle_distortion",
     "turned_over",
     "unique_edges",

@@ -20,12 +20,12 @@ from ..arrays import FloatArray, IntArray
 from ..freezing import read_only
 from ..mesh import Mesh, connected
 from .sampling import faces_between, unique_edges
+from .ties import principal_axes
 
-_PER_CELL = 1.5  # clusters in a surface, for each square of the grid that would cover it
-_ROUNDS, _GAIN = 6, 0.8  # of the search for the spacing; exponent of its correction
-_FEW, _MANY = 0.7, 1.5  # clusters, in numbers requested
-_SCATTERED = 2.0  # clusters of a noisy mesh, in numbers requested, at which its grid is smoothed
-_SMOOTHING = 8, 24, 72, 216  # passes of smoothing, one after the other, until that is enough
+_CLUSTERS_PER_CELL = 1.5  # clusters in a surface, for each square of the grid that would cover it
+_ROUNDS = 6  # of the search for the spacing
+_FEWEST_CLUSTERS, _MOST_CLUSTERS = 0.7, 1.5  # clusters, in numbers requested
+_SMOOTHING_PASSES = 8, 24, 72, 216  # of a noisy mesh, until its clusters are few enough
 
 _last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray, IntArray]] = WeakKeyDictionary()
 _lock = Lock()  # several threads ask for the same mesh at the same time
@@ -57,11 +57,12 @@ def decimated(mesh: Mesh, n_points: int) -> tuple[Mesh, IntArray, IntArray]:
 
 def _clusters(mesh: Mesh, n_points: int) -> IntArray:
     """Return the cluster of each vertex, (n,) int."""
-    x = _in_own_frame(mesh.vertices)
-    spacing = np.sqrt(_PER_CELL * mesh.face_areas.sum() / n_points)
-    most = _SCATTERED * n_points + mesh.components.max() + 1
+    x = mesh.vertices @ principal_axes(mesh.vertices).T
+    x = np.asarray(x - x.min(axis=0))
+    spacing = np.sqrt(_CLUSTERS_PER_CELL * mesh.face_areas.sum() / n_points)
+    most = _MOST_CLUSTERS * n_points + mesh.components.max() + 1
     cluster, spacing = _in_cells(mesh, x, spacing, n_points)
-    for passes in _SMOOTHING:
+    for passes in _SMOOTHING_PASSES:
         if cluster.max() < most:
             break
         x = _smoothed(mesh, x, passes)
@@ -80,9 +81,9 @@ def _in_cells(mesh: Mesh, x: FloatArray, spacing: float, n_points: int) -> tuple
             key = (key << 21) + np.floor(x[:, axis] / spacing).astype(np.int64)
         n_cells = len(np.unique(key))
         ratio = n_cells / n_points
-        if _FEW < ratio < _MANY or spacing == least:
+        if _FEWEST_CLUSTERS < ratio < _MOST_CLUSTERS or spacing == least:
             break
-        spacing *= ratio**_GAIN
+        spacing *= np.sqrt(ratio)
     same = key[i] == key[j]
     return connected(len(x), i[same], j[same]), spacing
 
@@ -94,19 +95,6 @@ def _smoothed(mesh: Mesh, x: FloatArray, passes: int) -> FloatArray:
     size = 1.0 + np.diff(near.indptr)[:, None]
     for _ in range(passes):
         x = (x + ones @ x) / size
-    return np.asarray(x - x.min(axis=0))
-
-
-def _in_own_frame(positions: FloatArray) -> FloatArray:
-    """Return positions (n, 3) from their lowest corner, in axes that rotate with the mesh.
-
-    Random weights separate axes of equal length, and determine their signs.
-    """
-    weights, signs = np.random.default_rng(0).uniform(0.5, 1.5, (2, len(positions)))
-    away = positions - (weights @ positions) / weights.sum()
-    axes = np.linalg.eigh((away.T * weights) @ away)[1]
-    axes = axes * np.where(((signs - 1.0) @ away) @ axes < 0.0, -1.0, 1.0)
-    x = np.stack([away @ axis for axis in axes.T], axis=1)
     return np.asarray(x - x.min(axis=0))
 
 

@@ -32,11 +32,10 @@ from scipy import sparse
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import in_parallel
 from ..mesh import HalfEdges, Mesh
-from .intrinsic import IntrinsicTriangulation
+from .intrinsic import FACES_AT_ONCE, IntrinsicTriangulation
 
-_PIECE = 50_000  # faces per task
 _LEAST_AREA = 0.05  # share of the mean area of a vertex's neighbours
-_STRIP = 0.1  # share of inner vertices below which a component is a strip
+_STRIP_SHARE = 0.1  # share of inner vertices below which a component is a strip
 
 
 def cotangent_laplacian(
@@ -71,9 +70,7 @@ def mixed_voronoi_areas(surface: IntrinsicTriangulation) -> FloatArray:
 def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
     """Return vertex *areas* (n,), each at least a twentieth of its neighbours' mean.
 
-    Eq. (5) divides by the area, so a patch of tiny triangles would outweigh all others: 100 of
-    them among the 2390 faces of the hand multiplied the trace of the bending term by 27; with this
-    bound, by 1.7.  On seven good meshes the bound is active at only eight vertices.
+    Eq. (5) divides by the area, so a patch of tiny triangles would outweigh all others.
     """
     n = len(areas)
     around = np.bincount(faces.ravel(), areas[faces[:, [1, 2, 0]]].ravel(), n)
@@ -96,7 +93,7 @@ def inner_vertices(mesh: Mesh) -> BoolArray:
     inner = np.ones(mesh.n_vertices, dtype=bool)
     inner[half_edges.tail[ends]] = inner[half_edges.head[ends]] = False
     count = np.bincount(mesh.components, inner)
-    is_strip = count < _STRIP * np.bincount(mesh.components)
+    is_strip = count < _STRIP_SHARE * np.bincount(mesh.components)
     return np.asarray(inner | is_strip[mesh.components])
 
 
@@ -128,5 +125,5 @@ def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
             out[:, corner] = share[:, [last]] * (x[:, corner] - x[:, after])
             out[:, corner] += share[:, [after]] * (x[:, corner] - x[:, last])
 
-    in_parallel(work, len(faces), _PIECE)
+    in_parallel(work, len(faces), FACES_AT_ONCE)
     return gradients

@@ -3,9 +3,7 @@
 Lloyd's algorithm: every point joins its nearest centre, every centre moves to the mean of its
 points.  The first centres are the points farthest from each other.
 
-Results are deterministic and the same in every frame of reference.  On a symmetric shape many
-distances are equal; a random factor of each vertex or centre, 1 to 1 + 1e-6, decides between
-them, and rounding does not.
+Results are deterministic and the same in every frame of reference (`ties`).
 
 Source
 ------
@@ -22,10 +20,10 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray, is_whole
 from ..errors import ArgumentError
 from ..kernels import nearest
+from .ties import tie_breakers
 
 _SAMPLE, _SAMPLE_PER_CLUSTER = 8000, 10  # points that centres are computed from, whichever is more
-_EQUAL = 4  # nearest centres that are compared for ties
-_TIE_BREAK = 1e-6  # relative size of the random factor
+_COMPARED = 4  # nearest centres that are compared for ties
 
 
 def cluster_positions(
@@ -38,7 +36,7 @@ def cluster_positions(
     """
     n_clusters = min(n_clusters, len(positions))
     rng = np.random.default_rng(0)
-    favour = 1.0 + _TIE_BREAK * rng.random(len(positions))
+    favour = tie_breakers(len(positions))
     sample = positions
     enough = max(_SAMPLE, _SAMPLE_PER_CLUSTER * n_clusters)
     if len(positions) > enough:
@@ -89,8 +87,7 @@ def cluster_within_parts(
 
 def farthest_points(positions: FloatArray, count: int) -> IntArray:
     """Return (count,) int: indices into *positions* (n, 3), each farthest from all before it."""
-    favour = 1.0 + _TIE_BREAK * np.random.default_rng(0).random(len(positions))
-    return _farthest_points(positions, count, favour)
+    return _farthest_points(positions, count, tie_breakers(len(positions)))
 
 
 def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> IntArray:
@@ -119,7 +116,7 @@ def _numbered(labels: IntArray) -> IntArray:
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     """Return the nearest of the *centres* to each position, (n,)."""
-    few = min(_EQUAL, len(centres))
+    few = min(_COMPARED, len(centres))
     distance, which = nearest(cKDTree(centres), positions, range(1, few + 1))
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)

@@ -53,15 +53,18 @@ from ..errors import ArgumentError
 from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
 from .volume import corner_and_edges, signed_volume
 
-_LEAST, _MOST = 0.48, 1.3  # abs(q) of an open component that encloses a volume
+_LEAST_WINDING, _MOST_WINDING = 0.48, 1.3  # abs(q) of an open component that encloses a volume
 _VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
-_SEEN = 10  # points y for each of them
-_FEWEST, _MOST_PAIRS = 12, 2e8  # points x, and pairs of x and y, if there are many components
-_FEW = 8  # faces of a component, up to which q is summed over pairs of faces
-_INNER = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0  # points x of a face
-_NEAREST = 0.3  # distances of neighbouring points y, below which |y - x| is replaced by this
+_SEEN_POINTS = 10  # points y for each of them
+_FEWEST_VIEWPOINTS, _MOST_PAIRS = (
+    12,
+    2e8,
+)  # points x, and pairs of x and y, if there are many components
+_SUMMED_FACES = 8  # faces of a component, up to which q is summed over pairs of faces
+_INNER_POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0  # points x of a face
+_LEAST_DISTANCE = 0.3  # |y - x| at least, in distances of neighbouring points y
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
-_FLAT = 0.01  # root mean square thickness of a flattened body, in square roots of its area
+_FLAT_THICKNESS = 0.01  # root mean square, of a flattened body, in square roots of its area
 _ONE_LAYER = 0.5  # length of the area vector, in areas, from which a flat component is a sheet
 _NOTHING = "no volume to preserve"
 _known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
@@ -262,11 +265,11 @@ def mean_winding(points: FloatArray, faces: IntArray, *, most: int = 400) -> flo
         y = corner[own] + u[:, None] * e[own] + v[:, None] * f[own]
         return y, normals[own] / np.maximum(twice[own, None], np.finfo(float).tiny)
 
-    count = min(int(np.clip(len(faces), *_VIEWPOINTS)), max(most, _FEWEST))
-    y, n = sample(_SEEN * count)
+    count = min(int(np.clip(len(faces), *_VIEWPOINTS)), max(most, _FEWEST_VIEWPOINTS))
+    y, n = sample(_SEEN_POINTS * count)
     x, _ = sample(count)
     area = 0.5 * float(ends[-1]) / len(y)
-    nearest = _NEAREST * np.sqrt(area)
+    nearest = _LEAST_DISTANCE * np.sqrt(area)
     heights = np.einsum("ij,ij->i", y, n) - x @ n.T
     square = np.square(x)[:, None].sum(axis=2) - 2.0 * x @ y.T + np.square(y).sum(axis=1)
     np.maximum(square, nearest**2, out=square)
@@ -286,14 +289,14 @@ def _winding_of_few(mesh: Mesh, order: IntArray, starts: IntArray, sizes: IntArr
     corners = mesh.vertices[mesh.faces]
     seen_from, seen = order[starts[owner] + one], corners[order[starts[owner] + other]]
     angle = np.zeros(len(owner))
-    for weights in _INNER:
+    for weights in _INNER_POINTS:
         a, b, c = np.moveaxis(seen - (weights @ corners[seen_from])[:, None], 1, 0)
         u, v, w = (np.linalg.norm(each, axis=1) for each in (a, b, c))
         ab, bc, ca = (np.einsum("ix,ix->i", i, j) for i, j in ((a, b), (b, c), (c, a)))
         volume = np.einsum("ix,ix->i", a, np.cross(b, c))
         angle += np.arctan2(volume, u * v * w + ab * w + bc * u + ca * v) / np.pi
     areas = mesh.face_areas
-    total = np.bincount(owner, areas[seen_from] * angle / len(_INNER), len(sizes))
+    total = np.bincount(owner, areas[seen_from] * angle / len(_INNER_POINTS), len(sizes))
     each, k = ragged_arange(sizes)
     return np.asarray(total / np.bincount(each, areas[order[starts[each] + k]], len(sizes)))
 
@@ -314,16 +317,16 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
         order = np.argsort(component, kind="stable")
         starts = np.cumsum(sizes) - sizes
         q = np.zeros(count)
-        few = sizes[asked] <= _FEW
+        few = sizes[asked] <= _SUMMED_FACES
         q[asked[few]] = _winding_of_few(mesh, order, starts[asked[few]], sizes[asked[few]])
-        at_once = np.sqrt(_MOST_PAIRS / (_SEEN * max(len(asked), 1)))
+        at_once = np.sqrt(_MOST_PAIRS / (_SEEN_POINTS * max(len(asked), 1)))
         for c in asked[~few]:
             used, faces = np.unique(
                 mesh.faces[order[starts[c] : starts[c] + sizes[c]]], return_inverse=True
             )
             points = mesh.vertices[used] - mesh.vertices[first[c]]
             q[c] = mean_winding(points, faces.reshape(-1, 3), most=int(at_once))
-        encloses[asked] = (np.abs(q[asked]) >= _LEAST) & (np.abs(q[asked]) <= _MOST)
+        encloses[asked] = (np.abs(q[asked]) >= _LEAST_WINDING) & (np.abs(q[asked]) <= _MOST_WINDING)
     if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
         encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
@@ -350,7 +353,7 @@ def _flattened(mesh: Mesh, lids: Lids) -> BoolArray:
     moments = areas[:, None] * x[:, :, None] * x[:, None]
     moments = (sums(component, moments.reshape(-1, 9)) / total).reshape(-1, 3, 3)
     thickness = np.linalg.eigvalsh(moments)[:, 0]  # squared
-    return np.asarray(found & (thickness < _FLAT**2 * total[:, 0]))
+    return np.asarray(found & (thickness < _FLAT_THICKNESS**2 * total[:, 0]))
 
 
 def _one_sided(mesh: Mesh) -> BoolArray:

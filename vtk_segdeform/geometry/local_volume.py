@@ -39,13 +39,13 @@ from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
 from .volume import corner_and_edges, outer_components, volume_gradient
 
-_MOST_SHRINKS = 30
-_NARROWEST = np.cos(np.radians(40.0))  # at a smaller angle both points are on one side
-_WIDTH = 0.25  # of smoothing, relative to the median diameter of the balls
-_MOST_ROUNDS = 100
-_REACH = 1.6  # distances of neighbouring cells
-_AT_ONCE = 1 << 15  # vertices per task
-_LEAST = 0.05  # of the mean volume; the quotient of a smaller one is unreliable
+_MOST_SHRINKS = 30  # of a ball
+_MOST_COSINE = np.cos(np.radians(40.0))  # at a smaller angle both points are on one side
+_SMOOTHING_WIDTH = 0.25  # of smoothing, relative to the median diameter of the balls
+_MOST_ROUNDS = 100  # of smoothing
+_CELL_REACH = 1.6  # distances of neighbouring cells
+_VERTICES_AT_ONCE = 1 << 15  # of a task
+_LEAST_VOLUME = 0.05  # of the mean volume; the quotient of a smaller one is unreliable
 
 
 class LocalVolume:
@@ -83,7 +83,7 @@ class LocalVolume:
                 )
         self._volumes = _Volumes(points, faces)
         self._rest = self._volumes.smoothed(points)
-        floor = _LEAST * np.abs(self._rest).mean()
+        floor = _LEAST_VOLUME * np.abs(self._rest).mean()
         self._reliable = self._rest > floor
 
     @property
@@ -117,7 +117,7 @@ class LocalVolume:
 
         def work(first: int, last: int) -> None:
             for k, weights in enumerate(self._interpolation[first:last], first):
-                out[k * _AT_ONCE : (k + 1) * _AT_ONCE] = weights @ s
+                out[k * _VERTICES_AT_ONCE : (k + 1) * _VERTICES_AT_ONCE] = weights @ s
 
         in_parallel(work, len(self._interpolation), 1)
         return out
@@ -137,7 +137,7 @@ class _Volumes:
         ring = joined + joined.T + sparse.eye_array(n)
         self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
         edge = float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
-        rounds = (_WIDTH * float(np.median(diameter)) / edge) ** 2
+        rounds = (_SMOOTHING_WIDTH * float(np.median(diameter)) / edge) ** 2
         self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
 
     def smoothed(self, x: FloatArray) -> FloatArray:
@@ -202,13 +202,13 @@ def _interpolation(
     mixed between the two sides of a thin body.
     """
     i, j = edges.T
-    reach = _REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
+    reach = _CELL_REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
     joined = sparse.coo_array((np.ones(len(i)), (i, j)), (len(points), len(points)))
     once = (joined + joined.T + sparse.eye_array(len(points))).tocsr()
     twice = (once @ once).tocsr()
     parts = []
-    for start in range(0, len(x), _AT_ONCE):
-        own = cells[start : start + _AT_ONCE]
+    for start in range(0, len(x), _VERTICES_AT_ONCE):
+        own = cells[start : start + _VERTICES_AT_ONCE]
         candidates = twice[own]
         near = candidates.indices
         vertex = np.repeat(np.arange(len(own)), np.diff(candidates.indptr))
@@ -253,7 +253,7 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
         # Cosine between the two touching points as seen from the new centre.
         spread = 1.0 - 0.5 * square / smaller**2
         keep = (distance < radius[active] * (1 - 1e-9)) & (smaller < radius[active])
-        keep &= (touched != active) & (spread < _NARROWEST)
+        keep &= (touched != active) & (spread < _MOST_COSINE)
         active, touched, smaller = active[keep], touched[keep], smaller[keep]
         if not len(active):
             break

@@ -26,13 +26,15 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import BoolArray, FloatArray, IntArray
 
-_AGREE = 1e-3  # distance of two unit normals that are the same one, stored in few bits
-_RANK = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
-_LARGEST = 1e100
-_FLAT = 1e-5  # area over longest edge squared: the normal of a flatter face is rounding.  A normal
+_EQUAL_NORMALS = 1e-3  # distance of two unit normals that are the same one, stored in few bits
+_RANK_VALUE = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
+_LARGEST_COORDINATE = 1e100
+_FLAT_AREA = (
+    1e-5  # area over longest edge squared: the normal of a flatter face is rounding.  A normal
+)
 # with no other faces follows those beside them
 _ROUNDING = 1e-14
-_MOST = 2.0  # largest sum |c_f A_f| / |n| of a combination
+_MOST_AMPLIFIED = 2.0  # largest sum |c_f A_f| / |n| of a combination
 
 
 class NormalTransport:
@@ -59,7 +61,7 @@ class NormalTransport:
         *, of_corner: IntArray, place: IntArray | None,
     ) -> None:  # fmt: skip
         self._given = np.asarray(normals, dtype=float)
-        finite = (np.abs(self._given) < _LARGEST).all(axis=1)  # not NaN either
+        finite = (np.abs(self._given) < _LARGEST_COORDINATE).all(axis=1)  # not NaN either
         self._normals = np.where(finite[:, None], self._given, 0.0)
         group = np.arange(len(self._normals))
         if place is not None:
@@ -78,7 +80,7 @@ class NormalTransport:
         usable = np.isfinite(areas) & (areas > 0)
         self._areas = np.where(usable, areas, 1.0)
         longest = np.maximum((first**2).sum(axis=1), (second**2).sum(axis=1))
-        sound = usable & (areas > _FLAT * longest)
+        sound = usable & (areas > _FLAT_AREA * longest)
         # A polygon counts as a whole, with all its triangles, for the normals at its corners.
         width = counts[polygon]
         triangle = np.repeat(np.arange(len(cut)), width)
@@ -121,12 +123,12 @@ class NormalTransport:
         outer = vectors[:, :, None] * (vectors / areas[:, None])[:, None, :]
         moments = (around @ (outer / areas.max(initial=0.0)).reshape(-1, 9)).reshape(-1, 3, 3)
         values, axes = np.linalg.eigh(moments)
-        spans = values > _RANK * np.maximum(values[:, 2:], np.finfo(float).tiny)
+        spans = values > _RANK_VALUE * np.maximum(values[:, 2:], np.finfo(float).tiny)
         inverse = np.where(spans, 1.0 / np.where(spans, values, 1.0), 0.0) / areas.max(initial=0.0)
         local = np.einsum("gij,gi->gj", axes, n)
         dual = np.einsum("gij,gj->gi", axes, inverse * local)
         c = np.einsum("pi,pi->p", (vectors / areas[:, None])[triangle], dual[owner])
-        amplified = np.bincount(owner, np.abs(c) * areas[triangle], len(n)) > _MOST
+        amplified = np.bincount(owner, np.abs(c) * areas[triangle], len(n)) > _MOST_AMPLIFIED
         c[amplified[owner]] = 0.0
         by_area = self._matrix(c)
         rest = n - by_area @ vectors
@@ -168,7 +170,7 @@ class NormalTransport:
     def tangents(self, tangents: FloatArray, points: FloatArray) -> FloatArray:
         """Return *tangents* (j, 3), given at the same places as the normals, transported."""
         t, n = np.asarray(tangents, dtype=float), _unit(self._normals)
-        t = np.where((np.abs(t) < _LARGEST).all(axis=1, keepdims=True), t, 0.0)
+        t = np.where((np.abs(t) < _LARGEST_COORDINATE).all(axis=1, keepdims=True), t, 0.0)
         moved = np.stack(self._moved_frames(points), axis=2)
         weighted = moved @ np.linalg.inv(self._safe_frames()) * self._areas[:, None, None]
         gradient = self._around @ weighted.reshape(-1, 9)
@@ -201,7 +203,7 @@ def _agreeing(positions: FloatArray, normals: FloatArray) -> IntArray:
     pairs = []
     for step in range(1, int(np.bincount(place).max(initial=1))):
         k = np.flatnonzero(place[step:] == place[:-step])
-        k = k[((n[k] - n[k + step]) ** 2).sum(axis=1) < _AGREE**2]
+        k = k[((n[k] - n[k + step]) ** 2).sum(axis=1) < _EQUAL_NORMALS**2]
         pairs.append(np.stack([order[k], order[k + step]]))
     if not pairs:
         return np.arange(len(normals))

@@ -19,12 +19,12 @@ import numpy as np
 from ..arrays import FloatArray
 from ..kernels import compiled_kernels, inputs
 
-_TIMES = 40  # as long as a face of a volume takes each
+_FACES_PER_ROTATION = 40  # of a volume, that take as long
 
 
 def closest_rotations(covariances: FloatArray) -> FloatArray:
     """Return R, (k, 3, 3), that maximises tr(R S) for each S of *covariances* (k, 3, 3)."""
-    if kernels := compiled_kernels(_TIMES * len(covariances)):
+    if kernels := compiled_kernels(_FACES_PER_ROTATION * len(covariances)):
         kernels.rotations(*inputs(covariances), found := np.empty(covariances.shape))
         return found
     u, _, vt = np.linalg.svd(covariances)

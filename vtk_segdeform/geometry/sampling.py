@@ -13,8 +13,7 @@ from scipy.sparse import csgraph
 from ..arrays import FloatArray, IntArray
 from ..mesh import Mesh
 from ..progress import Progress, tell
-
-_TIE_BREAK = 1e-6  # relative to the length of an edge
+from .ties import tie_breakers
 
 
 def voronoi_cells(
@@ -26,13 +25,13 @@ def voronoi_cells(
     other vertex to its nearest kept neighbour, so that rounds become smaller.  The final cells are
     computed on the mesh itself.
     """
-    kept, edges, tie_break = np.arange(mesh.n_vertices), mesh.edges, _tie_break(mesh.n_vertices)
+    kept, edges, factors = np.arange(mesh.n_vertices), mesh.edges, tie_breakers(mesh.n_vertices)
     spacing = 0.8 * np.sqrt(mesh.face_areas.sum() / n_points)
     while mesh.n_vertices > n_points:
         tell(progress, 0.8 * (1.0 - len(kept) / mesh.n_vertices), "sampling vertices")
         i, j = kept[edges.T]
         length = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
-        length *= 1.0 + tie_break[i] + tie_break[j]
+        length *= factors[i] * factors[j]
         short = length < spacing
         if np.count_nonzero(short) <= 0.01 * len(kept):
             break
@@ -60,9 +59,9 @@ def distinct_lengths(mesh: Mesh) -> sparse.csr_array:
 
     Regular meshes have many equally long paths, and rounding must not decide which is the shortest.
     """
-    graph, tie_break = mesh.adjacency, _tie_break(mesh.n_vertices)
-    ends = np.repeat(tie_break, np.diff(graph.indptr)) + tie_break[graph.indices]
-    return sparse.csr_array((graph.data * (1.0 + ends), graph.indices, graph.indptr), graph.shape)
+    graph, factors = mesh.adjacency, tie_breakers(mesh.n_vertices)
+    lengths = graph.data * np.repeat(factors, np.diff(graph.indptr)) * factors[graph.indices]
+    return sparse.csr_array((lengths, graph.indices, graph.indptr), graph.shape)
 
 
 def nearest_source(lengths: sparse.csr_array, sources: IntArray) -> IntArray:
@@ -71,11 +70,6 @@ def nearest_source(lengths: sparse.csr_array, sources: IntArray) -> IntArray:
         lengths, indices=sources, return_predecessors=True, min_only=True
     )
     return np.asarray(source, dtype=np.int64)
-
-
-def _tie_break(n: int) -> FloatArray:
-    """Return the relative amount by which each vertex lengthens its edges, (n,)."""
-    return np.asarray(_TIE_BREAK * np.random.default_rng(0).random(n))
 
 
 def unique_edges(edges: IntArray, n: int) -> IntArray:

@@ -12,9 +12,11 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ..arrays import FloatArray, bounds_of
 
-_LAYER = 0.03  # of the height: the vertices that belong to a footprint
-_ENOUGH = 100_000  # vertices; of more, every second, third ... determines the footprints
-_CLEAR = 0.01  # difference of footprints, in squares of the middle extent; smaller ones are chance
+_FOOTPRINT_HEIGHT = 0.03  # of the height: the vertices that belong to a footprint
+_MOST_VERTICES = 100_000  # of more, every second, third ... determines the footprints
+_LEAST_DIFFERENCE = (
+    0.01  # difference of footprints, in squares of the middle extent; smaller ones are chance
+)
 
 
 def guess_up_axis(vertices: FloatArray) -> int:
@@ -30,9 +32,9 @@ def guess_up_axis(vertices: FloatArray) -> int:
     unit = float(np.sort(extent)[1])
     if not unit > 0.0:  # points on a line
         return 1 if extent[1] > extent[2] else 2
-    points = (vertices[:: max(1, len(vertices) // _ENOUGH)] - low) / unit
+    points = (vertices[:: max(1, len(vertices) // _MOST_VERTICES)] - low) / unit
     y, z = (_footprint(points, axis, extent[axis] / unit) for axis in (1, 2))
-    if abs(y - z) > _CLEAR:
+    if abs(y - z) > _LEAST_DIFFERENCE:
         return 1 if y > z else 2
     return 1 if extent[1] > extent[2] else 2
 
@@ -40,8 +42,8 @@ def guess_up_axis(vertices: FloatArray) -> int:
 def _footprint(points: FloatArray, axis: int, height: float) -> float:
     """Return the area of the hull at the bottom, less that at the top."""
     across = np.delete(points, axis, axis=1)
-    bottom = points[:, axis] <= _LAYER * height
-    top = points[:, axis] >= (1.0 - _LAYER) * height
+    bottom = points[:, axis] <= _FOOTPRINT_HEIGHT * height
+    top = points[:, axis] >= (1.0 - _FOOTPRINT_HEIGHT) * height
     return _hull_area(across[bottom]) - _hull_area(across[top])
 
 

@@ -30,8 +30,8 @@ from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import cross_rows
 
-_BLOCK = 4096  # faces per partial sum; fixed, so that results do not depend on threads
-_PIECE = 16  # blocks per task
+_FACES_PER_SUM = 4096  # partial sums are fixed, so that results do not depend on threads
+_SUMS_AT_ONCE = 16  # of a task
 
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
@@ -158,10 +158,14 @@ def corner_and_edges(
 
 
 def _blocks(faces: IntArray) -> int:
-    return -(-len(faces) // _BLOCK)
+    return -(-len(faces) // _FACES_PER_SUM)
 
 
 def _by_blocks(kernel: Any, arguments: tuple[FloatArray | IntArray, ...], out: FloatArray) -> Any:
     """Return *out* with one partial sum per block of faces; numpy adds them pairwise."""
-    in_parallel(lambda first, last: kernel(*arguments, out, _BLOCK, first, last), len(out), _PIECE)
+    in_parallel(
+        lambda first, last: kernel(*arguments, out, _FACES_PER_SUM, first, last),
+        len(out),
+        _SUMS_AT_ONCE,
+    )
     return out

@@ -33,7 +33,6 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import compiled_kernels, inputs
 from ..mesh import Mesh
 
-_FACES = 50  # of a mesh, for which shortest paths take as long as one face of a volume
 _PAIRS_AT_ONCE = 400_000  # point-triangle pairs processed at once, about 100 MB
 
 
@@ -82,7 +81,7 @@ def border_distance(
     is processed on its own.
     """
     distance = np.zeros(membership.shape)
-    kernels, graph = compiled_kernels(mesh.n_faces // _FACES), mesh.adjacency
+    kernels, graph = compiled_kernels(mesh.n_faces), mesh.adjacency
     for d, members, edge in zip(distance, membership, borders(mesh, membership), strict=True):
         if kernels:
             d[members] = np.inf

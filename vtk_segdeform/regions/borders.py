@@ -18,12 +18,11 @@ from scipy import sparse
 from ..arrays import IntArray
 from ..geometry import distinct_lengths, nearest_source
 from ..mesh import Mesh, connected
-from .coarse import symmetric
+from .coarse import COARSE_POINTS, symmetric
 
-_CREASE = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
-_SCALE = 3000  # diffusion acts at the scale of an edge in a mesh of this many vertices
+_CREASE_RADIUS = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
 _ROUNDS = 3  # of diffusion
-_MOST_STEPS = 60  # per round
+_MOST_STEPS = 60  # of diffusion, per round
 
 
 def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
@@ -31,10 +30,11 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
 
     A border moves by a limited number of rings per round, and diffusion reaches one ring per step;
     so vertices farther than that from all borders keep their labels and are not processed.
+    Diffusion acts at the scale of an edge of the coarse surface.
     """
     area = mesh.face_areas.sum()
     edge = np.median(mesh.adjacency.data)
-    steps = int(np.clip(np.ceil(4.0 * area / _SCALE / edge**2), 4, _MOST_STEPS))
+    steps = int(np.clip(np.ceil(4.0 * area / COARSE_POINTS / edge**2), 4, _MOST_STEPS))
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
     zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
@@ -92,7 +92,7 @@ def _diffusion(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
     along = mesh.vertices[zone[j]] - mesh.vertices[zone[i]]
     size = np.maximum(np.einsum("ij,ij->i", along, along), np.finfo(float).tiny)
     curvature = np.einsum("ij,ij->i", normal[j] - normal[i], along) / size
-    concavity = _CREASE * np.sqrt(mesh.face_areas.sum()) * np.maximum(-curvature, 0.0)
+    concavity = _CREASE_RADIUS * np.sqrt(mesh.face_areas.sum()) * np.maximum(-curvature, 0.0)
     share = symmetric(edges, np.minimum(1.0, usual**2 / size) / (1.0 + concavity**2), k)
     degree = np.maximum(np.diff(share.indptr), 1)
     moves = sparse.diags_array(0.5 / degree) @ share

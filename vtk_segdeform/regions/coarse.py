@@ -24,8 +24,9 @@ from ..geometry import unique_edges, voronoi_cells
 from ..mesh import Mesh, connected, ragged_arange
 from ..progress import Progress
 
-_LOOPS, _ENDS = 4, 12  # earlier cuts, and points, that distances are computed from
-_STRAIGHT = np.pi / 4  # mean of length over steps, for a straight line walked in steps
+COARSE_POINTS = 2000  # of the coarse surface, about
+_MOST_CUTS, _MOST_ENDS = 4, 12  # earlier cuts, and points, that distances are computed from
+_PER_STEP = np.pi / 4  # mean of length over steps, for a straight line walked in steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ class Surface:
         largest[self.pieces(~outside)[0]] = True
         return largest
 
-    def distances_from_ends(self, rim: FloatArray, most: int = _ENDS) -> list[FloatArray]:
+    def distances_from_ends(self, rim: FloatArray, most: int = _MOST_ENDS) -> list[FloatArray]:
         """Return distances (k,) from the ends of the surface; their level sets run across limbs.
 
         The first ends are the largest connected pieces of {rim > 0}, with *rim* (k,) the length of
@@ -103,7 +104,7 @@ class Surface:
         if rim.any():
             loops = self.pieces(rim > 0.0)
             loops.sort(key=lambda loop: -rim[loop].sum())
-            fields = [self.distance(loop) for loop in loops[:_LOOPS]]
+            fields = [self.distance(loop) for loop in loops[:_MOST_CUTS]]
             nearest = np.min(fields, axis=0)
         for number in range(min(most, len(rim))):
             fields.append(self.distance(np.array([np.argmax(nearest)])))
@@ -161,7 +162,7 @@ def _surface(mesh: Mesh, cell: IntArray, kept: IntArray, edges: IntArray) -> Sur
     ends = np.stack([mesh.faces[face, corner], mesh.faces[face, (corner + 1) % 3]], axis=1)
     centres = mesh.vertices[mesh.faces[face]].mean(axis=1)
     width = np.linalg.norm(mesh.vertices[ends].mean(axis=1) - centres, axis=1)
-    contact = symmetric(cell[ends], _STRAIGHT * width, k)
+    contact = symmetric(cell[ends], _PER_STEP * width, k)
     faces = corners[np.bincount(face, minlength=len(corners)) == 3]
     length = np.linalg.norm(np.subtract(*x[edges.T]), axis=1)
     shortcuts, straight = _shortcuts(x, faces)

@@ -39,22 +39,22 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 from .coarse import Surface
 
-_SCORE = 0.1  # of a neck, at most
-_PROTRUSION = 2.5  # of a limb, at least
-_ENOUGH = 6.0  # a larger protrusion does not make a limb more distinct
-_SHARPNESS = 6  # power of c
-_ROUGH = 3.0  # candidates may miss both limits by this factor before they are improved
+_MOST_SCORE = 0.1  # of a neck, at most
+_LEAST_PROTRUSION = 2.5  # of a limb, at least
+_MOST_PROTRUSION = 6.0  # a larger protrusion does not make a limb more distinct
+_SHARPNESS_POWER = 6  # power of c
+_ROUGH_FACTOR = 3.0  # candidates may miss both limits by this factor before they are improved
 _TIPS = (16, 6, 6)  # of the surface, and of the surface without the limbs found before
-_HALF = 0.6  # area behind a level set, at most, relative to the surface
+_MOST_BEHIND = 0.6  # area behind a level set, at most, relative to the surface
 _LEVELS = 100  # level sets of each distance, scored approximately
-_PER_TIP, _IMPROVED = 3, 2  # candidates scored exactly, before and after their improvement
-_ALIKE = 0.1  # share of points in which two candidates differ that are not both improved
-_END = 0.6  # the end of a limb is farther from the neck than this, relative to the tip
+_MOST_ROUGH, _MOST_IMPROVED = 3, 2  # candidates scored exactly, before and after their improvement
+_LEAST_DIFFERENCE = 0.1  # share of points in which two candidates differ that are not both improved
+_END_DISTANCE = 0.6  # the end of a limb is farther from the neck than this, relative to the tip
 _PARALLELS = np.array([0.5, 0.75, 1.0, 1.5, 2.0])  # distances of the parallel curves, in L / 2 pi
-_NEARBY = np.arange(0.5, 4.1, 0.5)  # where limb and body may be wider, in L / 2 pi
+_WIDER_AT = np.arange(0.5, 4.1, 0.5)  # where limb and body may be wider, in L / 2 pi
 _WIDER, _WIDER_INSIDE = 1.27, 1.5  # relative to a neck of the body, and of a limb
-_SAME = 0.15  # limbs with less of the smaller one in common are disjoint
-_OTHER = 0.3  # share of a limb that is outside a limb inside it, at least
+_MOST_COMMON = 0.15  # limbs with less of the smaller one in common are disjoint
+_LEAST_OUTSIDE = 0.3  # share of a limb that is outside a limb inside it, at least
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -70,7 +70,9 @@ class Limb:
     @property
     def found(self) -> bool:
         """Whether the neck is sharp and the limb protrudes enough."""
-        return self.score < _SCORE and bool(_protrusion(self.area, self.length) > _PROTRUSION)
+        return self.score < _MOST_SCORE and bool(
+            _protrusion(self.area, self.length) > _LEAST_PROTRUSION
+        )
 
 
 def find_limbs(surface: Surface, least: float) -> list[Limb]:
@@ -116,18 +118,21 @@ def _candidates(surface: Surface, least: float, limbs: list[Limb], n_tips: int) 
             level[piece] = touch @ d / max(touch.sum(), _TINY)
         rough = [
             _limb(surface, least, level < t, 0.0 if limbs else length)
-            for t, length in _level_sets(body, least, d, _PER_TIP)
+            for t, length in _level_sets(body, least, d, _MOST_ROUGH)
         ]
         found = [limb for limb in rough if limb is not None]
         candidates += [limb for limb in found if limb.found]
         if found:
             best = min(found, key=attrgetter("score"))
-            if any((best.inside != x.inside).sum() < _ALIKE * best.inside.sum() for x in improved):
+            if any(
+                (best.inside != x.inside).sum() < _LEAST_DIFFERENCE * best.inside.sum()
+                for x in improved
+            ):
                 continue
             improved.append(best)
             away = np.where(best.inside, _distance(surface, best.inside), 0.0)
-            d = surface.distance(np.flatnonzero(away >= _END * away.max()))
-            levels = _level_sets(surface, least, d, _IMPROVED)
+            d = surface.distance(np.flatnonzero(away >= _END_DISTANCE * away.max()))
+            levels = _level_sets(surface, least, d, _MOST_IMPROVED)
             better = [_limb(surface, least, d < t, length) for t, length in levels]
             candidates += [limb for limb in better if limb is not None and limb.found]
     return candidates
@@ -148,8 +153,10 @@ def _level_sets(
     order = np.argsort(d, kind="stable")
     area = np.append(0.0, np.cumsum(surface.areas[order]))[np.searchsorted(d[order], t)]
     score = _score(below, above, length, area)
-    unlikely = (score > _ROUGH * _SCORE) | (_protrusion(area, length) < _PROTRUSION / _ROUGH)
-    unfit = (area < least) | (area > _HALF * surface.areas.sum()) | (length <= 0.0)
+    unlikely = (score > _ROUGH_FACTOR * _MOST_SCORE) | (
+        _protrusion(area, length) < _LEAST_PROTRUSION / _ROUGH_FACTOR
+    )
+    unfit = (area < least) | (area > _MOST_BEHIND * surface.areas.sum()) | (length <= 0.0)
     score[unlikely | unfit] = np.inf
     found: list[tuple[float, float]] = []
     while len(found) < most and np.isfinite(score).any():
@@ -170,7 +177,7 @@ def _limb(surface: Surface, least: float, inside: BoolArray, length: float) -> L
     area, total = float(surface.areas[whole].sum()), float(surface.areas.sum())
     if area > total - area:
         whole, area = ~whole, total - area
-    if area < least or _protrusion(area, length) < _PROTRUSION / _ROUGH:
+    if area < least or _protrusion(area, length) < _LEAST_PROTRUSION / _ROUGH_FACTOR:
         return None
     steps = _PARALLELS * length / (2.0 * np.pi)
     away = _distance(surface, whole, 1.25 * steps[-1])
@@ -178,7 +185,7 @@ def _limb(surface: Surface, least: float, inside: BoolArray, length: float) -> L
     limb, body = near[whole[near].all(axis=1)], near[~whole[near].any(axis=1)]
     on_limb, on_body = (surface.level_lengths(side, away, steps) for side in (limb, body))
     score = float(_score(on_limb, on_body, np.array(length), np.array(area)))
-    return Limb(whole, area, length, score) if score < _ROUGH * _SCORE else None
+    return Limb(whole, area, length, score) if score < _ROUGH_FACTOR * _MOST_SCORE else None
 
 
 def _distance(surface: Surface, inside: BoolArray, limit: float = np.inf) -> FloatArray:
@@ -195,8 +202,8 @@ def _score(limb: FloatArray, body: FloatArray, length: FloatArray, area: FloatAr
     """Return s from the lengths of parallels, (5, ...) each; those beyond a tip do not count."""
     mean = np.where(limb >= 0.3 * length, limb + body, 0.0).max(axis=0) / 2.0
     c = length / np.maximum(np.maximum(length, mean), _TINY)
-    protrusion = np.clip(_protrusion(area, length), _TINY, _ENOUGH)
-    return np.asarray(2.0 * c**_SHARPNESS / protrusion)
+    protrusion = np.clip(_protrusion(area, length), _TINY, _MOST_PROTRUSION)
+    return np.asarray(2.0 * c**_SHARPNESS_POWER / protrusion)
 
 
 def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> bool:
@@ -206,9 +213,9 @@ def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> b
     for other in sorted(limbs, key=attrgetter("area"), reverse=True):
         smaller = min(limb.area, other.area)
         common = surface.areas[limb.inside & other.inside].sum()
-        if common <= _SAME * smaller:
+        if common <= _MOST_COMMON * smaller:
             rest &= ~other.inside
-        elif common < (1.0 - _SAME) * smaller:
+        elif common < (1.0 - _MOST_COMMON) * smaller:
             return False
         elif other.area < limb.area:
             if own[other.inside].mean() > 0.5:
@@ -216,19 +223,19 @@ def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> b
             own &= ~other.inside
         else:  # the smallest such limb comes last
             rest = other.inside & ~limb.inside
-            least_rest, wider = max(least, _OTHER * other.area), _WIDER_INSIDE
+            least_rest, wider = max(least, _LEAST_OUTSIDE * other.area), _WIDER_INSIDE
     area = surface.areas[own].sum()
     if area < least or surface.areas[rest].sum() < least_rest:
         return False
-    if _protrusion(area, float(np.linalg.norm(rims))) < _PROTRUSION:
+    if _protrusion(area, float(np.linalg.norm(rims))) < _LEAST_PROTRUSION:
         return False
     unit = limb.length / (2.0 * np.pi)
-    away = _distance(surface, limb.inside, (_NEARBY[-1] + 0.25) * unit)
+    away = _distance(surface, limb.inside, (_WIDER_AT[-1] + 0.25) * unit)
     neck = _spread(surface, np.flatnonzero(away == 0.0))
     rings = (
         np.flatnonzero(side & (np.abs(away - step * unit) <= 0.25 * unit))
         for side in (own, rest)
-        for step in _NEARBY
+        for step in _WIDER_AT
     )
     return any(_spread(surface, ring) > wider * neck for ring in rings)
 

@@ -30,7 +30,7 @@ from .blending import (
     overlap_weights,
 )
 
-_EQUAL = 1e-9  # weights that differ by rounding only
+_EQUAL_WEIGHT = 1e-9  # weights that differ by rounding only
 
 
 class CageSurface(Protocol):
@@ -194,7 +194,7 @@ class Regions(Described, Frozen):
     @property
     def labels(self) -> IntArray:
         """(n,) int: the region of largest weight at each vertex; the first of equal ones."""
-        ahead = self.weights >= self.weights.max(axis=0) - _EQUAL
+        ahead = self.weights >= self.weights.max(axis=0) - _EQUAL_WEIGHT
         return np.asarray(np.argmax(ahead, axis=0), dtype=np.int64)
 
     def members(self, region: int) -> IntArray:

@@ -34,17 +34,16 @@ from ..kernels import one_blas_thread
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from .borders import connected_parts, smooth_borders
-from .coarse import Surface, coarsen
+from .coarse import COARSE_POINTS, Surface, coarsen
 from .limbs import find_limbs
 from .regions import Regions
 from .slices import fair_slice, quotas
 
-_POINTS = 2000  # of the coarse copy, about
-_POINTS_PER_REGION = 16  # at least
-_SMALL = 16  # without a requested number, a region's typical area is the whole over this
-_LEAST = 0.2  # area of the smallest limb, relative to that of a region
-_OVERLAP = 0.1  # rings, relative to the width of a region in edges
-_TIE_BREAK = 1e-3  # relative to an edge
+_POINTS_PER_REGION = 16  # of the coarse surface, at least
+_TYPICAL_REGIONS = 16  # of an automatic segmentation, for the area of a region
+_LEAST_LIMB = SMALL_COMPONENT * _TYPICAL_REGIONS  # area of a limb, relative to that of a region
+_OVERLAP_WIDTH = 0.1  # rings, relative to the width of a region in edges
+_SHIFT = 1e-3  # of vertices, relative to an edge: no two distances are equal then
 
 
 @one_blas_thread()
@@ -111,7 +110,7 @@ def segment(
         labels = mesh.components
     else:
         n_regions = None if n_regions is None else int(n_regions)
-        points = max(_POINTS, _POINTS_PER_REGION * (n_regions or 1))
+        points = max(COARSE_POINTS, _POINTS_PER_REGION * (n_regions or 1))
         cluster = None
         if mesh.n_vertices > max(sizes.DECIMATED, points):
             shape, _, cluster = decimated(mesh, max(sizes.DECIMATED_POINTS, points))
@@ -127,7 +126,7 @@ def segment(
             labels = labels[cluster]
     tell(progress, 0.95, "growing regions")
     if overlap is None:
-        overlap = max(2, round(_OVERLAP * np.sqrt(n / (labels.max() + 1))))
+        overlap = max(2, round(_OVERLAP_WIDTH * np.sqrt(n / (labels.max() + 1))))
     regions = Regions.from_labels(whole, _with_others(whole, kept, labels, far), overlap)
     tell(progress, 1.0, "regions found")
     return regions
@@ -143,19 +142,19 @@ def _without_ties(mesh: Mesh) -> Mesh:
     joined = np.flatnonzero(start < end)  # all vertices, unless a mesh is decimated
     first = np.arange(mesh.n_vertices)
     first[joined] = mesh.adjacency.indices[start[joined]]
-    share = _TIE_BREAK * np.random.default_rng(0).random((mesh.n_vertices, 1))
+    share = _SHIFT * np.random.default_rng(0).random((mesh.n_vertices, 1))
     return mesh.with_vertices(mesh.vertices + share * (mesh.vertices[first] - mesh.vertices))
 
 
 def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -> IntArray:
     """Return the part of each point, (k,) int: limbs first, then slices of large parts."""
     labels = np.empty(len(surface.areas), dtype=np.int64)
-    share = surface.areas.sum() / (n_regions or _SMALL)
+    share = surface.areas.sum() / (n_regions or _TYPICAL_REGIONS)
     components = surface.pieces(np.ones(len(labels), dtype=bool))
     limbs: list[tuple[float, float, IntArray]] = []
     for label, ids in enumerate(components):
         labels[ids] = label
-        for limb in find_limbs(surface.part(ids), _LEAST * share):
+        for limb in find_limbs(surface.part(ids), _LEAST_LIMB * share):
             rank = limb.score * max(1.0, share / limb.area) ** 2  # large and distinct ones first
             limbs.append((rank if n_regions else limb.score, limb.area, ids[limb.inside]))
         tell(progress, 0.1 + 0.4 * (label + 1) / len(components), "detecting limbs")
@@ -196,7 +195,7 @@ def _main_components(mesh: Mesh, n_regions: int | None) -> tuple[BoolArray, Bool
     if len(main) == 1 or (n_regions is not None and n_regions >= len(main)):
         return main, far
     share = component_shares(mesh.vertex_areas, mesh.components)
-    main[np.argsort(-share, kind="stable")[n_regions or _SMALL :]] = False
+    main[np.argsort(-share, kind="stable")[n_regions or _TYPICAL_REGIONS :]] = False
     if n_regions is None:
         small = share < SMALL_COMPONENT
         small[share.argmax()] = False

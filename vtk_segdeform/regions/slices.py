@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 from .coarse import Surface
 
-_TOLERANCE = 0.15  # relative error of the area of a side
+_AREA_TOLERANCE = 0.15  # relative error of the area of a side
 
 
 def quotas(areas: FloatArray, points: IntArray, count: int) -> IntArray:
@@ -70,6 +70,6 @@ def fair_slice(part: Surface, rim: FloatArray, fraction: float) -> BoolArray:
         miss = abs(part.areas[inside].sum() / total - target) / min(fraction, 1.0 - fraction)
         if miss < least and not inside.all():
             best, least = inside if target == fraction else ~inside, miss
-        if least <= _TOLERANCE:
+        if least <= _AREA_TOLERANCE:
             break
     return best

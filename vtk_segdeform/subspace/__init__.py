@@ -11,9 +11,10 @@ The files, in reading order:
 from .gpu import GPUError, GPUSurface, gpu_arrays
 from .interpolated import InterpolatedBlock
 from .passengers import Passengers, bind_passengers
-from .subspace import Subspace, cage_subspace
+from .subspace import NUMBERS_PER_FACE, Subspace, cage_subspace
 
 __all__ = [
+    "NUMBERS_PER_FACE",
     "GPUError",
     "GPUSurface",
     "InterpolatedBlock",

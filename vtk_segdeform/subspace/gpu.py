@@ -7,13 +7,10 @@
     c + s (x - c)                     `GPUSurface.scale_to_volume`   as in `exact_volume`
     n(x)                              `GPUSurface.normals`
 
-The tests run these lines with numpy, with torch on the processor where it is installed, and on a
-GPU where there is one.  They passed on an NVIDIA H200 with cupy 14.2 and with torch 2.11: a pose of
-500,000 vertices differed from that of the processor by 7e-15 of the diagonal.
-
 Each pass is written once, with functions that numpy, cupy and torch share, so that the tests run
-the lines that a GPU runs.  All numbers are in double precision, and no two threads add to one
-number, so results agree with those of the processor to rounding and are the same every time.
+the lines that a GPU runs: with numpy, with torch on the processor where it is installed, and on a
+GPU where there is one.  All numbers are in double precision, and no two threads add to one number,
+so results agree with those of the processor to rounding and are the same every time.
 
 Both libraries are optional; ``pip install 'vtk-segdeform[gpu]'`` installs cupy.  The driver is
 queried first: without a GPU neither library is imported, which would take seconds, and nothing is
@@ -52,8 +49,8 @@ from .subspace import Subspace, row_pieces
 
 GPUArray = Any  # of cupy, torch or numpy
 
-_FACES = 1 << 20  # whose corners are gathered together
-_SUMMED = 4096  # numbers to a partial sum of a volume
+_FACES_AT_ONCE = 1 << 20  # whose corners are gathered
+_SUMMED_NUMBERS = 4096  # to a partial sum of a volume
 
 _log = logging.getLogger(__name__)
 
@@ -130,11 +127,11 @@ class GPUSurface:
     @_faults_named()
     def volume(self, x: GPUArray) -> float:
         """Return the enclosed volume of *x* (n, 3), with its first vertex as the origin."""
-        n_sums = -(-len(self._host_faces) // _SUMMED)
-        determinants = self._arrays.zeros((n_sums * _SUMMED,))
+        n_sums = -(-len(self._host_faces) // _SUMMED_NUMBERS)
+        determinants = self._arrays.zeros((n_sums * _SUMMED_NUMBERS,))
         for piece, a, e, f in self._corners_and_edges(x):
             determinants[piece] = ((a - x[0]) * self._arrays.cross(e, f)).sum(1)
-        of_mesh = float(self.host(determinants.reshape(n_sums, _SUMMED).sum(1)).sum() / 6.0)
+        of_mesh = float(self.host(determinants.reshape(n_sums, _SUMMED_NUMBERS).sum(1)).sum() / 6.0)
         return of_mesh + self._volume_of_lids(x)
 
     def _volume_of_lids(self, x: GPUArray) -> float:
@@ -192,8 +189,8 @@ class GPUSurface:
         self, x: GPUArray
     ) -> Iterator[tuple[slice, GPUArray, GPUArray, GPUArray]]:
         """Yield faces piece by piece: their first corners a, b - a and c - a, (k, 3) each."""
-        for start in range(0, len(self._host_faces), _FACES):
-            piece = slice(start, min(start + _FACES, len(self._host_faces)))
+        for start in range(0, len(self._host_faces), _FACES_AT_ONCE):
+            piece = slice(start, min(start + _FACES_AT_ONCE, len(self._host_faces)))
             a, b, c = (self._arrays.take(x, corner[piece], axis=0) for corner in self._corners)
             yield piece, a, b - a, c - a
 

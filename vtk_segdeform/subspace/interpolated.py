@@ -11,11 +11,8 @@ which reproduce quadratic functions, so the error is of third order; with contin
 so that no facets appear on the surface.  Affine functions are reproduced exactly, and with them the
 two properties of the coordinates: they sum to 1, and give each vertex its place at rest.
 
-With h a tenth of the distance between cage vertices, poses differ from those of the coordinates
-themselves by up to 4e-5 of the diagonal and normals by up to 0.4 degrees, if the cage vertices move
-at random by a third of that distance; where a cage is closer to the surface than `fit_cages` makes
-it, a check of some vertices makes h smaller, or gives up.  Rough rows, with twice that h, have an
-eighth of the nodes, and poses that differ by up to 1.3e-3 of the diagonal.
+Where a cage is closer to the surface than `fit_cages` makes it, a check of some vertices halves h,
+or gives up.  Rough rows have twice that h and an eighth of the nodes.
 
 A vertex stores its offset from the nearest node only.  A map computes the motion of the nodes first
 and then, for each vertex, the sum over the 27 nodes around it.
@@ -39,11 +36,10 @@ from ..kernels import compiled_kernels, inputs
 from ..progress import Progress, part
 
 _SPACING = 0.08  # h, relative to sqrt(area of the cage / its vertices)
-_HALVINGS = 1  # of h, where the error is too large
+_ROUGH = 2.0  # times the spacing of rough rows, whose error is of third order
 _CHECKED, _TOLERANCE = 256, 0.01  # vertices; largest sum of the errors in a row
-_ROUGH_SPACING, _ROUGH_TOLERANCE = 0.16, 0.1
-_WORTHWHILE = 0.5  # nodes per vertex; with more, the coordinates themselves are as fast
-_SOME = 1 << 15  # nodes or vertices processed together
+_MOST_NODES = 0.5  # per vertex; with more, the coordinates themselves are as fast
+_ROWS_AT_ONCE = 1 << 15  # of nodes or vertices
 _MARGIN = 3  # nodes around those of the vertices: B-splines and second differences need two
 
 
@@ -82,21 +78,20 @@ class InterpolatedBlock:
         progress: Progress | None = None,
     ) -> InterpolatedBlock | None:
         """Return the rows of *points* (n, 3); None if the coordinates themselves are better."""
-        widest = _ROUGH_SPACING if rough else _SPACING
-        tolerance = _ROUGH_TOLERANCE if rough else _TOLERANCE
+        coarser = _ROUGH if rough else 1.0
         edges = cage.vertices[cage.faces]
         normals = np.cross(edges[:, 1] - edges[:, 0], edges[:, 2] - edges[:, 0])
         area = 0.5 * float(np.linalg.norm(normals, axis=1).sum())
         checked = np.unique(np.linspace(0, len(points) - 1, _CHECKED).astype(np.int64))
         exact = mean_value_coordinates(points[checked], cage.vertices, cage.faces)
         exact *= blend[checked, None]
-        for k in range(_HALVINGS + 1):
-            spacing = 0.5**k * widest * np.sqrt(area / cage.n_vertices)
-            share = part(progress, k / (_HALVINGS + 1), (k + 1) / (_HALVINGS + 1))
+        for k, finer in enumerate((1.0, 0.5)):  # where the error is too large
+            spacing = _SPACING * coarser * finer * np.sqrt(area / cage.n_vertices)
+            share = part(progress, k / 2, (k + 1) / 2)
             block = cls._on_grid(points, blend, cage, spacing, share)
             if block is None:
                 return None
-            if np.abs(block[checked] - exact).sum(axis=1).max() <= tolerance:
+            if np.abs(block[checked] - exact).sum(axis=1).max() <= _TOLERANCE * coarser**3:
                 return block
         return None
 
@@ -125,11 +120,11 @@ class InterpolatedBlock:
         met = np.unique(used[:, None] + around)
         beside = np.concatenate([steps, -steps])
         nodes = np.unique(met[:, None] + np.append(beside, 0))
-        if len(nodes) > _WORTHWHILE * len(points):
+        if len(nodes) > _MOST_NODES * len(points):
             return None
         w = np.empty((len(nodes), cage.n_vertices))
-        for start in range(0, len(nodes), _SOME):
-            some = nodes[start : start + _SOME]
+        for start in range(0, len(nodes), _ROWS_AT_ONCE):
+            some = nodes[start : start + _ROWS_AT_ONCE]
             stop = start + len(some)
             at = origin + spacing * np.stack(np.unravel_index(some, shape), axis=1)
             share = part(progress, start / len(nodes), stop / len(nodes))
@@ -159,8 +154,8 @@ class InterpolatedBlock:
             kernels.interpolated_rows(out, *inputs(*own, self.lines, self.values))
             return out
         pieces = [
-            self._weights(slice(start, start + _SOME), own) @ self.values
-            for start in range(0, len(own[0]), _SOME)
+            self._weights(slice(start, start + _ROWS_AT_ONCE), own) @ self.values
+            for start in range(0, len(own[0]), _ROWS_AT_ONCE)
         ]
         return np.concatenate([np.empty((0, self.values.shape[1])), *pieces])
 
@@ -173,8 +168,8 @@ class InterpolatedBlock:
         by_column = operator.tocsc()
         met = np.flatnonzero(np.diff(by_column.indptr))
         out = np.zeros((operator.shape[0], self.values.shape[1]))
-        for start in range(0, len(met), _SOME):
-            some = met[start : start + _SOME]
+        for start in range(0, len(met), _ROWS_AT_ONCE):
+            some = met[start : start + _ROWS_AT_ONCE]
             weights = self._weights(slice(None), self._of(some))
             out += (by_column[:, some] @ weights) @ self.values
         return out
@@ -185,8 +180,8 @@ class InterpolatedBlock:
         if kernels := compiled_kernels(len(self.blend)):
             kernels.add_interpolated_adjoint(at_nodes, *inputs(y, *own, self.lines))
             return np.asarray(self.values.T @ at_nodes)
-        for start in range(0, len(y), _SOME):
-            piece = slice(start, start + _SOME)
+        for start in range(0, len(y), _ROWS_AT_ONCE):
+            piece = slice(start, start + _ROWS_AT_ONCE)
             at_nodes += self._weights(piece, own).T @ y[piece]
         return np.asarray(self.values.T @ at_nodes)
 

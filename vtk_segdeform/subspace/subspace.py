@@ -40,13 +40,13 @@ from ..regions import Regions
 from .interpolated import InterpolatedBlock
 
 _LARGEST_CAGE = 1e3  # diagonals of the mesh
-_COORDINATES = 1 << 15  # vertices whose mean value coordinates are computed together
+_VERTICES_AT_ONCE = 1 << 15  # vertices whose mean value coordinates are computed together
 _REGION_BITS = 32  # regions that are encoded in one integer
-_PER_FACE = 24  # numbers whose product takes as long as a face of a volume
-_CACHED = 1 << 17  # numbers of a block that are multiplied together: a megabyte
-_PIECES = 16  # of a block at most, for compiled kernels: each call takes some microseconds
-_DENSE = 1 << 22  # numbers in a dense piece: 32 megabytes
-_SPARSE = 16  # rows for each one of which the squares of interpolated ones are summed
+NUMBERS_PER_FACE = 16  # numbers whose product takes about as long as a face of a volume
+_CACHED_NUMBERS = 1 << 17  # of a block, that are multiplied together: a megabyte
+_MOST_TASKS = 16  # of a block at most, for compiled kernels: each call takes some microseconds
+_DENSE_NUMBERS = 1 << 22  # of a dense piece: 32 megabytes
+_SAMPLED = 16  # interpolated rows for each one whose squares are summed
 _NOTHING = np.empty((0, 3))
 
 
@@ -79,7 +79,7 @@ class Subspace(Frozen):
 
         The answer stays, so that the same cage vertices always give the same mesh, bit for bit.
         """
-        size = sum(block.size for block in self.blocks) // _PER_FACE
+        size = sum(block.size for block in self.blocks) // NUMBERS_PER_FACE
         return compiled_kernels(size) is not None
 
     @cached_property
@@ -211,7 +211,7 @@ class Subspace(Frozen):
         out = np.zeros((int(clusters.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             if isinstance(block, InterpolatedBlock):
-                rows, block = rows[::_SPARSE], block[::_SPARSE]
+                rows, block = rows[::_SAMPLED], block[::_SAMPLED]
             for piece in row_pieces(len(rows), block.shape[1]):
                 size = piece.stop - piece.start
                 places = (clusters[rows[piece]], np.arange(size))
@@ -286,10 +286,10 @@ def _add_product(
     0: piece by piece, while a piece is in the cache.
     """
     kernels = compiled_kernels() if compiled and p.shape[1] % 3 == 0 else None
-    size = max(_CACHED // block.shape[1], 1)
+    size = max(_CACHED_NUMBERS // block.shape[1], 1)
     if kernels:
         arguments = *inputs(rows, block), writable(p.T)
-        size = max(8 * size, -(-len(rows) // _PIECES))
+        size = max(8 * size, -(-len(rows) // _MOST_TASKS))
 
     def add(start: int, stop: int) -> None:
         _begin_rows(x, rows, base, start, stop)
@@ -322,8 +322,12 @@ def _add_interpolated(
 
     if not len(rows):
         _begin_rows(x, rows, base, 0, 0)
-    in_parallel(move, len(at_nodes), max(_CACHED // block.shape[1], -(-len(at_nodes) // _PIECES)))
-    in_parallel(add, len(rows), max(_CACHED // 27, -(-len(rows) // _PIECES)))
+    in_parallel(
+        move,
+        len(at_nodes),
+        max(_CACHED_NUMBERS // block.shape[1], -(-len(at_nodes) // _MOST_TASKS)),
+    )
+    in_parallel(add, len(rows), max(_CACHED_NUMBERS // 27, -(-len(rows) // _MOST_TASKS)))
 
 
 def _begin_rows(
@@ -358,7 +362,7 @@ def _double(block: FloatArray) -> FloatArray:
 
 def row_pieces(n: int, width: int) -> list[slice]:
     """Return 0..n in slices of rows whose dense arrays of *width* columns take 32 megabytes."""
-    size = max(_DENSE // width, 1)
+    size = max(_DENSE_NUMBERS // width, 1)
     return [slice(start, min(start + size, n)) for start in range(0, n, size)]
 
 
@@ -414,8 +418,8 @@ def cage_subspace(
             continue
         is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
-        for start in range(0, len(members), _COORDINATES):
-            piece = slice(start, min(start + _COORDINATES, len(members)))
+        for start in range(0, len(members), _VERTICES_AT_ONCE):
+            piece = slice(start, min(start + _VERTICES_AT_ONCE, len(members)))
             ways = part(share, start / len(members), piece.stop / len(members))
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]

@@ -1,16 +1,31 @@
-"""Results of an experiment: text, tables, figures and ratios.
-
-A `Ratio` is a measured number with a limit; the report says whether the limit is met.
-"""
+"""Problem sizes of a run, and what an experiment returns: a section with text and tables."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Sizes and repetitions of the experiments."""
+
+    name: str
+    paper_size: int = 5430  # vertices of the cactus, as in the paper
+    n_cage_vertices: int = 155
+    drag_sizes: tuple[int, ...] = (5430, 50_000)
+    repeats: int = 5  # of each measurement
+    regions: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 12, 16, 24)  # of the paper's table 2
+    peer_sizes: tuple[int, ...] = (5430,)
+    mechanism_bodies: int = 3
+
+
+QUICK = Scale("quick", repeats=3, regions=(1, 3, 6, 12, 24), mechanism_bodies=1)
+USUAL = Scale("usual", peer_sizes=(5430, 50_000))
+FULL = Scale("full", drag_sizes=(5430, 50_000, 500_000), peer_sizes=(5430, 50_000, 500_000))
 
 
 @dataclass(frozen=True)
@@ -23,7 +38,7 @@ class Table:
 
     columns: tuple[str, ...]
     rows: Sequence[tuple[Cell, ...]]
-    title: str = ""
+    title: str
     mixed: bool = False
 
     def column(self, name: str) -> list[Cell]:
@@ -36,46 +51,12 @@ class Table:
         cells = list(zip(*self.rows, strict=True)) or [()] * len(self.columns)
         is_text = [any(isinstance(cell, str) for cell in column) for column in cells]
         powers = [not self.mixed and any(map(_is_tiny, column)) for column in cells]
-        lines = [
-            "| " + " | ".join(self.columns) + " |",
-            "|" + "|".join("---" if text else "---:" for text in is_text) + "|",
+        rows = [
+            self.columns,
+            ["---" if text else "---:" for text in is_text],
+            *([cell_text(*pair) for pair in zip(row, powers, strict=True)] for row in self.rows),
         ]
-        for row in self.rows:
-            texts = [cell_text(cell, power) for cell, power in zip(row, powers, strict=True)]
-            lines.append("| " + " | ".join(texts) + " |")
-        return "\n".join([f"*{self.title}*", "", *lines] if self.title else lines)
-
-
-@dataclass(frozen=True)
-class Ratio:
-    """A measured number and its limit; NaN if it was not measured."""
-
-    what: str
-    value: float
-    limit: float
-    at_most: bool = True
-
-    @property
-    def limit_text(self) -> str:
-        """The limit as text: "at most 1"."""
-        return f"at {'most' if self.at_most else 'least'} {self.limit:.3g}"
-
-    @property
-    def verdict(self) -> str:
-        """Whether the limit is met; text."""
-        if math.isnan(self.value):
-            return "not measured"
-        is_met = self.value <= self.limit if self.at_most else self.value >= self.limit
-        return "met" if is_met else "**not met**"
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of the report: a PNG file, its caption and a function that draws it."""
-
-    name: str
-    caption: str
-    draw: Callable[[Path], None]
+        return "\n".join([f"*{self.title}*", "", *(f"| {' | '.join(row)} |" for row in rows)])
 
 
 @dataclass
@@ -83,11 +64,15 @@ class Section:
     """The results of one experiment; *skipped* names what was not measured, with reasons."""
 
     title: str
-    text: list[str] = field(default_factory=list)
+    text: str = ""
     tables: list[Table] = field(default_factory=list)
-    figures: list[Figure] = field(default_factory=list)
-    ratios: list[Ratio] = field(default_factory=list)
     skipped: list[str] = field(default_factory=list)
+
+    def markdown(self) -> str:
+        """Return the section in Markdown."""
+        skipped = "\n".join(f"- Not measured: {line}" for line in self.skipped)
+        parts = [f"## {self.title}", self.text, *(t.markdown() for t in self.tables), skipped]
+        return "\n\n".join(filter(None, parts))
 
 
 def cell_text(cell: Cell, power: bool = False) -> str:
