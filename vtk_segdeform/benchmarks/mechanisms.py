@@ -260,7 +260,7 @@ def _drags(case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
     return [_quantities(drag) for drag in drags]
 
 
-def _bends(_: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
+def _bends(_case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
     """Return the quantities of a pose that is reached in one jump and finished."""
     found: list[list[dict[str, float]]] = [[], []]
     for _ in range(_REPEATS):
