@@ -167,7 +167,7 @@ def test_a_call_continues_the_last_one_only_from_its_end_and_for_its_targets():
     for at, to, continues in ((p, targets.copy(), True), (p.copy(), targets, False),
                               (p, targets + 1e-9, False)):  # fmt: skip
         state = _State(None, length=0.3, end=(p, targets))
-        state.acceleration.extrapolate(p, p, p)
+        state.acceleration.extrapolate(p, p)
         state.begin(at, to, options)
         assert state.length == (0.3 if continues else np.inf)
         assert (state.acceleration._last is not None) == continues
