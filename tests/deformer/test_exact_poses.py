@@ -33,11 +33,13 @@ def test_a_mesh_with_a_coarse_volume_is_moved_onto_its_own_and_its_cages_with_it
     assert abs(signed_volume(solution.vertices, SCENE.mesh.faces) / VOLUME - 1.0) < 1e-14
     assert abs(solution.volume_change) < 1e-14
     assert_allclose(deformer.surface(solution.cage_vertices), solution.vertices, atol=1e-13)
+    assert deformer._constraints.preserved.scaled is None
 
 
 @pytest.mark.usefixtures("scaled")
 def test_a_large_mesh_is_scaled_and_its_cages_with_it():
     deformer = SCENE.deformer()
+    assert deformer._constraints.preserved.scaled is not None
     solution = deformer.solve(TARGETS)
     assert solution.status is Status.CONVERGED
     assert abs(solution.volume_change) < 1e-14
@@ -129,6 +131,11 @@ def test_large_bodies_are_scaled_one_by_one_unless_a_cage_moves_two(separate, sh
     deformer = deformer.hold(fixed=[first], handle=[last])
     solution = deformer.solve(mesh.vertices[[last]] + [0.5, 0.0, 0.7])
     assert (deformer._constraints.preserved.scaled is not None) is separate
+    if separate:  # about the fixed vertex and the middle of the body without one
+        centres = deformer._constraints.anchors + deformer._problem.frame.centre
+        middle = mesh.vertices[mesh.components == mesh.components[last]].mean(axis=0)
+        expected = [mesh.vertices[first], middle]
+        assert_allclose(centres[np.argsort(centres[:, 0])], expected, atol=1e-6 + rounding)
     assert_allclose(
         [c.relative(solution.vertices) for c in deformer.preserved_volumes], 0, atol=rounding
     )

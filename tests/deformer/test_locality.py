@@ -120,6 +120,10 @@ def test_what_shares_a_region_with_the_pulled_part_comes_along_and_other_bodies_
     assert near.min() > 0.5 * of_tip
     assert far.max() < 0.01 * of_tip
     assert other.max() < 1e-9 * D
+    free = held.local(tip, np.inf, 0.1 * D)._constraints  # only what nothing else holds is anchored
+    loose = free.problem.anchors_of_loose_parts(np.append(SCENE.fixed, tip))
+    assert loose.any()
+    assert_allclose(free.solver.positions.anchors.quadratic, loose, atol=1e-12)
 
 
 def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_one():
@@ -325,6 +329,12 @@ def test_only_rings_that_would_bend_resist():
     fine = Deformer(dense, regions, fit_cages(dense, regions, 20))
     local = fine.hold(handle=[0]).local(0, 0.8 * d, 0.075 * d)
     assert local._constraints.solver.energy is fine._problem.energy
+    ring = Ring.around(deformer.mesh, deformer._problem.rest.vertices, SurfacePoint.at_vertex(0))
+    rows = ring.combinations @ deformer.subspace.at(ring.vertices)
+    solver = one._constraints.solver
+    (own, both), _ = solver.compliance(np.stack([deformer.subspace.at(np.array([0]))[0], rows[0]]))
+    pulled = 0.3 * d / deformer._problem.frame.size  # 0.05 edges of offset, its edges apart
+    assert abs(both) / own * pulled == pytest.approx(0.05 * ring.edge, rel=0.03)
     far = deformer.hold(handle=[0, 217]).local(0, 0.3 * d, 0.075 * d)
     assert far._constraints.solver.energy.constant > plain.constant + 1.5 * more
 

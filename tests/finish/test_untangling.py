@@ -60,7 +60,7 @@ def test_the_gradient_is_that_of_the_length(monkeypatch):
 def test_the_gradient_counts_segments_that_end_at_a_common_corner():
     # The second triangle pierces the first, and shares its corner 0 with it.
     points = np.array([[0.0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0, 1.2]])
-    faces, pairs = np.array([[0, 1, 2], [0, 3, 4]]), np.array([[0, 1]])
+    faces, pairs = np.array([[0, 1, 2], [3, 4, 0]]), np.array([[0, 1]])
     length, slope = contour(points, faces, pairs)
     assert length == pytest.approx(1.0)
     for vertex in range(5):

@@ -21,7 +21,7 @@ def _problem() -> tuple[np.ndarray, np.ndarray]:
 def _steps(anderson: Anderson, A: np.ndarray, b: np.ndarray, p: np.ndarray, count: int):
     for _ in range(count):
         h = 0.5 * A @ (b - p)
-        p = anderson.extrapolate(p, h, h)
+        p = anderson.extrapolate(p + h, h)
     return p
 
 
@@ -52,7 +52,7 @@ def test_a_step_combines_the_last_ones_so_that_their_residuals_cancel_best(windo
     p, ps, hs = np.zeros_like(b), [], []
     for _ in range(4):
         ps, hs = [*ps, p], [*hs, 0.5 * A @ (b - p)]
-        p = anderson.extrapolate(p, hs[-1], norm @ hs[-1])
+        p = anderson.extrapolate(p + hs[-1], norm @ hs[-1])
     own = np.hstack([norm @ h for h in hs[-window - 1 :]])
     ones = np.ones((window + 1, 1))  # min |own a| subject to sum a = 1, by its conditions
     full = np.block([[own.T @ own, ones], [ones.T, np.zeros((1, 1))]])

@@ -42,11 +42,12 @@ def test_a_polynomial_path_is_continued_exactly_at_uneven_steps(degree):
     assert_allclose(ahead(along(times, degree), 6.1e-3), path(6.1e-3, degree), atol=1e-12)
 
 
-def test_a_noisy_path_is_continued_straight_on():
+@pytest.mark.parametrize("size", [0.05, 1e-4])  # larger, and smaller, than the steps
+def test_a_noisy_path_is_continued_straight_on(size):
     """A polynomial of higher degree would enlarge the noise."""
     way = Way()
     for k in range(5):
-        noise = 0.05 * (-1.0) ** k
+        noise = size * (-1.0) ** k
         way = way.on_to(end(0.01 * k, 1, path(0.01 * k, 1) + noise))
     before, last = (each.p for each in way.ends[-2:])
     assert_allclose(ahead(way, 0.05), 2.0 * last - before, atol=1e-12)

@@ -167,7 +167,7 @@ def test_a_call_continues_the_last_one_only_from_its_end_and_for_its_targets():
     for at, to, continues in ((p, targets.copy(), True), (p.copy(), targets, False),
                               (p, targets + 1e-9, False)):  # fmt: skip
         state = _State(None, length=0.3, end=(p, targets))
-        state.acceleration.extrapolate(p, p, p)
+        state.acceleration.extrapolate(p, p)
         state.begin(at, to, options)
         assert state.length == (0.3 if continues else np.inf)
         assert (state.acceleration._last is not None) == continues
@@ -186,6 +186,23 @@ def test_h_is_computed_where_a_pose_is_far_and_saves_steps_there(monkeypatch):
     slow = SCENE.held().solve(SCENE.turned(28))
     assert quick.steps < slow.steps
     assert distance(quick, slow) < 1e-4
+
+
+def test_near_a_minimum_the_step_with_h_is_as_long_as_the_way_left():
+    """Newton's, so what it leaves falls with the square; without the volumes in H it does not."""
+    deformer = SCENE.deformer(tolerance=1e-12)
+    deformer.solve(SCENE.turned(25))
+    path = deformer._path
+    solver, places, end = path.solver, deformer._constraints.places(path.targets), path.end
+    here = solver._at(end, places)
+    way = np.random.default_rng(3).normal(size=end.shape)
+    left = []
+    for size in (1e-2, 1e-3):
+        start = solver.moved(end + size * way, solver.directions(here.rows))
+        step = solver._step(start, solver._factor_at(start))
+        ahead = solver.moved(start.at + step.h, step.directions)
+        left.append(solver.farthest(ahead.at - end) / solver.farthest(start.at - end))
+    assert left[1] < 0.2 * left[0] < 0.1
 
 
 def test_where_no_share_of_a_step_helps_h_is_that_of_the_pose_then_that_of_the_paper(on_its_way):

@@ -111,9 +111,9 @@ class Mechanism:
 class _Plain(Anderson):
     """No acceleration."""
 
-    def extrapolate(self, p: FloatArray, h: FloatArray, _residual: FloatArray) -> FloatArray:
-        """Return p + h."""
-        return p + h
+    def extrapolate(self, q: FloatArray, _residual: FloatArray) -> FloatArray:
+        """Return *q*."""
+        return q
 
 
 def _without_volumes(*given: Any, added: FloatArray | None = None, **_: object) -> Factor | None:

@@ -77,7 +77,7 @@ class Constraints:
     places_of_targets: sparse.csr_array  # (s, k), from targets to the places of their sets
     places_of_fixed: FloatArray  # (s, 3)
     fixed_box: FloatArray  # (2, 3), corners of the box around the fixed vertices; or (0, 3)
-    anchors: FloatArray  # (c, 3), the centres when the c bodies of a pose are scaled
+    anchors: FloatArray  # (c, 3), the centres when the c bodies of a pose are scaled; else none
     preserved: Preserved
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
@@ -177,7 +177,7 @@ def _centres(
     From the centre of the frame, in scene units; *fixed_at* (f, 3) in solver coordinates.
     """
     if surface is None:
-        return np.zeros((1, 3))
+        return _NO_POINTS
     frame = problem.frame
     if len(surface.middles) == 1:
         centres = np.zeros((1, 3))

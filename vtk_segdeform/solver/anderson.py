@@ -37,9 +37,8 @@ class Anderson:
         self._moves: list[FloatArray] = []  # differences of q = p + h
         self._changes: list[FloatArray] = []  # differences of the residual
 
-    def extrapolate(self, p: FloatArray, h: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the accelerated successor of *p*, whose plain successor is p + h."""
-        q = p + h
+    def extrapolate(self, q: FloatArray, residual: FloatArray) -> FloatArray:
+        """Return the accelerated successor of p, whose plain successor is *q* = p + h."""
         if self._last is not None:
             self._moves = [*self._moves, (q - self._last[0]).ravel()][-self.window :]
             changes = [*self._changes, (residual - self._last[1]).ravel()]
@@ -48,4 +47,4 @@ class Anderson:
         if not self._changes:
             return q
         gamma = np.linalg.lstsq(np.array(self._changes).T, residual.ravel(), rcond=1e-10)[0]
-        return q - (gamma @ np.array(self._moves)).reshape(p.shape)
+        return q - (gamma @ np.array(self._moves)).reshape(q.shape)

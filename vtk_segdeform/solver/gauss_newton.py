@@ -78,9 +78,6 @@ _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
 _COST = 12  # of computing H again, in steps
 _SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
-# Of the paper's step, root mean square over the surface, mesh size 1: below it multipliers are
-# accurate enough for the Hessian of the volumes.
-_CLOSE = 3e-3
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
@@ -382,9 +379,8 @@ class GaussNewton:
         if self.volumes.hessian:
             g = violations(self.volumes.constraints, here.x)
             solve = self._factor.solve_all
-            step, multipliers, _ = constrained_step(solve, here.slope, here.rows, g)
-            if self._length(step) < _CLOSE:
-                of_volumes = self.volumes.hessian(here.at, multipliers)
+            _, multipliers, _ = constrained_step(solve, here.slope, here.rows, g)
+            of_volumes = self.volumes.hessian(here.at, multipliers)
         rotations = rotation_term(self.energy, here.at)
         exact = full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
         return exact or self._factor

@@ -142,7 +142,7 @@ def minimise(
         ahead: _Pose | None = None
         trial: Step | None = step
         if step.is_whole:
-            guess = anderson.extrapolate(here.at, step.h, objective.residual(step.h))
+            guess = anderson.extrapolate(here.at + step.h, objective.residual(step.h))
             ahead = _lower(objective.moved(guess, step.directions), here)
         while ahead is None and trial is not None:
             anderson.forget()
