@@ -260,14 +260,14 @@ def _drags(case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
     return [_quantities(drag) for drag in drags]
 
 
-def _bends(_: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
+def _bends(_case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
     """Return the quantities of a pose that is reached in one jump and finished."""
     found: list[list[dict[str, float]]] = [[], []]
     for _ in range(_REPEATS):
         for (way, preparation), bends in zip(ways, found, strict=True):
             with way():
                 bends.append(bend(own, preparation))
-    return [{name: min(bend[name] for bend in bends) for name in bends[0]} for bends in found]
+    return [{k: min(each[k] for each in bends) for k in bends[0]} for bends in found]
 
 
 def begun(

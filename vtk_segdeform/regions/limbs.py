@@ -48,11 +48,13 @@ _TIPS = (16, 6, 6)  # of the surface, and of the surface without the limbs found
 _MOST_BEHIND = 0.6  # area behind a level set, at most, relative to the surface
 _LEVELS = 100  # level sets of each distance, scored approximately
 _MOST_ROUGH, _MOST_IMPROVED = 3, 2  # candidates scored exactly, before and after their improvement
+_LEAST_DIFFERENCE = 0.1  # share of points in which two candidates differ that are not both improved
 _END_DISTANCE = 0.6  # the end of a limb is farther from the neck than this, relative to the tip
 _PARALLELS = np.array([0.5, 0.75, 1.0, 1.5, 2.0])  # distances of the parallel curves, in L / 2 pi
 _WIDER_AT = np.arange(0.5, 4.1, 0.5)  # where limb and body may be wider, in L / 2 pi
-_WIDER = 1.27  # relative to a neck
-_MOST_COMMON = 0.15  # of the smaller of two limbs that are disjoint, or differ too little
+_WIDER, _WIDER_INSIDE = 1.27, 1.5  # relative to a neck of the body, and of a limb
+_MOST_COMMON = 0.15  # limbs with less of the smaller one in common are disjoint
+_LEAST_OUTSIDE = 0.3  # share of a limb that is outside a limb inside it, at least
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -123,7 +125,8 @@ def _candidates(surface: Surface, least: float, limbs: list[Limb], n_tips: int) 
         if found:
             best = min(found, key=attrgetter("score"))
             if any(
-                (best.inside != x.inside).sum() < _MOST_COMMON * best.inside.sum() for x in improved
+                (best.inside != x.inside).sum() < _LEAST_DIFFERENCE * best.inside.sum()
+                for x in improved
             ):
                 continue
             improved.append(best)
@@ -206,6 +209,7 @@ def _score(limb: FloatArray, body: FloatArray, length: FloatArray, area: FloatAr
 def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> bool:
     """Return whether *limb* and the part of the body with the others *limbs* are two parts."""
     own, rest, rims = limb.inside.copy(), ~limb.inside, [limb.length]
+    least_rest, wider = least, _WIDER
     for other in sorted(limbs, key=attrgetter("area"), reverse=True):
         smaller = min(limb.area, other.area)
         common = surface.areas[limb.inside & other.inside].sum()
@@ -219,8 +223,9 @@ def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> b
             own &= ~other.inside
         else:  # the smallest such limb comes last
             rest = other.inside & ~limb.inside
+            least_rest, wider = max(least, _LEAST_OUTSIDE * other.area), _WIDER_INSIDE
     area = surface.areas[own].sum()
-    if area < least or surface.areas[rest].sum() < least:
+    if area < least or surface.areas[rest].sum() < least_rest:
         return False
     if _protrusion(area, float(np.linalg.norm(rims))) < _LEAST_PROTRUSION:
         return False
@@ -232,7 +237,7 @@ def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> b
         for side in (own, rest)
         for step in _WIDER_AT
     )
-    return any(_spread(surface, ring) > _WIDER * neck for ring in rings)
+    return any(_spread(surface, ring) > wider * neck for ring in rings)
 
 
 def _spread(surface: Surface, ids: IntArray) -> float:
