@@ -41,7 +41,7 @@ print(f"cage twisted:   volume change {direct[0]:.0e}")
 # By a handle: the solver finds the cage vertices.
 session.reset_pose()
 session.set_fixed(mesh.vertices[:, 2] < 0.05)
-session.add_handle(mesh.vertices[:, 2] > 0.95, "top")
+session.handles.add(mesh.vertices[:, 2] > 0.95, "top")
 aside = np.eye(4)
 aside[0, 3] = 0.3
 session.move_handle("top", aside)

@@ -25,14 +25,14 @@ labels = np.select([left, right, height > 0.6], [1, 2, 3], default=0)
 session = sd.Session(mesh)
 session.set_regions(sd.Regions.from_labels(mesh, labels, overlap=4))
 
-session.paint_region(0, (height > 0.55) & (height < 0.7) & ~left & ~right)  # a wider overlap
-session.merge_regions([0, 3])  # one region for the trunk
-session.split_region(0, height > 0.45, overlap=5)  # split lower down
+session.painting.paint(0, (height > 0.55) & (height < 0.7) & ~left & ~right)  # a wider overlap
+session.painting.merge([0, 3])  # one region for the trunk
+session.painting.split(0, height > 0.45, overlap=5)  # split lower down
 session.undo()
 
 session.fit_cages()
 session.set_fixed(height < 0.08)
-session.add_handle(right & (height > 0.75), "right hand")
+session.handles.add(right & (height > 0.75), "right hand")
 up = np.eye(4)
 up[:3, 3] = 0.1, 0.0, 0.15
 session.move_handle("right hand", up)

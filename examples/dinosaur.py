@@ -36,8 +36,8 @@ session.segment(6)
 session.change_options(n_cage_vertices=240)
 session.fit_cages()
 session.set_fixed(feet)
-session.add_handle(head, "head")
-session.add_handle(tail, "tail")
+session.handles.add(head, "head")
+session.handles.add(tail, "tail")
 solution = session.drag(
     {
         "head": rotated(head, "y", 60, [0.4, 0.0, 0.55]),

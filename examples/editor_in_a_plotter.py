@@ -30,7 +30,7 @@ plotter.add_mesh(pv.Plane(i_size=1.2, j_size=1.2), color="wheat")
 editor = plotter.segdeform.edit(mesh)
 session = editor.session
 session.set_fixed(height < 0.08)
-session.add_handle(height > 0.92, "tip")
+session.handles.add(height > 0.92, "tip")
 plotter.camera_position = "xz"
 plotter.camera.zoom(1.4)
 plotter.show(interactive=show, auto_close=False)  # with "show", until the window is closed

@@ -25,7 +25,7 @@ session = sd.Session(mesh)
 session.segment(3)
 session.fit_cages()
 session.set_fixed(height < 0.08)
-session.add_handle(height > 0.92, "tip")
+session.handles.add(height > 0.92, "tip")
 
 pivot = [0.0, 0.0, 0.4]
 angles = 60.0 * np.sin(np.linspace(0.0, np.pi, 16))  # degrees

@@ -1,14 +1,16 @@
-"""Validation of arguments of public functions; for arrays see `arrays`.
+"""Validation of arguments of public functions, and short texts for values; for arrays see `arrays`.
 
-Each function returns the valid value or raises an `ArgumentError` that names the argument, says
-what it must be, and shows the value in short form.
+A checking function returns the valid value or raises an `ArgumentError` that names the argument,
+says what it must be, and shows the value in short form.
 """
 
 from __future__ import annotations
 
+import html
 import math
 import os
 import reprlib
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -52,6 +54,22 @@ def shown(value: object) -> str:
     ('[1, 1, 1, 1, ...]', 60, 'an integer of 16610 bits')
     """
     return " ".join(_BRIEF.repr(value).split())
+
+
+class Described:
+    """An object described by its numbers: in one line, and as a table in a notebook."""
+
+    @abstractmethod
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {'; '.join(map(': '.join, self.facts().items()))}>"
+
+    def _repr_html_(self) -> str:
+        cells = ((html.escape(name), html.escape(text)) for name, text in self.facts().items())
+        rows = "".join(f"<tr><th>{name}</th><td>{text}</td></tr>" for name, text in cells)
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>"
 
 
 def require(value: object, kind: type[_T] | tuple[type[_T], ...], name: str) -> _T:

@@ -59,7 +59,7 @@ def story(window: Any, editor_of: Callable[[], DeformEditor | None], name: str) 
     session.segment(3)
     session.fit_cages()
     session.set_fixed(height < 0.08)
-    session.add_handle(height > 0.92, "tip")
+    session.handles.add(height > 0.92, "tip")
     cos, sin, turn = np.cos(angle), np.sin(angle), np.eye(4)
     turn[:3, :3] = [[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]
     turn[:3, 3] = PIVOT - turn[:3, :3] @ PIVOT

@@ -155,7 +155,7 @@ def test_pulling_one_body_changes_the_volume_of_none():
     session.set_regions(regions)
     session.set_cages(deformer.cages)
     session.set_fixed(foot)
-    session.add_handle(tip, "tip")
+    session.handles.add(tip, "tip")
     session.drag({"tip": targets}, max_steps=3)
     session.drag({"tip": targets + [0.0, 0.1, 0.0]}, max_steps=3)
     for x in (session.vertices[:n], session.vertices[n:]):

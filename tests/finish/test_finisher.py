@@ -302,7 +302,7 @@ def test_a_denser_mesh_with_the_same_cages_is_finished_alike():
     assert two < one
 
 
-def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for():
+def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for(monkeypatch):
     """Between its ends, a sheet above another one is an arch, which would relax through it."""
     one = sheet()
     x, n = one.vertices, one.n_vertices
@@ -319,6 +319,10 @@ def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for():
     assert not len(new_crossings(apart, mesh.vertices, mesh.faces))
     assert_array_equal(apart[held], start[held])
     assert distortion(problem, apart) < distortion(problem, start)
+    monkeypatch.setattr(finishing, "_FIRMER", 1.0)
+    never = problem.finish(10.0, avoid_contact=True)
+    assert never.status is Status.STALLED
+    assert_array_equal(never.vertices, start)  # which does not cross
 
 
 def test_far_from_what_moves_there_is_no_energy():
@@ -501,3 +505,23 @@ def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
     x = SAUSAGE.finisher()._at_places(mesh.vertices, places)
     assert_array_equal(x[held], places)
     assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13
+
+
+def test_what_is_within_the_length_of_held_vertices_moves_along_with_them():
+    """Without a volume, as by the matrix of the finish without a force at free vertices."""
+    problem = bent(sheet())
+    mesh, held = problem.mesh, problem.held
+    offsets = np.where(mesh.vertices[held, :1] > 2.0, 0.4, 0.0) * [0.6, 0.0, 0.8]
+    x = problem.finisher()._at_places(problem.start, problem.places + offsets)
+    moved, weights = x - problem.start, mesh.vertex_areas / (0.06 * mesh.diagonal) ** 2
+    assert_allclose(moved[held], offsets, atol=1e-12)
+    force = CellEnergy.of(mesh, PER_CAGE).laplacian @ moved + weights[:, None] * moved
+    assert_allclose(force[~held], 0.0, atol=1e-12)
+    assert np.linalg.norm(moved[~held], axis=1).max() > 0.1
+
+
+def test_the_finish_reports_when_it_has_ended():
+    told = []
+    SAUSAGE.finisher().run(SAUSAGE.start, SAUSAGE.places, lambda *given: told.append(given))
+    assert told[-1] == (1.0, "finished")
+    assert [share for share, _ in told] == sorted(share for share, _ in told)

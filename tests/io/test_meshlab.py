@@ -151,8 +151,8 @@ def test_selected_vertices_can_be_fixed_a_handle_or_a_region():
     of_faces = meshlab.selected_vertices(meshset)
     whole = scene.mesh.faces[np.isin(scene.mesh.faces, scene.handle).all(axis=1)]
     assert_array_equal(of_faces, np.unique(whole))
-    session.add_handle(of_faces, "tip")
-    session.paint_region(1, of_faces)
+    session.handles.add(of_faces, "tip")
+    session.painting.paint(1, of_faces)
     assert session.regions.membership[1, of_faces].all()
 
 
@@ -163,7 +163,7 @@ def test_a_session_becomes_layers_of_its_mesh_and_cages_in_their_pose():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     session.drag(scene.turned(20), max_steps=3)
     meshset = meshlab.to_meshset(session)
     assert_array_equal(meshlab.selected_vertices(meshset), scene.handle)
@@ -187,7 +187,7 @@ def test_a_surface_and_its_session_are_converted_as_given_but_for_the_pose():
     assert_array_equal(again["heat"], surface.given["heat"])
     assert Surface(again).mesh.is_closed
     session = Session(surface)
-    session.add_handle(session.mesh.vertices[:, 0] > 1.9)
+    session.handles.add(session.mesh.vertices[:, 0] > 1.9)
     layer = meshlab.from_meshset(meshlab.to_meshset(session))
     assert_array_equal(layer.points, surface.given.points)
     assert_array_equal(layer["selection"] > 0, surface.given.points[:, 0] > 1.9)

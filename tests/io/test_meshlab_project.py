@@ -57,7 +57,7 @@ def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     write_project(tmp_path / "work.mlp", {**meshlab.as_layers(session), "painted": painted()})
     meshset = pymeshlab.MeshSet(verbose=False)
     meshset.load_project(str(tmp_path / "work.mlp"))
@@ -80,7 +80,7 @@ def posed_session():
     session.fit_cages()
     fixed, handle = ends(session.mesh)
     session.set_fixed(fixed)
-    session.add_handle(handle, "end")
+    session.handles.add(handle, "end")
     session.drag({"end": bent(session.mesh, handle)}, max_steps=2)
     return session
 

@@ -18,7 +18,7 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, SessionE
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session import pose_solver
+from vtk_segdeform.session.poses import Aim
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import checked_state
 from vtk_segdeform.session.store import load_session, save_session
@@ -45,7 +45,7 @@ def ready(scene: Scene = SCENE) -> Session:
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle, "tip")
+    session.handles.add(scene.handle, "tip")
     return session
 
 
@@ -70,7 +70,7 @@ def two_parts() -> Session:
     (cage,) = fit_cages(one, Regions.single(one), 60)
     session.set_cages([cage, Cage(cage.vertices + far, cage.faces)])
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle, "tip")
+    session.handles.add(SCENE.handle, "tip")
     return session
 
 
@@ -82,7 +82,7 @@ def open_sheet() -> Session:
     session.fit_cages()
     x = mesh.vertices[:, 0]
     session.set_fixed(x <= np.quantile(x, 0.1))
-    session.add_handle(x >= np.quantile(x, 0.9), "tip")
+    session.handles.add(x >= np.quantile(x, 0.9), "tip")
     return session
 
 
@@ -90,11 +90,11 @@ def open_sheet() -> Session:
 def test_a_drag_goes_on_from_a_finished_pose_without_a_jump(make):
     session = dragged(make(), -0.6)
     other = dragged(make(), -0.6)
-    before, steps = session.vertices, len(session.history)
+    before, steps = session.vertices, len(session.history.labels)
     solution = session.finish()
     finished = session.vertices
     assert np.abs(finished - before).max() > 1e-4 * session.mesh.diagonal
-    assert len(session.history) == steps
+    assert len(session.history.labels) == steps
     assert solution.handle_error < 1e-12
     assert solution.fixed_error < 1e-12
     session.drag(session.targets)
@@ -119,14 +119,17 @@ def test_every_copy_and_step_has_the_same_finished_pose(tmp_path):
     assert_array_equal(session.vertices, first)
     session.undo()
     assert session.state.pose is None
-    session.jump(len(session.history) - 1)
+    session.history.jump(len(session.history.labels) - 1)
     assert_array_equal(session.vertices, second)
-    assert_array_equal(session.vertices_at(session.position - 1), first)
+    assert_array_equal(
+        session.poses.peek(session.history.state_at(session.history.position - 1)),
+        first,
+    )
     save_session(tmp_path / "posed", session)
     loaded = load_session(tmp_path / "posed")
     assert_array_equal(loaded.vertices, second)
     for each in (session, loaded):
-        each.start_afresh()
+        each.poses.start_afresh()
         each.drag(each.targets)
         each.commit()
         each.finish()
@@ -141,7 +144,7 @@ def test_what_is_fixed_or_grabbed_after_a_finish_stays_where_it_is():
     away = np.abs(finished - SCENE.mesh.vertices).sum(axis=1)
     middle = free[np.argsort(away[free])][len(free) // 2 :][:20]
     session.set_fixed(np.concatenate([session.fixed, middle[:10]]))
-    session.add_handle(middle[10:], "belly")
+    session.handles.add(middle[10:], "belly")
     solution = session.drag(session.targets)
     assert np.abs(session.vertices - finished).max() < 1e-3 * unit
     assert max(solution.handle_error, solution.fixed_error) < 5e-4
@@ -181,7 +184,7 @@ def test_what_cannot_be_finished_is_told():
     session = ready()
     with pytest.raises(SessionError, match="no pose"):
         session.finish()
-    session.remove_handle("tip")
+    session.handles.remove("tip")
     session.set_fixed([])
     session.move_cage(0, 1.01 * session.cage_vertices[0])
     with pytest.raises(SessionError, match="add a handle"):
@@ -202,7 +205,7 @@ def test_a_finished_pose_rotates_with_its_handles():
     scene = sausage(2)  # the cages of a coarse one meet their places less accurately
     session = ready(scene)
     session.set_fixed([])
-    session.add_handle(scene.fixed, "base")
+    session.handles.add(scene.fixed, "base")
     dragged(session).finish()
     plain = session.vertices
     assert rotated(session, rotation([1.0, 2.0, 3.0], 2.0)) < 1e-4
@@ -213,7 +216,7 @@ def test_a_finished_pose_rotates_with_its_handles():
     # A handle made in a finished pose is where the cages do not put it.
     away = np.abs(plain - scene.mesh.vertices).sum(axis=1)
     away[session.state.handle] = 0.0
-    session.add_handle(np.argsort(away)[-6:], "more")
+    session.handles.add(np.argsort(away)[-6:], "more")
     assert rotated(session, rotation([0.0, 1.0, 0.0], 1.0)) < 1e-3
     session.finish()
     assert session.solution is not None
@@ -251,7 +254,7 @@ def pulled(session: Session, vertex: int, by: float, **options: float) -> None:
 @pytest.mark.campaign
 def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     session = ready(sausage(2))
-    session.remove_handle("tip")
+    session.handles.remove("tip")
     x, faces = session.mesh.vertices, session.mesh.faces
     ends = int(x[:, 0].argmax()), int(np.abs(x - x[x[:, 0].argsort()[len(x) // 3]]).sum(1).argmin())
     poses = []
@@ -266,7 +269,7 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
         assert abs(solution.volume_change) < 1e-12
         assert moved[ends[0]] < 1e-3
     assert np.count_nonzero(moved < 1e-12) > len(x) // 4  # what the second pull does not reach
-    session.pin(int(x[:, 2].argmax()))
+    session.handles.pin(int(x[:, 2].argmax()))
     free = np.setdiff1d(np.flatnonzero(x[:, 0] < 0.0), [*session.fixed, *session.state.handle])
     session.set_fixed([*session.fixed, *free[:20]])  # which are fixed where they are now
     pulled(session, ends[0], -0.05)
@@ -280,7 +283,7 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     loaded = load_session(tmp_path / "pulled")
     for each in (session, loaded):
         assert_array_equal(each.vertices, poses[2])
-        each.start_afresh()
+        each.poses.start_afresh()
         pulled(each, ends[1], 0.02)
         each.finish()
     assert_array_equal(loaded.vertices, session.vertices)
@@ -293,7 +296,7 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
 @pytest.mark.parametrize(("growth", "left"), [(-0.3, 0.01), (-1.0, 0.01), (-1.5, 0.1)])
 def test_offsets_that_turn_with_their_pose_come_to_rest(growth, left):
     wanted, shift = np.zeros((1, 3)), np.ones((1, 3))
-    aim = pose_solver._Aim(wanted, shift)
+    aim = Aim(wanted, shift)
     for _ in range(20):
         before, aim = aim, aim.turned(wanted, growth * aim.shift)
     assert aim is before
@@ -319,7 +322,7 @@ def test_a_finished_pose_of_which_hardly_a_vertex_is_free_keeps_its_volume(free)
     session.finish()
     held = np.concatenate([session.fixed, session.handles["tip"]])
     rest = np.setdiff1d(np.arange(session.mesh.n_vertices), held)
-    name = session.add_handle(rest[free:])
+    name = session.handles.add(rest[free:])
     before = session.vertices
     session.move_handle(name, turned(0.2))
     assert session.state.pose.finished is not None

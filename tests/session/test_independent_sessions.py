@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import functools
+import gc
 import itertools
+import weakref
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from campaign import every
 from scenes import sausage
 from solids import rotation
 
+from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.session.session import Session
 
@@ -34,7 +37,7 @@ def new() -> Session:
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle, "tip")
+    session.handles.add(SCENE.handle, "tip")
     return session
 
 
@@ -161,3 +164,30 @@ def require_unchanged(beginning, act, last) -> None:
     with pytest.raises(Cancelled):
         act(session, stop)
     assert what_comes_next(session) == expected(beginning)
+
+
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_a_move_that_fails_leaves_the_session_as_it_was(beginning, monkeypatch):
+    session, solve = begun(beginning), Deformer.solve
+
+    def fails(deformer, *inputs, **options):
+        solve(deformer, *inputs, **options)
+        raise FloatingPointError("a solve that fails at its end")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Deformer, "solve", fails)
+        with pytest.raises(FloatingPointError):
+            session.move_handle("tip", turned(-0.3))
+    assert what_comes_next(session) == expected(beginning)
+
+
+@pytest.mark.parametrize("beginning", BEGINNINGS)
+def test_a_session_is_freed_with_its_last_reference(beginning):
+    session = begun(beginning)
+    seen = weakref.ref(session.poses)
+    gc.disable()
+    try:
+        del session
+        assert seen() is None
+    finally:
+        gc.enable()

@@ -61,8 +61,8 @@ def test_in_random_sequences_no_frame_leaves_all_proportion(seed):
         near = one_pull(session, rng, near)
         if rng.random() < 0.3:
             free = np.setdiff1d(np.arange(n), session.state.handle)
-            session.pin(int(rng.choice(free)))
+            session.handles.pin(int(rng.choice(free)))
         if rng.random() < 0.3:
-            session.remove_handle(str(rng.choice(list(session.handles))))
+            session.handles.remove(str(rng.choice(list(session.handles))))
         if rng.random() < 0.2:
             session.undo()

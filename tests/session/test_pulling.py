@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session.pulling import automatic_locality
+from vtk_segdeform.session.pulls import can_grab, grabbed, locality_of
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
@@ -58,7 +58,7 @@ def moved(session: Session, before: np.ndarray) -> float:
 
 
 def with_pin(session: Session) -> None:
-    session.pin(LOW)
+    session.handles.pin(LOW)
 
 
 def without_volume(session: Session) -> None:
@@ -76,7 +76,7 @@ BEFORE: dict[str, Callable[[Session], object]] = {
     "a pin": with_pin,
     "fixed vertices": with_fixed,
     "volume preservation off": without_volume,
-    "a handle": lambda session: session.add_handle(SCENE.handle),
+    "a handle": lambda session: session.handles.add(SCENE.handle),
     "a cage moved": lambda session: session.move_cage(0, SCENE.cages[0].vertices * [1, 1, 1.05]),
 }
 
@@ -110,7 +110,7 @@ def test_nothing_moves_at_the_press_after_loading(tmp_path):
     assert vars(loaded.state.locality).keys() == vars(session.state.locality).keys()
     assert_array_equal(loaded.vertices, session.vertices)
     for each in (session, loaded):
-        each.start_afresh()
+        each.poses.start_afresh()
         each.pull(HIGH, x[HIGH], max_steps=8)
         assert moved(each, x) < 1e-12
         each.pull(HIGH, X[HIGH] + UP)
@@ -152,7 +152,7 @@ def test_the_grabbed_vertex_follows_and_the_volume_is_exact_in_every_frame(local
     assert np.linalg.norm(session.vertices[HIGH] - X[HIGH] - UP) < 6e-4 * D
     assert session.commit() == "drag pull 1"
     assert session.undo() == "drag pull 1"
-    assert not session.can_undo
+    assert not session.history.can_undo
     assert_array_equal(session.vertices, X)
 
 
@@ -186,7 +186,7 @@ def test_another_vertex_radius_or_locality_begins_another_pull():
     session.commit()
     labels = [session.undo() for _ in range(3)]
     assert labels == ["drag pull 2", "drag pull 1", "drag pull 1"]
-    assert not session.can_undo
+    assert not session.history.can_undo
 
 
 def test_a_pulled_point_nearby_is_grabbed_again_and_farther_ones_are_carried_along():
@@ -212,7 +212,7 @@ def test_pins_stay_can_be_removed_and_three_make_the_surface_between_free():
     ways = ([0.3, 0, -1.0], [1.0, 0, 0], [-1.0, 0, 0])
     free = []
     for k, way in enumerate(ways):
-        assert session.pin(int(np.argmax(X @ way))) == f"pin {k + 1}"
+        assert session.handles.pin(int(np.argmax(X @ way))) == f"pin {k + 1}"
         session.pull(HIGH, X[HIGH], max_steps=1)
         free.append(np.isinf(session.state.locality.reach))
         session.revert()
@@ -223,7 +223,7 @@ def test_pins_stay_can_be_removed_and_three_make_the_surface_between_free():
     session.commit()
     x = session.vertices
     for k in (1, 2, 3):
-        session.remove_handle(f"pin {k}")
+        session.handles.remove(f"pin {k}")
     assert_array_equal(session.vertices, x)
     session.pull(HIGH, x[HIGH] + UP)
     assert np.isfinite(session.state.locality.reach)
@@ -231,7 +231,7 @@ def test_pins_stay_can_be_removed_and_three_make_the_surface_between_free():
 
 def test_a_renamed_pull_is_a_handle_like_any_other():
     session = pulled()
-    session.rename_handle("pull 1", "nose")
+    session.handles.rename("pull 1", "nose")
     session.pull(TIP, X[TIP] + UP, max_steps=2)
     assert session.state.locality.reach > 4.0 * 0.15 * D  # a single point: less local
     session.commit()
@@ -262,7 +262,7 @@ def test_a_matrix_turns_the_surface_around_the_point():
     assert_allclose(session.vertices[patch], expected, atol=5e-3 * D)
     assert session.commit() == "drag pull 1"
     assert session.undo() == "drag pull 1"
-    assert not session.can_undo
+    assert not session.history.can_undo
 
 
 def test_the_rotation_so_far_turns_nothing():
@@ -330,10 +330,10 @@ def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
 def test_the_default_locality_is_that_of_a_pull_in_one_call(pins):
     session = ready()
     for k in range(pins):
-        session.pin(int(SCENE.fixed[k]))
-    assert automatic_locality(session.state) == {0: 0.2, 2: 0.05, 3: 0.0}[pins]
+        session.handles.pin(int(SCENE.fixed[k]))
+    assert locality_of(session.state) == {0: 0.2, 2: 0.05, 3: 0.0}[pins]
     session.pull(HIGH, X[HIGH] + UP, max_steps=1)
-    assert session.state.locality.follows == 1.0 - automatic_locality(session.state)
+    assert session.state.locality.follows == 1.0 - locality_of(session.state)
 
 
 @pytest.mark.parametrize("locality", [0.0, 1.0])
@@ -462,9 +462,9 @@ def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for()
     assert session.accept(prepared)
     assert session.is_bound
     assert len(heard) == 1
-    assert session.undo_label == "change total cage vertices"
+    assert session.history.undo_label == "change total cage vertices"
     session.pull(HIGH, X[HIGH] + UP, max_steps=2)
-    while session.can_undo:
+    while session.history.can_undo:
         session.undo()
         assert session.regions is prepared.regions  # also before the first step
     assert session.accept(session.preparation())
@@ -494,9 +494,9 @@ WRONG = [
     (lambda s: s.pull(HIGH, X[HIGH], locality=1.1), "locality must be a number from 0 to 1"),
     (lambda s: s.pull(HIGH, X[HIGH], locality=-0.1), "locality must be a number from 0 to 1"),
     (lambda s: s.pull(int(SCENE.fixed[0]), UP), "this point is fixed"),
-    (lambda s: s.pin(int(SCENE.fixed[0])), "both fixed and handle"),
-    (lambda s: s.pin(TIP), "already in 'pull 1'"),
-    (lambda s: s.pin(-3), "vertex must be a whole number"),
+    (lambda s: s.handles.pin(int(SCENE.fixed[0])), "both fixed and handle"),
+    (lambda s: s.handles.pin(TIP), "already in 'pull 1'"),
+    (lambda s: s.handles.pin(-3), "vertex must be a whole number"),
     (lambda s: Session(MESH).pull(HIGH, X[HIGH]), "there are no cages"),
 ]
 
@@ -553,10 +553,10 @@ def test_in_a_live_pull_the_grabbed_vertex_keeps_to_the_pointer():
 
 def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
     session = pulled()
-    session.pin(LOW)
+    session.handles.pin(LOW)
     before = session.vertices
-    handle = session.make_handle("pin 1", radius=0.15 * D)
-    other = session.make_handle("pull 1")
+    handle = session.handles.to_patch("pin 1", radius=0.15 * D)
+    other = session.handles.to_patch("pull 1")
     assert (handle, other) == ("handle 1", "handle 2") == tuple(sorted(session.handles))
     assert session.state.pulls == ()
     for name, vertex in ((handle, LOW), (other, HIGH)):
@@ -568,7 +568,7 @@ def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
     assert_array_equal(session.vertices, before)
     session.move_handle(handle, np.diag([1.0, 1.0, 1.1, 1.0]))
     session.commit()
-    assert session.make_pin(handle) == "pin 1"
+    assert session.handles.to_pin(handle) == "pin 1"
     assert session.handles["pin 1"].shape == (1,)
     for label in ("convert handle 1 to pin 1", "drag handle 1", "convert pull 1 to handle 2"):
         assert session.undo() == label
@@ -583,7 +583,7 @@ INSIDE = SurfacePoint.of(FACE, [0.3, 0.4, 0.3])
 
 def test_a_pull_moves_the_grabbed_point_of_a_face_and_its_handle_stays_where_it_was_left():
     session, place = ready(), INSIDE.at(X)
-    session.pin(LOW)
+    session.handles.pin(LOW)
     for share in (0.5, 1.0, 3.0):
         session.pull(INSIDE, place + share * UP)
         off = np.linalg.norm(INSIDE.at(session.vertices) - place - share * UP)
@@ -591,7 +591,7 @@ def test_a_pull_moves_the_grabbed_point_of_a_face_and_its_handle_stays_where_it_
         assert session.solution.handle_error < 1e-4
     session.commit()
     assert list(session.handles["pull 1"]) == [INSIDE.vertex]
-    assert session.grabbed(INSIDE) == "pull 1"
+    assert grabbed(session.mesh, session.state, INSIDE) == "pull 1"
     before = session.vertices
     session.refine()
     assert moved(session, before) < 1e-4
@@ -660,9 +660,9 @@ def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
 
 def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():
     session = ready()
-    assert session.can_grab(INSIDE)
-    assert not session.can_grab(INSIDE, radius=0.001 * D)
-    assert session.can_grab(HIGH, radius=0.001 * D)
+    assert can_grab(session.mesh, INSIDE)
+    assert not can_grab(session.mesh, INSIDE, radius=0.001 * D)
+    assert can_grab(session.mesh, HIGH, radius=0.001 * D)
     with pytest.raises(ConstraintError, match="no vertex is near this point"):
         session.pull(INSIDE, INSIDE.at(X) + UP, radius=0.001 * D)
     assert session.state.pose is None

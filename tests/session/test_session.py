@@ -21,11 +21,11 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionEr
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session.history import History
 from vtk_segdeform.session.listeners import Change
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.session.timeline import Timeline
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
@@ -42,7 +42,7 @@ def ready(**options) -> Session:
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle, "tip")
+    session.handles.add(SCENE.handle, "tip")
     return session
 
 
@@ -76,15 +76,15 @@ def one_action(session: Session, rng: np.random.Generator) -> None:
     free = np.setdiff1d(some, np.concatenate([session.fixed, session.state.handle]))
     handle = rng.choice([*session.handles, "nobody"])
     actions = [
-        lambda: session.paint_region(region, some, subtract=subtract),
+        lambda: session.painting.paint(region, some, subtract=subtract),
         lambda: session.set_regions(SCENE.regions),
-        lambda: session.merge_regions([0, region]),
-        lambda: session.split_region(region),
+        lambda: session.painting.merge([0, region]),
+        lambda: session.painting.split(region),
         lambda: session.set_cages(SCENE.cages),
         lambda: session.set_fixed(free),
-        lambda: session.add_handle(free[:6]),
-        lambda: session.remove_handle(handle),
-        lambda: session.rename_handle(handle, f"called {rng.integers(1000)}"),
+        lambda: session.handles.add(free[:6]),
+        lambda: session.handles.remove(handle),
+        lambda: session.handles.rename(handle, f"called {rng.integers(1000)}"),
         lambda: session.change_options(stretch=float(rng.integers(1, 3))),
         session.reset_pose,
         *[lambda: session.move_handle(handle, up(0.4 * rng.normal()), max_steps=4)] * 5,
@@ -108,16 +108,16 @@ def test_any_sequence_of_actions_is_undone_and_redone_bit_for_bit(seed):
         one_action(session, rng)
     after = [snapshot(session)]
     labels = []
-    while session.can_undo:
+    while session.history.can_undo:
         labels.append(session.undo())
         after.append(snapshot(session))
     assert len(labels) > 20
     assert sum(label.startswith("drag") for label in labels) > 2
     assert session.regions is None
     for label, expected in zip(labels[::-1], after[-2::-1], strict=True):
-        assert session.redo_label == label == session.redo()
+        assert session.history.redo_label == label == session.redo()
         assert snapshot(session) == expected
-    assert not session.can_redo
+    assert not session.history.can_redo
     assert session.redo() is None
     where = len(labels)
     for step in rng.integers(0, 2, 20) * 2 - 1:  # to and fro
@@ -125,12 +125,12 @@ def test_any_sequence_of_actions_is_undone_and_redone_bit_for_bit(seed):
             where += step
             _ = session.redo() if step > 0 else session.undo()
             assert snapshot(session) == after[::-1][where]
-    assert session.history == ("opened", *labels[::-1])
+    assert session.history.labels == ("opened", *labels[::-1])
     for position in rng.integers(0, len(labels) + 1, 20):
-        now, seen = snapshot(session), session.vertices_at(position)
+        now, seen = snapshot(session), session.poses.peek(session.history.state_at(position))
         assert snapshot(session) == now
-        session.jump(position)
-        assert session.position == position
+        session.history.jump(position)
+        assert session.history.position == position
         assert snapshot(session) == after[::-1][position]
         assert seen is None or seen.tobytes() == session.vertices.tobytes()
 
@@ -216,9 +216,9 @@ def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
 def test_a_new_step_after_undo_leaves_nothing_to_redo():
     session = ready()
     session.undo()
-    assert session.can_redo
+    assert session.history.can_redo
     session.set_fixed([1])
-    assert not session.can_redo
+    assert not session.history.can_redo
 
 
 def test_history_holds_no_vertices_of_the_mesh():
@@ -240,7 +240,7 @@ def test_weights_of_regions_not_shown_are_let_go():
     session = ready()
     old = session.regions
     assert old.weights.shape == (2, len(X))
-    session.paint_region(0, X < 0.6)
+    session.painting.paint(0, X < 0.6)
     assert not {"weights", "border_distance"} & vars(old).keys()
     session.undo()
     assert_allclose(session.regions.weights.sum(axis=0), 1.0)
@@ -253,26 +253,26 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
     labels = [session.undo() for _ in range(4)]
     assert labels == ["set fixed vertices"] * 3 + [None]
     assert session.fixed.tolist() == [2]
-    assert session.history == ("set fixed vertices",) * 4  # the oldest state has a name too
+    assert session.history.labels == ("set fixed vertices",) * 4  # the oldest state has a name too
     for wrong in (-1, 4, 1.5, "1"):
         with pytest.raises(SessionError, match="position must be from 0 to 3"):
-            session.jump(wrong)
+            session.history.jump(wrong)
     with pytest.raises(SessionError, match="number of steps"):
-        History(0)
+        Timeline(State(), 0)
 
 
 def test_the_oldest_state_is_named_by_the_last_step_that_was_discarded():
     session = Session(SCENE.mesh, history=2)
     session.set_fixed([0])
-    session.add_handle([5], "first")
-    assert session.history == ("opened", "set fixed vertices", "set first")
-    session.add_handle([6], "second")
-    assert session.history == ("set fixed vertices", "set first", "set second")
-    session.add_handle([7], "third")
-    assert session.history == ("set first", "set second", "set third")
+    session.handles.add([5], "first")
+    assert session.history.labels == ("opened", "set fixed vertices", "set first")
+    session.handles.add([6], "second")
+    assert session.history.labels == ("set fixed vertices", "set first", "set second")
+    session.handles.add([7], "third")
+    assert session.history.labels == ("set first", "set second", "set third")
     session.undo()
     session.undo()
-    assert session.history[session.position] == "set first"
+    assert session.history.labels[session.history.position] == "set first"
     assert list(session.handles) == ["first"]
 
 
@@ -281,14 +281,14 @@ def test_there_is_nothing_to_redo_during_a_drag_which_goes_on():
     session.move_handle("tip", up(0.1), max_steps=2)
     session.commit()
     session.undo()
-    assert session.redo_label == "drag tip"
+    assert session.history.redo_label == "drag tip"
     session.move_handle("tip", up(0.2), max_steps=2)
-    dragged, labels = session.vertices, session.history
-    assert not session.can_redo
+    dragged, labels = session.vertices, session.history.labels
+    assert not session.history.can_redo
     assert session.redo() is None
     assert session.is_dragging
     assert session.vertices is dragged
-    assert session.history == labels
+    assert session.history.labels == labels
     session.commit()
     assert session.redo() is None
     assert session.vertices is dragged
@@ -300,31 +300,31 @@ def test_there_is_nothing_to_redo_during_a_drag_which_goes_on():
 
 def test_a_jump_during_a_drag_ends_it_as_one_step():
     session, heard = ready(), []
-    count = len(session.history)
+    count = len(session.history.labels)
     session.move_handle("tip", up(0.2), max_steps=2)
     dragged = session.vertices
-    assert session.history[count:] == ("drag tip",)
-    assert session.position == count
-    assert session.vertices_at(count) is dragged
-    assert session.vertices_at(count - 1) is session.mesh.vertices
+    assert session.history.labels[count:] == ("drag tip",)
+    assert session.history.position == count
+    assert session.poses.peek(session.history.state_at(count)) is dragged
+    assert session.poses.peek(session.history.state_at(count - 1)) is session.mesh.vertices
     session.on_change(heard.append)
-    session.jump(count)
+    session.history.jump(count)
     assert (session.is_dragging, heard) == (False, [Change.HISTORY])
     session.move_handle("tip", up(0.3), max_steps=2)
-    session.jump(0)
-    assert session.history[count:] == ("drag tip", "drag tip")
-    session.jump(count)
+    session.history.jump(0)
+    assert session.history.labels[count:] == ("drag tip", "drag tip")
+    session.history.jump(count)
     assert session.vertices.tobytes() == dragged.tobytes()
 
 
 def test_a_drag_is_one_step_and_its_label_names_what_was_dragged():
     session = ready()
-    session.add_handle(np.abs(X) < 0.1)
+    session.handles.add(np.abs(X) < 0.1)
     for z in (0.1, 0.2, 0.3):
         session.move_handle("tip", up(z), max_steps=2)
         session.move_handle("handle 1", up(-z), max_steps=2)
     assert session.is_dragging
-    assert session.undo_label == "drag tip, handle 1"
+    assert session.history.undo_label == "drag tip, handle 1"
     assert session.commit() == "drag tip, handle 1"
     assert not session.is_dragging
     assert session.commit() is None
@@ -338,15 +338,15 @@ def test_revert_takes_a_drag_back_and_leaves_no_step():
     session = ready()
     session.move_handle("tip", up(0.3))
     session.commit()
-    before, label = snapshot(session), session.undo_label
+    before, label = snapshot(session), session.history.undo_label
     session.move_handle("tip", up(0.3))
     session.refine()
     session.revert()
     session.revert()
     assert snapshot(session) == before
-    assert session.undo_label == label
-    assert not session.can_redo
-    session.add_handle(np.abs(X) < 0.1, "middle")
+    assert session.history.undo_label == label
+    assert not session.history.can_redo
+    session.handles.add(np.abs(X) < 0.1, "middle")
     session.move_handle("middle", up(0.1), max_steps=1)
     assert session.commit() == "drag middle"
 
@@ -362,7 +362,7 @@ def test_another_action_commits_the_drag_in_hand_first(action):
         assert session.redo() == "drag tip"
     else:
         session.set_fixed(X < -2.5)
-        assert [session.undo_label, session.undo()] == ["set fixed vertices"] * 2
+        assert [session.history.undo_label, session.undo()] == ["set fixed vertices"] * 2
     assert snapshot(session) == dragged
 
 
@@ -383,7 +383,7 @@ def test_a_matrix_moves_a_handle_from_where_the_drag_began():
 
 def test_targets_by_name_leave_the_other_handles_where_they_are():
     session = ready()
-    session.add_handle(np.abs(X) < 0.1, "middle")
+    session.handles.add(np.abs(X) < 0.1, "middle")
     session.drag({"middle": session.targets["middle"] + [0, 0, 0.2]})
     session.drag({"tip": session.targets["tip"] + [0, 0, 0.1]})
     middle = VERTICES[np.abs(X) < 0.1]
@@ -405,9 +405,9 @@ def test_a_drag_stopped_early_is_refined_to_the_end():
     whole = ready()
     whole.drag(SCENE.turned(25))
     assert_allclose(session.vertices, whole.vertices, atol=1e-5)
-    label = session.undo_label
+    label = session.history.undo_label
     assert session.refine().status is not Status.STEP_LIMIT
-    assert session.undo_label == label
+    assert session.history.undo_label == label
     refined = snapshot(session)
     session.undo()
     session.redo()
@@ -423,20 +423,20 @@ def test_fixed_vertices_and_handles_change_without_moving_anything():
     session.commit()
     posed = session.vertices
     session.set_fixed(X < -2.2)
-    session.add_handle(np.abs(X) < 0.1, "middle")
-    session.rename_handle("tip", "end")
+    session.handles.add(np.abs(X) < 0.1, "middle")
+    session.handles.rename("tip", "end")
     assert_array_equal(session.vertices, posed)
     assert_array_equal(session.targets["middle"], posed[np.abs(X) < 0.1])
     assert_allclose(session.targets["end"], SCENE.turned(30))
     solution = session.move_handle("middle", up(1e-3))
     assert np.abs(session.vertices - posed).max() < 0.1
     assert solution.handle_error < 2e-3
-    session.add_handle(np.abs(X) < 0.6, "middle")
+    session.handles.add(np.abs(X) < 0.6, "middle")
     assert_array_equal(session.targets["middle"], session.vertices[np.abs(X) < 0.6])
-    session.remove_handle("end")
+    session.handles.remove("end")
     assert list(session.handles) == list(session.targets) == ["middle"]
-    session.remove_handle("middle")
-    assert not session.is_ready
+    session.handles.remove("middle")
+    assert not session.state.is_ready
     assert volume_error(session) < 1e-13
 
 
@@ -500,7 +500,7 @@ def test_other_cages_are_carried_to_the_pose(by_pull):
     session = ready()
     if by_pull:
         session.set_fixed([])
-        session.remove_handle(next(iter(session.handles)))
+        session.handles.remove(next(iter(session.handles)))
         tip = int(session.mesh.vertices[:, 0].argmax())
         session.pull(tip, session.mesh.vertices[tip] + [0.0, 0.0, 0.6])
         session.commit("pull")
@@ -538,10 +538,10 @@ def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
     session.on_change(heard.append)
     session.move_handle("tip", up(0.2))
     session.commit()
-    session.paint_region(0, X < 0.6)
+    session.painting.paint(0, X < 0.6)
     assert session.cages == SCENE.cages
     assert_array_equal(session.vertices, VERTICES)  # at rest
-    session.paint_region(0, X < 3.0)
+    session.painting.paint(0, X < 3.0)
     assert session.cages == ()
     assert heard[2:] == [
         Change.REGIONS | Change.POSE | Change.HISTORY,
@@ -549,7 +549,7 @@ def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
     ]
     session.undo()
     assert session.cages == SCENE.cages
-    session.split_region(0)
+    session.painting.split(0)
     assert session.cages == ()
 
 
@@ -565,14 +565,14 @@ def test_other_cages_put_the_pose_to_rest():
 
 def test_cages_are_fitted_around_painted_regions():
     session = Session(SCENE.mesh)
-    session.paint_region(1, X > -0.5)
-    session.paint_region(0, X > 0.5, subtract=True)
+    session.painting.paint(1, X > -0.5)
+    session.painting.paint(0, X > 0.5, subtract=True)
     assert session.regions.n_regions == 2
     session.change_options(n_cage_vertices=60)
     session.fit_cages()
     assert sum(cage.n_vertices for cage in session.cages) == 60
-    assert session.undo_label == "fit cages"
-    session.add_handle(SCENE.handle)
+    assert session.history.undo_label == "fit cages"
+    session.handles.add(SCENE.handle)
     session.drag(SCENE.turned(20))
     assert volume_error(session) < 1e-13
 
@@ -583,7 +583,7 @@ def test_cancelling_leaves_everything_as_it_was(work):
     session.move_handle("tip", up(0.1))
     session.commit()
     session.change_options(stretch=5.0)  # so that there is something to bind
-    before, label, heard = snapshot(session), session.undo_label, []
+    before, label, heard = snapshot(session), session.history.undo_label, []
     session.on_change(heard.append)
     session.change_options(stretch=6.0)
     session.undo()
@@ -600,7 +600,7 @@ def test_cancelling_leaves_everything_as_it_was(work):
     assert snapshot(session) == before
     assert heard == []
     if work != "bind":
-        assert session.undo_label == label
+        assert session.history.undo_label == label
 
 
 def test_a_cage_vertex_that_goes_out_and_back_in_one_drag_leaves_everything_where_it_was():
@@ -676,10 +676,10 @@ def test_what_to_do_next_is_said_at_every_stage():
     for step in (
         lambda: session.set_regions(SCENE.regions),
         lambda: session.set_cages(SCENE.cages),
-        lambda: session.add_handle(SCENE.handle),
+        lambda: session.handles.add(SCENE.handle),
         lambda: session.set_fixed(SCENE.fixed),
     ):
-        assert session.is_ready == (len(said) > 3)
+        assert session.state.is_ready == (len(said) > 3)
         step()
         said.append(session.what_next)
     assert [words.split()[0] for words in said] == ["create", "fit", "add", "drag", "drag"]
@@ -758,7 +758,7 @@ def test_nothing_handed_out_can_be_written_to():
 def test_what_is_handed_in_can_be_written_to_afterwards():
     session = ready()
     ids, targets = SCENE.handle[:5].copy(), VERTICES[SCENE.handle[:5]] + [0, 0, 0.1]
-    session.add_handle(ids, "tip")
+    session.handles.add(ids, "tip")
     session.drag(targets)
     before = snapshot(session)
     ids[:], targets[:] = 0, 0.0
@@ -779,24 +779,36 @@ WRONG = [
     (lambda s: s.move_handle("tip", np.ones((4, 4))), ConstraintError, "last row"),
     (lambda s: s.move_handle("tip", up(np.inf)), ConstraintError, "NaN or infinite"),
     (lambda s: s.set_fixed(SCENE.handle), ConstraintError, "both fixed and handle"),
-    (lambda s: s.add_handle(SCENE.handle[:3]), ConstraintError, "already in 'tip'"),
-    (lambda s: s.add_handle([]), ConstraintError, "at least one vertex"),
-    (lambda s: s.add_handle([0.5]), ConstraintError, "vertex numbers or be a mask"),
-    (lambda s: s.add_handle(np.abs(X) < 0.1, " "), ConstraintError, "printable"),
-    (lambda s: s.rename_handle("tip", "x" * 81), ConstraintError, "80 characters"),
-    (lambda s: s.remove_handle("nose"), ConstraintError, "no handle 'nose'"),
-    (lambda s: s.paint_region(0, X < -2.0, subtract=True), RegionError, "add them to another"),
-    (lambda s: s.paint_region(3, X < -2.0), RegionError, r"one of 0\.\.1"),
-    (lambda s: s.paint_region(0, [-1]), RegionError, "vertices must index"),
-    (lambda s: s.merge_regions([1]), RegionError, "two or more regions"),
-    (lambda s: s.rename_region(2, "arm"), RegionError, "no region 2; there are 2, numbered from 0"),
-    (lambda s: s.rename_region(0, "x" * 81), RegionError, "at most 80 characters; got 81"),
-    (lambda s: s.rename_region(0, "two\nlines"), RegionError, "printable"),
-    (lambda s: s.rename_region(0, "\u202egnp.exe"), RegionError, "printable"),  # turns what follows
-    (lambda s: s.rename_region(0, "half a \ud83d"), RegionError, "printable"),
-    (lambda s: s.rename_region(0, "region 2"), RegionError, "reserved for a region of this number"),
-    (lambda s: s.rename_region(0, None), RegionError, "printable text; got None"),
-    (lambda s: s.split_region(0, X < 9.0), RegionError, "cannot be split: all"),
+    (lambda s: s.handles.add(SCENE.handle[:3]), ConstraintError, "already in 'tip'"),
+    (lambda s: s.handles.add([]), ConstraintError, "at least one vertex"),
+    (lambda s: s.handles.add([0.5]), ConstraintError, "vertex numbers or be a mask"),
+    (lambda s: s.handles.add(np.abs(X) < 0.1, " "), ConstraintError, "printable"),
+    (lambda s: s.handles.rename("tip", "x" * 81), ConstraintError, "80 characters"),
+    (lambda s: s.handles.remove("nose"), ConstraintError, "no handle 'nose'"),
+    (lambda s: s.painting.paint(0, X < -2.0, subtract=True), RegionError, "add them to another"),
+    (lambda s: s.painting.paint(3, X < -2.0), RegionError, r"one of 0\.\.1"),
+    (lambda s: s.painting.paint(0, [-1]), RegionError, "vertices must index"),
+    (lambda s: s.painting.merge([1]), RegionError, "two or more regions"),
+    (
+        lambda s: s.painting.rename(2, "arm"),
+        RegionError,
+        "no region 2; there are 2, numbered from 0",
+    ),
+    (lambda s: s.painting.rename(0, "x" * 81), RegionError, "at most 80 characters; got 81"),
+    (lambda s: s.painting.rename(0, "two\nlines"), RegionError, "printable"),
+    (
+        lambda s: s.painting.rename(0, "\u202egnp.exe"),
+        RegionError,
+        "printable",
+    ),  # turns what follows
+    (lambda s: s.painting.rename(0, "half a \ud83d"), RegionError, "printable"),
+    (
+        lambda s: s.painting.rename(0, "region 2"),
+        RegionError,
+        "reserved for a region of this number",
+    ),
+    (lambda s: s.painting.rename(0, None), RegionError, "printable text; got None"),
+    (lambda s: s.painting.split(0, X < 9.0), RegionError, "cannot be split: all"),
     (lambda s: s.set_regions(Regions.single(Mesh(*icosphere(2)))), RegionError, "another mesh"),
     (lambda s: s.set_cages(SCENE.cages[:1]), CageError, "2 regions need as many cages; got 1"),
     (lambda s: s.set_cages([Cage(*icosphere(1))] * 2), CageError, "outside the cage"),
@@ -849,7 +861,7 @@ def test_without_cages_or_handles_or_regions_it_says_what_is_missing():
         session.bind()
     with pytest.raises(ConstraintError, match="add a handle first"):
         session.drag(NEAR)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     with pytest.raises(CageError, match="fit or set cages"):
         session.drag(NEAR)
 
@@ -879,7 +891,7 @@ def test_far_from_the_origin_a_pose_keeps_its_volume():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     for degrees in (10, 20, 30):
         session.drag(scene.turned(degrees, about=shift), max_steps=3)
         assert abs(session.volume_change) < 1e-10
@@ -894,7 +906,7 @@ def test_the_volume_change_is_that_of_the_vertices_after_a_drag_and_after_loadin
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     solution = session.drag(scene.turned(40, about=shift))
     session.commit()
     loaded = Session(scene.mesh, state=session.state)
@@ -930,19 +942,19 @@ def test_regions_are_called_by_their_place_until_they_have_a_name():
     news = []
     session.on_change(news.append)
     for name in ODD:
-        session.rename_region(1, f"  {name} ")
+        session.painting.rename(1, f"  {name} ")
         assert session.region_names == ("region 1", name)
         assert news[-1] == Change.NAMES | Change.HISTORY
     with pytest.raises(RegionError, match="already"):
-        session.rename_region(0, ODD[-1])
-    session.rename_region(1, ODD[-1])  # no other name: no step
+        session.painting.rename(0, ODD[-1])
+    session.painting.rename(1, ODD[-1])  # no other name: no step
     assert session.undo() == f"rename {ODD[-2]}"
     assert session.region_names == ("region 1", ODD[-2])
-    session.rename_region(1, "")
+    session.painting.rename(1, "")
     assert session.region_names == ("region 1", "region 2")
-    session.rename_region(1, "arm")
-    session.rename_region(1, "region 2")  # what it would be called anyway is no name
-    session.merge_regions([0, 1])
+    session.painting.rename(1, "arm")
+    session.painting.rename(1, "region 2")  # what it would be called anyway is no name
+    session.painting.merge([0, 1])
     assert session.region_names == ("region 1",)
 
 
@@ -951,8 +963,8 @@ def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
     session = Session(scene.mesh)
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
-    session.rename_region(1, "arm")
-    session.rename_region(3, "leg")
+    session.painting.rename(1, "arm")
+    session.painting.rename(3, "leg")
     assert len(session.cages) == 4  # a name changes nothing else
     masks = session.regions.membership
     whole = dict(zip(session.region_names, masks, strict=True))
@@ -960,18 +972,18 @@ def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
     def mask(name):
         return session.regions.membership[session.region_names.index(name)]
 
-    session.split_region(1)
+    session.painting.split(1)
     assert session.region_names == ("region 1", "arm", "region 3", "leg", "arm 2")
     assert_array_equal(mask("arm") | mask("arm 2"), whole["arm"])
     assert_array_equal(mask("leg"), whole["leg"])
-    session.split_region(4)
+    session.painting.split(4)
     assert session.region_names[5] == "arm 3"
-    session.merge_regions([0, 5, 4, 1])  # the first that has a name gives it
+    session.painting.merge([0, 5, 4, 1])  # the first that has a name gives it
     assert session.region_names == ("arm", "region 2", "leg")
     assert_array_equal(mask("arm"), whole["arm"] | whole["region 1"])
-    session.split_region(1)
+    session.painting.split(1)
     assert session.region_names == ("arm", "region 2", "leg", "region 4")
-    session.paint_region(4, scene.mesh.vertices[:, 0] > 2.0)
+    session.painting.paint(4, scene.mesh.vertices[:, 0] > 2.0)
     assert session.region_names[2:] == ("leg", "region 4", "region 5")
     for _ in range(5):
         session.undo()
@@ -982,33 +994,22 @@ def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
 
 def test_errors_and_steps_call_a_region_by_its_name():
     session = ready()
-    session.rename_region(0, "tail")
+    session.painting.rename(0, "tail")
     with pytest.raises(RegionError, match="are only in tail; add"):
-        session.paint_region(0, X < -2.0, subtract=True)
+        session.painting.paint(0, X < -2.0, subtract=True)
     with pytest.raises(RegionError, match="tail cannot be split"):
-        session.split_region(0, X < 9.0)
+        session.painting.split(0, X < 9.0)
     with pytest.raises(CageError, match=r"tail .*outside the cage"):
         session.set_cages([Cage(*icosphere(1))] * 2)
-    session.split_region(0)
-    assert session.undo_label == "split tail"
-
-
-def test_effort_counts_every_step_of_the_solver_and_nothing_else():
-    session = ready()
-    steps = [session.move_handle("tip", up(z), max_steps=2).steps for z in (0.1, 0.2)]
-    session.commit()
-    steps.append(session.refine(max_steps=3).steps)
-    session.undo()
-    session.move_cage(0, session.cage_vertices[0] + [0.0, 0.0, 0.01])
-    assert session.effort.steps == sum(steps) > 0
-    assert session.effort.seconds > 0.0
+    session.painting.split(0)
+    assert session.history.undo_label == "split tail"
 
 
 def test_halves_of_a_region_are_connected_overlap_and_cover_it():
     session = Session(SCENE.mesh)
     session.set_regions(Regions.single(SCENE.mesh))
-    session.split_region(0)
-    session.split_region(1, overlap=1)
+    session.painting.split(0)
+    session.painting.split(1, overlap=1)
     membership = session.regions.membership
     assert membership.any(axis=0).all()
     for a, b in itertools.pairwise(sorted(membership, key=lambda row: X[row].mean())):
@@ -1023,7 +1024,7 @@ def test_halves_of_a_region_are_connected_overlap_and_cover_it():
             touched = inside[reached[inside].any(axis=1)]
             reached[touched] = True
         assert reached[row].mean() > 0.98
-    session.merge_regions([2, 0, 1])
+    session.painting.merge([2, 0, 1])
     assert session.regions.n_regions == 1
     assert session.regions.membership.all()
 
@@ -1044,31 +1045,32 @@ def test_letting_the_volume_go_binds_nothing_anew_and_it_comes_back_exactly():
 
 def test_a_pivot_moves_with_its_handle_is_undone_and_saved(tmp_path):
     session = Session(SCENE.mesh, state=State(SCENE.regions, SCENE.cages))
-    name = session.add_handle(SCENE.handle)
-    assert_allclose(session.pivot(name), SCENE.mesh.vertices[SCENE.handle].mean(axis=0))
+    name = session.handles.add(SCENE.handle)
+    assert_allclose(session.handles.pivot(name), SCENE.mesh.vertices[SCENE.handle].mean(axis=0))
     turn = np.eye(4)
     turn[:3, :3], turn[:3, 3] = rotation([1.0, 2.0, 0.5], 0.2), [0.1, 0.2, 0.0]
-    session.set_pivot(name, [0.5, 0.1, 0.2])
+    session.handles.set_pivot(name, [0.5, 0.1, 0.2])
     session.move_handle(name, turn, max_steps=2)
     there = turn[:3, :3] @ [0.5, 0.1, 0.2] + turn[:3, 3]
-    assert_allclose(session.pivot(name), there, atol=1e-12)
-    session.set_pivot(name, there + 0.1)
-    assert_allclose(session.pivot(name), there + 0.1, atol=1e-12)
+    assert_allclose(session.handles.pivot(name), there, atol=1e-12)
+    session.handles.set_pivot(name, there + 0.1)
+    assert_allclose(session.handles.pivot(name), there + 0.1, atol=1e-12)
     session.undo()
-    session.rename_handle(name, "tip")
-    assert_allclose(session.pivot("tip"), there, atol=1e-12)
+    session.handles.rename(name, "tip")
+    assert_allclose(session.handles.pivot("tip"), there, atol=1e-12)
     save_session(tmp_path / "pivot.segdeform", session)
     assert_array_equal(
-        load_session(tmp_path / "pivot.segdeform").pivot("tip"), session.pivot("tip")
+        load_session(tmp_path / "pivot.segdeform").handles.pivot("tip"),
+        session.handles.pivot("tip"),
     )
-    session.set_pivot("tip", None)
-    assert session.undo_label == "reset the pivot of tip"
+    session.handles.set_pivot("tip", None)
+    assert session.history.undo_label == "reset the pivot of tip"
     assert not session.state.pivots
     session.undo()
-    session.remove_handle("tip")
+    session.handles.remove("tip")
     assert not session.state.pivots
     for point in ([1.0, 2.0], [np.nan, 0.0, 0.0], [1e9, 0.0, 0.0]):
         session.undo()
         with pytest.raises(ConstraintError, match="point"):
-            session.set_pivot(*session.handles, point)
+            session.handles.set_pivot(*session.handles, point)
         session.redo()

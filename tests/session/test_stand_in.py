@@ -133,4 +133,4 @@ def test_the_mesh_and_its_session_are_not_changed(stand_in):
     stand_in.pulled(TOP, CACTUS.vertices[TOP] + SIDE)
     stand_in.release()
     assert_array_equal(CACTUS.vertices, before)
-    assert not stand_in.session.can_undo or stand_in.session.state.pose is None
+    assert not stand_in.session.history.can_undo or stand_in.session.state.pose is None

@@ -39,10 +39,10 @@ def posed() -> Session:
     session = Session(SCENE.mesh, state=State(options=options))
     session.set_regions(Regions(SCENE.mesh, SCENE.regions.membership, smoothness=1.5))
     session.set_cages(SCENE.cages)
-    session.rename_region(1, "左腕 \N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}")
+    session.painting.rename(1, "左腕 \N{WOMAN}\N{ZERO WIDTH JOINER}\N{MICROSCOPE}")
     session.set_fixed(SCENE.fixed[::-1])
-    session.add_handle(SCENE.handle, "the tip · 1")
-    session.add_handle(np.abs(SCENE.mesh.vertices[:, 0]) < 0.1)
+    session.handles.add(SCENE.handle, "the tip · 1")
+    session.handles.add(np.abs(SCENE.mesh.vertices[:, 0]) < 0.1)
     session.move_handle("the tip · 1", np.diag([1.0, 0.9, 1.1, 1.0]), max_steps=3)
     session.commit()
     return session
@@ -54,7 +54,7 @@ def tiny(pose: bool = True) -> Session:
     session.set_regions(Regions.single(session.mesh))
     session.set_cages([Cage(4.0 * TETRAHEDRON[0], TETRAHEDRON[1])])
     session.set_fixed([1])
-    session.add_handle([0], "h")
+    session.handles.add([0], "h")
     if pose:
         session.drag(session.targets["h"] + [0.2, 0.1, 0.0], max_steps=2)
     return session
@@ -122,7 +122,7 @@ def test_what_is_loaded_is_what_was_saved(make, tmp_path):
     content = saved(session, tmp_path)
     loaded = load_session(tmp_path / "saved.npz")
     assert same(session, loaded)
-    assert not loaded.can_undo
+    assert not loaded.history.can_undo
     save_session(str(tmp_path / "again"), loaded)
     assert (tmp_path / "again").read_bytes() == content
     assert sorted(os.listdir(tmp_path)) == ["again", "saved.npz"]
@@ -198,7 +198,7 @@ def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_p
     (tmp_path / "old.npz").write_bytes(nameless.getvalue())
     loaded = load_session(tmp_path / "old.npz")
     assert loaded.region_names == ("region 1", "region 2")
-    loaded.rename_region(1, shared(posed).region_names[1])
+    loaded.painting.rename(1, shared(posed).region_names[1])
     assert same(loaded, shared(posed))
 
 

@@ -24,7 +24,7 @@ def test_a_handle_that_is_turned_in_steps_winds_the_body_and_it_stays_wound(tmp_
     session.change_options(n_cage_vertices=80)
     session.fit_cages()
     session.set_fixed(z < 0.5)
-    name = session.add_handle(z > HEIGHT - 0.5)
+    name = session.handles.add(z > HEIGHT - 0.5)
     for degrees in (-90.0, -180.0, -270.0):
         session.move_handle(name, turned(degrees))
     session.commit()

@@ -11,7 +11,8 @@ from scenes import sausage
 
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.solver.extrapolation import Way
-from vtk_segdeform.solver.gauss_newton import GaussNewton, SolverOptions
+from vtk_segdeform.solver.gauss_newton import GaussNewton, SolverOptions, _State
+from vtk_segdeform.solver.newton import Step
 from vtk_segdeform.solver.solution import Status
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -123,6 +124,80 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
             found = deformer.solve(SCENE.turned(60), max_steps=3)
     assert len(asked) > 1
     assert distance(found, expected) < 5e-3
+
+
+def is_slow(lengths, *, max_steps=500, age=1):
+    """Tell whether H is out of date for the last of steps with these *lengths*.
+
+    The tolerance is 1e-4, and *age* is that of H at the start of the call: 1 if it is that of rest.
+    """
+    nowhere = np.zeros((0, 3))
+    state = _State(None, age=age)
+    state.begin(nowhere, nowhere, SolverOptions(tolerance=1e-4, max_steps=max_steps))
+    *taken, last = (Step(nowhere, (), length) for length in lengths)
+    for step in taken:
+        state.took(step)
+    return state.is_slow(last)
+
+
+def test_h_is_out_of_date_where_the_next_12_steps_at_the_present_rate_do_not_converge():
+    assert is_slow([1.0, 0.50])  # 0.5^13 is 1.2e-4
+    assert not is_slow([1.0, 0.49])  # 0.9e-4
+    assert is_slow([9.0, 1.0, 0.50])
+    assert is_slow([1.0, 2.0])
+    assert not is_slow([1e-5, 9e-5])  # longer than the last one, but the last that is needed
+    assert not is_slow([1.0])  # the rate is unknown
+
+
+def test_nor_where_as_many_steps_as_are_left_do_not():
+    assert is_slow([1.0, 0.047], max_steps=3)  # two are left: 0.047^3 is 1.04e-4
+    assert not is_slow([1.0, 0.046], max_steps=3)
+    assert not is_slow([1.0, 0.047], max_steps=4)
+    assert is_slow([1.0, 0.5, 0.17], max_steps=5)  # three: 0.34^3 * 0.17
+    assert not is_slow([1.0, 0.5, 0.04], max_steps=5)
+
+
+def test_the_rate_of_steps_is_known_after_two_with_one_h():
+    assert not is_slow([1.0, 0.9], age=0)
+    assert is_slow([1.0, 0.95, 0.9], age=0)
+
+
+def test_a_call_continues_the_last_one_only_from_its_end_and_for_its_targets():
+    p, targets, options = np.ones((2, 3)), np.zeros((1, 3)), SolverOptions()
+    for at, to, continues in ((p, targets.copy(), True), (p.copy(), targets, False),
+                              (p, targets + 1e-9, False)):  # fmt: skip
+        state = _State(None, length=0.3, end=(p, targets))
+        state.acceleration.extrapolate(p, p, p)
+        state.begin(at, to, options)
+        assert state.length == (0.3 if continues else np.inf)
+        assert (state.acceleration._last is not None) == continues
+
+
+def test_h_is_computed_where_a_pose_is_far_and_saves_steps_there(monkeypatch):
+    of_h, computed = GaussNewton._factor_at, []
+    monkeypatch.setattr(
+        GaussNewton, "_factor_at", lambda *given: computed.append(0) or of_h(*given)
+    )
+    SCENE.held().solve(SCENE.turned(5))
+    assert not computed
+    quick = SCENE.held().solve(SCENE.turned(28))
+    assert computed
+    monkeypatch.setattr(_State, "is_slow", lambda *_: False)
+    slow = SCENE.held().solve(SCENE.turned(28))
+    assert quick.steps < slow.steps
+    assert distance(quick, slow) < 1e-4
+
+
+def test_where_no_share_of_a_step_helps_h_is_that_of_the_pose_then_that_of_the_paper(on_its_way):
+    """Also of a solver that has not begun, so whose H is not of this pose."""
+    begun, p, targets = on_its_way
+    solver = begun.fresh()
+    here = solver._at(p, targets)
+    exact, plain = solver.another(here), solver.another(here)
+    assert_allclose(exact.h, solver._step(here, solver._factor_at(here)).h, rtol=1e-12)
+    assert_allclose(plain.h, solver._step(here, solver._factor).h, rtol=1e-12)
+    assert np.abs(exact.h - plain.h).max() > 1e-3 * np.abs(plain.h).max()
+    assert solver.another(here) is None
 
 
 def test_the_iteration_ends_where_only_rounding_is_left():

@@ -139,6 +139,8 @@ def test_it_takes_at_most_so_many_steps_and_reports_each(most):
     assert len(took) == most
     assert told == [(k / most, "bowling") for k in range(most)]
     assert end.step is None  # from the end no step was computed
+    solved(bowl(), max_steps=1, progress=progress)
+    assert told[-1] == (0.0, "solving")
 
 
 def test_progress_cancels_it():

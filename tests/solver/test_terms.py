@@ -102,6 +102,28 @@ def test_a_term_limits_every_step():
     assert_allclose(p, expected.p, atol=1e-5)
 
 
+def test_h_contains_a_term_from_the_first_step_on_at_which_it_is_active():
+    deformer = SCENE.held()
+    row, p = deformer.subspace.at(np.array([0]))[0], deformer._path.p
+    wall = Wall(row, row @ p[:, 2] - 0.05, 0.1)
+    solver, places = (
+        solver_with(deformer, wall)._path.solver,
+        deformer._constraints.places(deformer._path.targets),
+    )
+    here, factor = solver._at(p, places), solver._state.factor
+    assert here.is_active
+    step = solver.step(here)
+    assert solver._state.factor is not factor
+    assert_allclose(step.h, solver._step(here, solver._factor_at(here)).h, rtol=1e-9)
+    factor = solver._state.factor
+    solver.step(here)
+    assert solver._state.factor is factor  # not again while it is active
+    solver._renew(replace(here, is_active=False))
+    factor = solver._state.factor
+    solver.step(here)
+    assert solver._state.factor is not factor
+
+
 @dataclass(frozen=True)
 class Spring:
     """A square about a place, times a constant; it limits steps to a share."""

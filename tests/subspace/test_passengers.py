@@ -86,7 +86,9 @@ def test_a_session_carries_points_as_well():
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
-    assert_allclose(session.carry(INSIDE), INSIDE, atol=1e-11)
+    session.handles.add(SCENE.handle)
+    assert_allclose(session.poses.carry(session.state, INSIDE), INSIDE, atol=1e-11)
     session.drag(SCENE.turned(30))
-    assert_allclose(session.carry(MESH.vertices), session.vertices, rtol=0, atol=1e-12)
+    assert_allclose(
+        session.poses.carry(session.state, MESH.vertices), session.vertices, rtol=0, atol=1e-12
+    )

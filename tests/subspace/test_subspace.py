@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -87,3 +89,16 @@ def test_in_single_precision_the_product_is_that_of_rounded_weights(monkeypatch)
     double = SCENE.deformer().surface(solution.cage_vertices)
     away = np.linalg.norm(double - solution.vertices, axis=1).max()
     assert away < 1e-6 * SCENE.mesh.diagonal
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_pickle_has_the_blocks_only_and_maps_the_same_bits(compiled):
+    subspace = Subspace(SUBSPACE.n_vertices, SUBSPACE.rows, SUBSPACE.blocks)
+    before = len(pickle.dumps(subspace))
+    vars(subspace)["_is_compiled"] = compiled
+    moved = subspace.map(wobble())
+    assert len(subspace._packed.weights) > 0
+    text = pickle.dumps(subspace)
+    assert len(text) < 1.01 * before
+    assert pickle.loads(text)._is_compiled == compiled
+    assert np.array_equal(pickle.loads(text).map(wobble()), moved)

@@ -34,7 +34,7 @@ def ready_session() -> Session:
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     return session
 
 

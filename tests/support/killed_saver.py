@@ -29,7 +29,7 @@ def main() -> None:
     sessions = [sd.Session(sd.Mesh(*OCTAHEDRON)), sd.Session(sd.Mesh(*icosphere(3)))]
     whole = []
     for session in sessions:
-        session.add_handle([0], "h")
+        session.handles.add([0], "h")
         sd.save_session(path, session)
         whole.append(path.read_bytes())
     found: Counter[str] = Counter()

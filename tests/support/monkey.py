@@ -51,7 +51,7 @@ class Monkey:
         session.set_regions(scene.regions)
         session.set_cages(scene.cages)
         session.set_fixed(scene.fixed)
-        session.add_handle(scene.handle)
+        session.handles.add(scene.handle)
         self.view = plain_view(SIZE)
         self.editor = DeformEditor(self.view, session)
         self.editor.path = folder / "monkey.segdeform"

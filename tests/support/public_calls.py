@@ -30,6 +30,7 @@ import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.faults import Search, as_soup
+from vtk_segdeform.session.groups import Handles, Painting
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.films.film import Film
@@ -93,7 +94,9 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
                 continue
             seen.add(name)
             if inspect.isclass(thing):
-                yield from _calls_of_class(thing)
+                groups = (Handles, Painting) if thing is Session else ()
+                for each in (thing, *groups):
+                    yield from _calls_of_class(each)
             elif callable(thing):
                 yield _call(name, functools.partial(lambda f: f, thing), thing)
 
@@ -215,7 +218,7 @@ def _worked_on() -> Session:
     session.set_regions(regions())
     session.set_cages(cages())
     session.set_fixed(_left())
-    session.add_handle(_right())
+    session.handles.add(_right())
     session.drag(_targets())
     session.commit()
     return session
@@ -296,6 +299,8 @@ def instance(cls: type) -> Any:
         "Cage": lambda: cages()[0],
         "Deformer": lambda: bound().copy(),
         "Session": session,
+        "Handles": lambda: session().handles,
+        "Painting": lambda: session().painting,
         "Surface": given,
         "Passengers": passengers,
         "Solution": lambda: bound().copy().solve(_targets()),
@@ -484,12 +489,12 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "HandleDragger.refine_while_resting.value": lambda: False,
     "RegionSelector.radius.value": lambda: 0.1,
     "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
-    "Session.add_handle.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],
+    "Handles.add.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],
     "Session.move_cage.vertices": lambda: cages()[0].vertices * 1.05,
-    "Session.paint_region.vertices": lambda: [0, 1, 2],
-    "Session.rename_region.name": lambda: "arm",
+    "Painting.paint.vertices": lambda: [0, 1, 2],
+    "Painting.rename.name": lambda: "arm",
     "Session.set_fixed.vertices": _left,
-    "Session.split_region.vertices": lambda: None,
+    "Painting.split.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),
     "as_polydata.expected": lambda: "a PolyData",
@@ -546,19 +551,19 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "Mesh.faces": ("oriented mesh",),
     "Mesh.vertices": ("oriented mesh",),
     "Regions.from_masks.masks": ("membership",),
-    "Session.add_handle.vertices": ("handle",),
+    "Handles.add.vertices": ("handle",),
     "Session.drag.targets": ("handle",),
-    "Session.make_handle.name": ("handle",),
-    "Session.make_pin.name": ("handle",),
-    "Session.merge_regions.which": ("region",),
+    "Handles.to_patch.name": ("handle",),
+    "Handles.to_pin.name": ("handle",),
+    "Painting.merge.which": ("region",),
     "Session.move_handle.motion": ("targets",),
     "Session.move_handle.name": ("handle",),
-    "Session.pivot.name": ("handle",),
-    "Session.remove_handle.name": ("handle",),
-    "Session.rename_handle.name": ("handle",),
-    "Session.rename_handle.new_name": ("handle's name",),
+    "Handles.pivot.name": ("handle",),
+    "Handles.remove.name": ("handle",),
+    "Handles.rename.name": ("handle",),
+    "Handles.rename.new_name": ("handle's name",),
     "Session.set_fixed.vertices": ("fixed",),
-    "Session.set_pivot.name": ("handle",),
+    "Handles.set_pivot.name": ("handle",),
     "Surface.targets_at.points": ("points", "targets"),
     "Surface.targets_at.targets": ("points", "targets"),
     "blend_at.vertices": ("weights",),

@@ -92,7 +92,7 @@ def small():
     shapes = [ball * [3.5, 1.6, 1.6] + [shift, 0.0, 0.0] for shift in (-1.5, 1.5)]
     session.set_cages([Cage(shape, ball_faces) for shape in shapes])
     session.set_fixed(x < -2.4)
-    session.add_handle(x > 2.4)
+    session.handles.add(x > 2.4)
     return session.mesh, session.state
 
 

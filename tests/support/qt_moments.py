@@ -56,7 +56,7 @@ class QtStand(Stand):
         assert panel.history.isEnabled()
         assert not panel.status.cancel.isVisible()
         assert panel.boxes["regions"].isEnabledTo(panel)
-        assert panel.toolbar.buttons["undo"].isEnabled() is self.session.can_undo
+        assert panel.toolbar.buttons["undo"].isEnabled() is self.session.history.can_undo
 
     def close(self):
         self.widget.close()

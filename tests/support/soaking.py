@@ -48,7 +48,7 @@ def session_of(scene: Scene) -> Session:
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle, NAME)
+    session.handles.add(scene.handle, NAME)
     return session
 
 

@@ -171,7 +171,7 @@ def drag_session(session):
     session.fit_cages()
     fixed, handle = ends(mesh)
     session.set_fixed(fixed)
-    name = session.add_handle(handle)
+    name = session.handles.add(handle)
     dragged(session, {name: bent(mesh, handle)})
 
 
@@ -306,7 +306,7 @@ def regions_in_a_session(masks):
     session.change_options(n_cage_vertices=30 * session.regions.n_regions)
     session.fit_cages()
     session.set_fixed(zoo.LEFT)
-    dragged(session, {session.add_handle(zoo.RIGHT): bent(session.mesh, zoo.RIGHT)})
+    dragged(session, {session.handles.add(zoo.RIGHT): bent(session.mesh, zoo.RIGHT)})
 
 
 def overlap_of_labels(rings):
@@ -322,7 +322,7 @@ def overlap_of_segments(rings):
 
 def overlap_of_a_split_region(rings):
     session = sd.Session(scene()[0])
-    session.split_region(0, overlap=rings)
+    session.painting.split(0, overlap=rings)
     regions_only(session.regions.membership)
 
 
@@ -351,7 +351,7 @@ def cage_in_a_session(vertices, faces):
     session.set_regions(regions)
     session.set_cages([sd.Cage(vertices, faces)])
     session.set_fixed(zoo.LEFT)
-    dragged(session, {session.add_handle(zoo.RIGHT): bent(mesh, zoo.RIGHT)})
+    dragged(session, {session.handles.add(zoo.RIGHT): bent(mesh, zoo.RIGHT)})
 
 
 def cage_in_the_filter(vertices, faces):
@@ -387,7 +387,7 @@ def selection_in_a_session(fixed, handle):
     session.set_regions(regions)
     session.set_cages(cages)
     session.set_fixed(fixed)
-    name = session.add_handle(handle)
+    name = session.handles.add(handle)
     dragged(session, {name: bent(mesh, session.handles[name], 5.0)})
 
 
@@ -417,7 +417,7 @@ def session_of_the_scene():
     session.set_regions(regions)
     session.set_cages(cages)
     session.set_fixed(zoo.LEFT)
-    session.add_handle(zoo.RIGHT, "right")
+    session.handles.add(zoo.RIGHT, "right")
     return session
 
 

@@ -70,7 +70,7 @@ def fitted_session(name: str) -> sd.Session:
 
 def drag(session: sd.Session, fixed, handle, targets) -> None:
     session.set_fixed(np.setdiff1d(fixed, handle))
-    session.add_handle(handle, "end")
+    session.handles.add(handle, "end")
     session.drag({"end": targets}, max_steps=8)
     session.commit()
 

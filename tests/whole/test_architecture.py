@@ -58,6 +58,7 @@ GRANTED = {
     "io.reading_child": VTK | {"h5py", "pymeshlab"},
     "io.vtk_arrays": VTK,
     "io.vtk_formats": VTK,
+    "session.output": {"pyvista"},
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},

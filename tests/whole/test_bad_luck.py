@@ -177,7 +177,7 @@ def posed_session():
     session.set_cages(scene.cages)
     session.change_options(n_cage_vertices=60)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle, "tip")
+    session.handles.add(scene.handle, "tip")
     session.drag({"tip": scene.turned(10)}, max_steps=3)
     session.commit()
     return session
@@ -199,7 +199,7 @@ JOBS = {
 def cancelled_at(job, moment):
     """Cancel *job* at its progress report number *moment*; return whether it made that report."""
     session, reports = posed_session(), iter(range(10**6))
-    before, label = session.state, session.undo_label
+    before, label = session.state, session.history.undo_label
 
     def stop(_fraction, _text):
         if next(reports) == moment:
@@ -209,7 +209,7 @@ def cancelled_at(job, moment):
         JOBS[job](session, stop)
     except Cancelled:
         assert session.state is before
-        assert session.undo_label == label
+        assert session.history.undo_label == label
         assert not session.is_dragging
         return True
     if session.state is not before:
@@ -243,7 +243,7 @@ def test_a_session_works_although_all_its_listeners_raise():
         lambda: session.drag(dict(session.targets), max_steps=1),
         session.commit,
         lambda: session.set_fixed([1, 2]),
-        lambda: session.add_handle([7, 8]),
+        lambda: session.handles.add([7, 8]),
         session.undo,
         session.undo,
         session.redo,
@@ -257,7 +257,7 @@ def test_a_session_works_although_all_its_listeners_raise():
         stop()
     assert session.fixed.tolist() == [1, 2]
     assert abs(session.volume_change) < 1e-12
-    while session.undo_label:
+    while session.history.undo_label:
         session.undo()
     assert np.allclose(session.vertices, pose, atol=1e-6)
 

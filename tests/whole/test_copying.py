@@ -34,9 +34,9 @@ def working_session() -> Session:
     session = Session(SCENE.mesh)
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
-    session.rename_region(0, "trunk")
+    session.painting.rename(0, "trunk")
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     session.drag(SCENE.turned(10), max_steps=2)
     session.commit()
     session.change_options(stretch=5.0)
@@ -75,7 +75,7 @@ def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
     assert other.region_names == ("trunk", "region 2")
     assert_array_equal(other.vertices, session.vertices)
     for one in (session, other):
-        one.start_afresh()
+        one.poses.start_afresh()
     again = [one.refine().vertices for one in (session, other)]
     assert_array_equal(*again)
     labels = [[one.undo() for _ in range(7)] for one in (session, other)]
@@ -92,17 +92,16 @@ def test_a_copied_session_is_independent_and_has_no_listeners(way):
     heard: list[sd.Change] = []
     session.on_change(heard.append)
     other = way(session)
-    before, label = session.state, session.undo_label
+    before, label = session.state, session.history.undo_label
     other.undo()
     other.set_fixed([])
-    other.remove_handle("handle 1")
+    other.handles.remove("handle 1")
     assert heard == []
     assert session.state is before
-    assert (session.undo_label, session.redo_label) == (label, None)
-    assert session.effort == way(session).effort
+    assert (session.history.undo_label, session.history.redo_label) == (label, None)
     session.revert()
     assert heard
-    assert other.undo_label == "remove handle 1"
+    assert other.history.undo_label == "remove handle 1"
 
 
 @pytest.mark.parametrize("way", every(2, WAYS))

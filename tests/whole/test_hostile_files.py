@@ -120,7 +120,7 @@ def session():
     result = sd.Session(sd.Mesh(*OCTAHEDRON))
     result.set_regions(sd.Regions.single(result.mesh))
     result.set_cages([sd.Cage(scene.cages[0].vertices, scene.cages[0].faces)])
-    result.add_handle([0], "h")
+    result.handles.add([0], "h")
     result.drag(result.targets["h"] + [0.2, 0.1, 0.0], max_steps=2)
     return result
 

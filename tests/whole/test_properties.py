@@ -207,7 +207,7 @@ def session():
     """Return a session of the scene, at rest."""
     result = sd.Session(scene().mesh, state=State(scene().regions, scene().cages))
     result.set_fixed(scene().fixed)
-    result.add_handle(scene().handle, "tip")
+    result.handles.add(scene().handle, "tip")
     return result
 
 
@@ -229,14 +229,14 @@ def act(work, action, seed):
         work.drag({name: work.targets[name] + rng.normal(0, 0.1, 3)}, max_steps=2)
         work.commit()
     elif action == "paint":
-        work.paint_region(int(rng.integers(0, work.regions.n_regions)), some)
+        work.painting.paint(int(rng.integers(0, work.regions.n_regions)), some)
     elif action == "fix":
         work.set_fixed(np.setdiff1d(some, work.state.handle))
     elif action == "handle":
         taken = np.concatenate([work.fixed, work.state.handle])
         free = np.setdiff1d(some, taken)
         if len(free):
-            work.add_handle(free)
+            work.handles.add(free)
     elif action == "options":
         work.change_options(stretch=float(rng.uniform(0, 20)))
     elif action == "undo":
@@ -252,12 +252,12 @@ def test_undo_and_redo_of_any_action_restore_the_pose(actions):
     work = session()
     for action, seed in actions:
         act(work, action, seed)
-        there, label = work.vertices.copy(), work.undo_label
+        there, label = work.vertices.copy(), work.history.undo_label
         if label:
             work.undo()
             work.redo()
         assert np.array_equal(work.vertices, there)
-        assert work.undo_label == label
+        assert work.history.undo_label == label
         assert abs(work.volume_change) <= 1e-12
 
 

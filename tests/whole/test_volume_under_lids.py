@@ -190,7 +190,7 @@ def session_of(mesh):
     session = sd.Session(mesh)
     z = mesh.vertices[:, 2]
     session.set_fixed(z < z.min() + 0.1 * np.ptp(z))
-    session.add_handle(z > z.max() - 0.1 * np.ptp(z), "end")
+    session.handles.add(z > z.max() - 0.1 * np.ptp(z), "end")
     session.segment(1)
     session.change_options(n_cage_vertices=40)
     session.fit_cages()

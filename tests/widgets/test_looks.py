@@ -49,7 +49,7 @@ def ready():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     return scene, session.state
 
 
@@ -251,7 +251,7 @@ def test_the_editor_with_a_bent_body(ready):
     session.drag(scene.turned(50.0))
     session.commit()
     (name,) = session.handles
-    session.set_pivot(name, [0.0, 0.0, 0.0])
+    session.handles.set_pivot(name, [0.0, 0.0, 0.0])
     editor = DeformEditor(view, session)
     dragger = editor.widgets.dragger
     dragger.refine_while_resting = False

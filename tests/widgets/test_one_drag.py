@@ -47,11 +47,13 @@ def follow(editor, close, is_shown, corner):
         if not is_told and is_shown():
             is_told = True
             print(json.dumps(np.rint(pixel(mesh.vertices[[tip]]) + [0, 2]).tolist()), flush=True)
-        elif session.undo_label and not (session.is_dragging or editor.widgets.puller.is_refining):
+        elif session.history.undo_label and not (
+            session.is_dragging or editor.widgets.puller.is_refining
+        ):
             ((name, pulled),) = session.handles.items()
             outcome = {
                 "moved": (pixel(session.vertices[pulled]) - pixel(mesh.vertices[pulled])).tolist(),
-                "handle": name, "label": session.undo(), "next": session.undo_label,
+                "handle": name, "label": session.undo(), "next": session.history.undo_label,
                 "camera": start == view.camera.GetPosition(), "worst": max(map(abs, volumes)),
             }
             print(json.dumps(outcome), flush=True)

@@ -56,7 +56,7 @@ def session() -> sd.Session:
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     return session
 
 
@@ -201,7 +201,7 @@ def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
     assert editor.session is session
     assert not hand.failures
     assert abs(session.volume_change) < 1e-12
-    assert session.undo_label == "drag handle 1"
+    assert session.history.undo_label == "drag handle 1"
 
 
 # Registration.
@@ -291,7 +291,7 @@ def test_the_window_returns_the_edited_session(session, monkeypatch):
     monkeypatch.setattr(pv.Plotter, "show", show_and_work)
     assert sd.edit(session) is session
     assert failures == []
-    assert session.undo_label == "drag handle 1"
+    assert session.history.undo_label == "drag handle 1"
     assert np.abs(session.vertices - session.mesh.vertices).max() > 0.1
     assert abs(session.volume_change) < 1e-12
     assert_array_equal(session.deformed.points, session.vertices)

@@ -35,7 +35,7 @@ mesh = sd.models.cactus(1500)
 session = sd.Session(mesh)
 {opened}
 session.set_fixed(mesh.vertices[:, 2] < 0.1)
-session.add_handle(mesh.vertices[:, 2] > 0.9, "tip")
+session.handles.add(mesh.vertices[:, 2] > 0.9, "tip")
 volumes = []
 
 def drawn(*_):

@@ -113,7 +113,7 @@ def ready(preparation: Preparation, own: Hand, *, handle: bool, **options: bool)
     session.accept(preparation)
     if handle:
         session.set_fixed(own.fixed)
-        session.add_handle(own.handle)
+        session.handles.add(own.handle)
     session.bind()
     return session
 

@@ -292,22 +292,25 @@ def begun(
 def bend(own: Hand, preparation: Preparation) -> dict[str, float]:
     """Return the quantities of the case "bend"."""
     session = ready(preparation, own, handle=True)
-    _, seconds = timed(lambda: turn_and_finish(session, own))
+    steps, seconds = timed(lambda: turn_and_finish(session, own))
     solution = session.solution
     assert solution is not None
     shape = Shape.of(own.mesh, solution)
     return {
         "time": seconds,
-        "steps": float(session.effort.steps),
+        "steps": float(steps),
         "volume": abs(solution.volume_change),
         **{name: float(value) for name, value in vars(shape).items() if name != "away"},
     }
 
 
-def turn_and_finish(session: Session, own: Hand) -> None:
-    """Turn the handle by 90 degrees at once, and finish the pose."""
-    session.drag(own.targets(_TURN))
+def turn_and_finish(session: Session, own: Hand) -> int:
+    """Turn the handle by 90 degrees at once, and finish the pose; return the solver's steps."""
+    steps = session.drag(own.targets(_TURN)).steps
+    if session.is_unsettled:
+        steps += session.refine().steps
     session.finish()
+    return steps
 
 
 def improves(values: Values) -> bool:

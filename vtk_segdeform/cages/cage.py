@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy import ndimage
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_faces, as_points
-from ..checks import require
+from ..checks import Described, require
 from ..errors import CageError
 from ..freezing import Frozen
 from ..mesh import (
@@ -40,8 +40,8 @@ _LARGEST_COORDINATE = 1e70  # coordinate, as for a mesh
 _known: WeakKeyDictionary[Cage, WeakKeyDictionary[Regions, dict[int, bool]]] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True, init=False, eq=False)
-class Cage(Frozen):
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Cage(Described, Frozen):
     """A closed, outward oriented triangle mesh without self-intersections; immutable.
 
     Parameters
@@ -78,6 +78,10 @@ class Cage(Frozen):
         points.flags.writeable = triangles.flags.writeable = False
         object.__setattr__(self, "vertices", points)
         object.__setattr__(self, "faces", triangles)
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        return {"vertices": f"{self.n_vertices:,}", "faces": f"{self.n_faces:,}"}
 
     @property
     def n_vertices(self) -> int:

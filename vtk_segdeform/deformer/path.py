@@ -122,13 +122,11 @@ class Path:
         """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
         handles, start = self.constraints.handles, self.targets
         shortest = self._longest_leg(0.0)
-        if largest_length(goal - start) <= shortest * LONGEST_MOVE:
-            shortest = 1.0
         way = [start, *waypoints(start, goal, handles, shortest)]
         done, last, most = 0, len(way) - 1, round(1.0 / shortest)
         while done + 1 < last:
             ahead = min(most, last - done)
-            if ahead > 1 and most > 1:
+            if ahead > 1:
                 longest = self._longest_leg(_CLEARANCE) * LONGEST_MOVE
                 while ahead > 1 and largest_length(way[done + ahead] - way[done]) > longest:
                     ahead -= 1

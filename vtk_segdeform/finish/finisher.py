@@ -266,11 +266,11 @@ class Finisher:
     def _landed(self, x: FloatArray, directions: Sequence[FloatArray]) -> FloatArray:
         """Return *x* moved along *directions* onto the volumes.
 
-        They are scaled to the size of the mesh, so that cubics along them overflow no sooner than
-        volumes; a power of two changes no digit of a step.
+        They are scaled to about 1, so that cubics along them overflow no sooner than volumes; a
+        power of two changes no digit of a step.
         """
         if not directions:
             return x
-        scales = [-math.frexp(np.abs(each).max() / self._diagonal)[1] for each in directions]
+        scales = [-math.frexp(np.abs(each).max())[1] for each in directions]
         paths = np.hstack([x, *map(np.ldexp, directions, scales)])
         return moved_along(paths, steps_to_volume(self._constraints, paths))

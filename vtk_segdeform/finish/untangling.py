@@ -33,7 +33,7 @@ from ..mesh import Crossings, Mesh
 from ..progress import Progress, tell
 
 _RINGS = 16  # around crossing faces: what may move
-_STEP, _GROWTH = 0.2, 1.3  # of the length of an edge; a step that is too long is halved
+_STEP = 0.2  # of the length of an edge: the farthest motion of a vertex in a step
 _AVERAGES = 10, 3, 30  # of the motion with that of the neighbours, one after another
 _STEPS = 100  # at most
 _PATIENCE, _SHORTER = 20, 0.9  # the curve becomes shorter by this factor in so many steps, or never
@@ -69,7 +69,7 @@ def _tangles(mesh: Mesh, pairs: IntArray) -> Iterator[BoolArray]:
     """Yield the vertices (n,) bool of the surface around crossing *pairs* (k, 2), one by one."""
     near = around(mesh, np.unique(pairs), _RINGS)
     ids = np.flatnonzero(near)
-    number = np.full(mesh.n_vertices, -1)
+    number = np.empty(mesh.n_vertices, dtype=np.int64)
     number[ids] = np.arange(len(ids))
     one, two = (number[mesh.faces[side, 0]] for side in pairs.T)
     across = sparse.coo_array((np.ones(len(one)), (one, two)), (len(ids), len(ids)))
@@ -84,7 +84,7 @@ def _tangles(mesh: Mesh, pairs: IntArray) -> Iterator[BoolArray]:
 def _opened(mesh: Mesh, x: FloatArray, free: BoolArray, own: BoolArray) -> FloatArray:
     """Return the vertices *own* (n,) of the pose *x*, at which nothing crosses, or as they were."""
     ids = np.flatnonzero(own)
-    number = np.full(mesh.n_vertices, -1)
+    number = np.empty(mesh.n_vertices, dtype=np.int64)
     number[ids] = np.arange(len(ids))
     inside = own[mesh.faces]
     moving = free[ids]
@@ -92,7 +92,7 @@ def _opened(mesh: Mesh, x: FloatArray, free: BoolArray, own: BoolArray) -> Float
     moving[number[corners[own[corners]]]] = False
     faces = number[mesh.faces[inside.all(axis=1)]]
     joined = (mesh.adjacency[ids][:, ids] > 0.0).astype(float)
-    average = sparse.diags_array(1.0 / np.maximum(joined.sum(axis=1), 1.0)) @ joined
+    average = sparse.diags_array(1.0 / joined.sum(axis=1)) @ joined
     crossings = Crossings(mesh.vertices[ids], faces)
     for rounds in _AVERAGES:
 
@@ -114,13 +114,12 @@ def _shrunk(
     smooth: Callable[[FloatArray], FloatArray],
 ) -> FloatArray | None:
     """Return *x* (k, 3) moved against *smooth* slopes until no *faces* cross, or None."""
-    step, lengths = _STEP, [np.inf]
+    lengths = [np.inf]
     for _ in range(_STEPS):
         pairs = crossings.pairs(x)
         if not len(pairs):
             return x
         length, slope = contour(x, faces, pairs)
-        step = min(_GROWTH * step, _STEP) if length < lengths[-1] else 0.5 * step
         lengths.append(length)
         if length > _SHORTER * lengths[max(0, len(lengths) - 1 - _PATIENCE)]:
             break
@@ -131,7 +130,7 @@ def _shrunk(
         corners = x[faces[np.unique(pairs)]]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         edge = float(np.median(edges))
-        x = x - (step * edge / most) * slope
+        x = x - (_STEP * edge / most) * slope
     return None
 
 

@@ -134,7 +134,7 @@ def selected_vertices(meshset: Any) -> IntArray:
     """Return the selected vertices of the current layer and those of selected faces, (k,) int.
 
     For use as fixed vertices, ``session.set_fixed(selected_vertices(meshset))``, as a handle,
-    ``session.add_handle(...)``, or as a region, ``session.paint_region(0, ...)``.
+    ``session.handles.add(...)``, or as a region, ``session.painting.paint(0, ...)``.
 
     Raises
     ------

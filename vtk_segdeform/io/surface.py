@@ -19,7 +19,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, plain
-from ..checks import require
+from ..checks import Described, require
 from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
 from .convert import as_polydata, read_polydata, write_mesh
@@ -52,7 +52,7 @@ def read_mesh(path: str | Path) -> Mesh:
     return Surface.read(path).mesh
 
 
-class Surface:
+class Surface(Described):
     """A surface as it was given, and its mesh.
 
     Parameters
@@ -117,6 +117,11 @@ class Surface:
         surface._given = polydata.copy(deep=False)
         surface._soup = soup
         return surface
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        given = {"points": f"{self._given.n_points:,}", "cells": f"{self._given.n_cells:,}"}
+        return given | self.mesh.facts()
 
     @property
     def given(self) -> pv.PolyData:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, as_ids, as_points, bounds_of, frozen
-from ..checks import require, shown
+from ..checks import Described, require, shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen, read_only
 from ..kernels import compiled_checks, in_parallel, inputs
@@ -35,8 +35,8 @@ _OF_VTK = {"vtkPolyData", "vtkUnstructuredGrid", "vtkMultiBlockDataSet"}
 _BITS = 32  # of the second vertex in the number of an edge
 
 
-@dataclass(frozen=True, init=False, eq=False)
-class Mesh(Frozen):
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Mesh(Described, Frozen):
     """An oriented triangle mesh, closed or with borders; immutable.
 
     Parameters
@@ -97,6 +97,17 @@ class Mesh(Frozen):
         self.__dict__["boundary"] = read_only(search.half_edges.net_boundary)
         if search.n_components == 1:
             self.__dict__["components"] = read_only(np.zeros(self.n_vertices, dtype=np.int64))
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        size = " x ".join(f"{length:.3g}" for length in np.ptp(self.bounds, axis=0))
+        borders = "none" if self.is_closed else f"{len(self.borders):,}"
+        return {
+            "vertices": f"{self.n_vertices:,}",
+            "faces": f"{self.n_faces:,}",
+            "borders": borders,
+            "size": size,
+        }
 
     @property
     def n_vertices(self) -> int:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
-from ..checks import shown
+from ..checks import Described, shown
 from ..errors import RegionError
 from ..freezing import Frozen
 from ..mesh import Mesh, counted, require_mesh
@@ -45,8 +45,8 @@ class CageSurface(Protocol):
         """(k, 3) int."""
 
 
-@dataclass(frozen=True, eq=False)
-class Regions(Frozen):
+@dataclass(frozen=True, eq=False, repr=False)
+class Regions(Described, Frozen):
     """Overlapping regions of the vertices of a mesh; every vertex is in at least one.
 
     Parameters
@@ -146,6 +146,15 @@ class Regions(Frozen):
             )
         masks = array == np.unique(array)[:, None]
         return cls(mesh, masks).grow(overlap)
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        vertices, shared = self.mesh.n_vertices, int((self.membership.sum(axis=0) > 1).sum())
+        return {
+            "regions": f"{self.n_regions:,}",
+            "vertices": f"{vertices:,}",
+            "in several": f"{shared:,}",
+        }
 
     @property
     def n_regions(self) -> int:

@@ -3,13 +3,18 @@
 The files, in reading order:
 
     session        `Session`: the interface for widgets and scripts
+    groups         edits of handles and regions, as methods
     state          immutable states
-    history        undo and redo
+    timeline       undo and redo
     handles        named handles and their targets
-    pulling        pulls and pins
+    pulls          pulls and pins
     painting       painting, merging and splitting regions
+    poses          surfaces and deformers of states, cached
+    memo           the cache
+    solving        the next pose of a state
+    preparing      regions, cages and binding in advance
     finishing      poses finished on the mesh itself
-    pose_solver    poses of states, with cached solvers
+    output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes
     naming         names of regions and handles
@@ -19,29 +24,35 @@ The files, in reading order:
 """
 
 from ..mesh import SurfacePoint
+from . import pulls
 from .finishing import FinishedPose
+from .groups import Handles, Painting
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
-from .pulling import automatic_locality, middle_vertex
-from .session import Effort, Preparation, Session
+from .poses import Poses
+from .preparing import Preparation
+from .session import Session
 from .stand_in import StandIn
 from .state import Options, State
 from .store import load_session, save_session, saved_view
+from .timeline import Timeline
 
 __all__ = [
     "Change",
-    "Effort",
     "FinishedPose",
+    "Handles",
     "Options",
+    "Painting",
+    "Poses",
     "Preparation",
     "Session",
     "StandIn",
     "State",
     "SurfacePoint",
-    "automatic_locality",
+    "Timeline",
     "load_session",
-    "middle_vertex",
+    "pulls",
     "region_name",
     "require_handle",
     "save_session",

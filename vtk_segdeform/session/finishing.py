@@ -28,18 +28,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray, frozen
 from ..deformer import Deformer
-from ..mesh import Mesh
+from ..errors import SessionError
+from ..geometry import turned_over
+from ..mesh import Mesh, new_crossings
 from ..progress import Progress
-from ..solver import Solution, VolumeConstraint, moved_along, steps_to_volume
-from .state import Finished, Pose
-
-Cages: TypeAlias = tuple[FloatArray, ...]
+from ..solver import Solution, Status, VolumeConstraint, errors_at, moved_along, steps_to_volume
+from .handles import stacked
+from .poses import Poses
+from .pulls import localised
+from .state import Cages, Finished, Pose, State
 
 _EDGES = 20_000  # along which bending is compared, at most
 _ALIKE = 0.6, 0.85  # cosines between ways of bending for f = 0 and 1
@@ -85,43 +89,120 @@ class Finish:
         return FinishedPose(pose, Pose(pose.cage_vertices, pose.targets, finished), solution)
 
 
-class Surfaces(NamedTuple):
-    """A session's surface with any cages."""
+def finish(poses: Poses, state: State) -> Finish:
+    """Return the finish of the pose of *state*, which any thread may call.
 
-    mesh: Mesh
-    at: Callable[[Cages], FloatArray]
-    """Returns W~ p, (n, 3)."""
-    rotations: Callable[[Cages], FloatArray]
-    """Returns R, (n, 3, 3)."""
+    Raises
+    ------
+    SessionError
+        If there is no pose, or nothing is fixed or in a handle.
+    """
+    if reason := reason_not_to_finish(state):
+        raise SessionError(reason)
+    pose, locality, shift = state.pose, state.locality, poses.shift(state)
+    assert pose is not None
+    is_shifted = shift is not None and bool(shift[state.fixed].any())
+    deformer = poses.held(state, state.fixed_at) if is_shifted else poses.constrained(state)
+    is_further = pose.is_finished and locality is None
+    of_cages = poses.surface(state, pose.cage_vertices)
+    x = poses.vertices(state) if is_further or locality is not None else of_cages
+    wanted, (_, volume) = stacked(pose.targets), poses.enclosed(state)
+    aims = np.array(wanted)
+    if locality is not None:
+        at_press = poses.surface(state, locality.cage_vertices)
+        deformer = localised(deformer, locality, at_press)
+        beside = _beside(poses, state)
+        if beside is not None:  # where the deformer differs
+            point = locality.point
+            own = point.at(at_press) - at_press[point.vertex]
+            aims[deformer.handle == point.vertex] += beside - own
+    rest, faces = poses.mesh.vertices, poses.mesh.faces
+    start = Solution(
+        vertices=x,
+        cage_vertices=pose.cage_vertices,
+        steps=0,
+        status=Status.STEP_LIMIT if is_further else Status.CONVERGED,
+        merits=(),
+        errors=errors(poses, state, deformer, wanted),
+        volume=partial(volume.relative, x),
+        region_volumes=lambda _: np.empty(0),
+        crossed=partial(new_crossings, rest=rest, faces=faces),
+        folded=partial(turned_over, rest=rest, faces=faces),
+        unfinished=of_cages if is_further else None,
+    )
+    return Finish(deformer.copy(), pose, aims, shift, start)
 
 
-def moved_on(
-    finished: Finished,
-    before: Cages,
-    after: Cages,
-    surfaces: Surfaces,
-    *,
-    fixed: IntArray,
-    handle: IntArray,
-    constraints: tuple[VolumeConstraint, ...],
-) -> Finished:
-    """Return *finished*, a pose with the cages *before*, for those *after*.
+def reason_not_to_finish(state: State) -> str:
+    """Return why the pose of *state* cannot be finished, or ""."""
+    if state.pose is None:
+        return "there is no pose to finish; move a handle first"
+    if not (state.handles or len(state.fixed)):
+        return "there are no handles or fixed vertices to finish the pose for; add a handle"
+    return ""
+
+
+def errors(
+    poses: Poses, state: State, deformer: Deformer, wanted: FloatArray
+) -> Callable[[FloatArray], tuple[float, ...]]:
+    """Return `Solution.errors`: how far a mesh (n, 3) is from *wanted* (k, 3) and fixed places."""
+    beside, locality, fixed_at = _beside(poses, state), state.locality, poses.fixed_places(state)
+    ids, diagonal = (deformer.handle, deformer.fixed), poses.mesh.diagonal
+
+    def errors_of(x: FloatArray) -> tuple[float, ...]:
+        places = np.array(wanted)
+        if locality is not None and beside is not None:
+            point = locality.point
+            places[ids[0] == point.vertex] += x[point.vertex] + beside - point.at(x)
+        return errors_at(ids, (places, fixed_at), diagonal, x)
+
+    return errors_of
+
+
+def _beside(poses: Poses, state: State) -> FloatArray | None:
+    """Return where the pulled point was at the press, from its handle's vertex, (3,).
+
+    On the mesh that was shown.  None if no point of a face is pulled.
+    """
+    pose, locality = state.pose, state.locality
+    if pose is None or locality is None or locality.point.is_vertex:
+        return None
+
+    def beside() -> FloatArray:
+        cages, point = locality.cage_vertices, locality.point
+        if pose.finished is None:
+            x = poses.surface(state, cages)
+        elif pose.cage_vertices is cages:
+            x = pose.finished.vertices
+        else:
+            x = moved_on(poses, state, cages).vertices
+        return np.asarray(point.at(x) - x[point.vertex])
+
+    return poses.memo.get("beside", (locality,), beside)
+
+
+def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
+    """Return the finished mesh in the pose of *state*, for the cages *after*.
 
     Fixed and handle vertices do not follow when the volumes are restored, if the others suffice.
     """
-    held = np.concatenate([fixed, handle])
+    assert state.pose is not None
+    assert state.pose.finished is not None
+    before, finished, fixed = state.pose.cage_vertices, state.pose.finished, state.fixed
+    held = np.concatenate([fixed, state.handle])
     known = np.union1d(finished.held, held)
-    shifts = finished.shifted(surfaces.at(before))[known]
+    shifts = finished.shifted(poses.surface(state, before))[known]
     shifted = shifts.any(axis=1)
     fades = not shifted[np.isin(known, fixed)].any()  # what is fixed keeps its offset
-    offset = _offset(finished, after, surfaces, fixed, fades=fades)
-    x = surfaces.at(after)
+    offset = _offset(poses, state, after, fades=fades)
+    x = poses.surface(state, after)
     moved = x + offset
     if shifted.any():
-        change = offset - _offset(finished, before, surfaces, fixed, fades=fades)
+        change = offset - _offset(poses, state, before, fades=fades)
         changed = shifts + np.where(shifted[:, None], change[known], 0.0)
         if np.abs(changed - shifts).max() > _TURNED * np.ptp(x, axis=0).max():
             shifts = changed  # else the targets of the cages stay, so that they converge
+    constraints = poses.constrained(state).preserved_volumes
     if constraints:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
@@ -153,16 +234,17 @@ def _on_volumes(
     return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
-def _offset(
-    finished: Finished, cages: Cages, surfaces: Surfaces, fixed: IntArray, *, fades: bool
-) -> FloatArray:
+def _offset(poses: Poses, state: State, cages: Cages, *, fades: bool) -> FloatArray:
     """Return f R' R^T (x - W~ p) with the given *cages*, (n, 3)."""
-    then, now = surfaces.rotations(finished.cage_vertices), surfaces.rotations(cages)
+    assert state.pose is not None
+    assert state.pose.finished is not None
+    finished = state.pose.finished
+    then, now = poses.rotations(state, finished.cage_vertices), poses.rotations(state, cages)
     offset = (now @ (np.swapaxes(then, 1, 2) @ finished.offset[:, :, None]))[:, :, 0]
     if fades:
-        edges = _some_edges(surfaces.mesh)
+        edges = _some_edges(poses.mesh)
         offset *= _share(*(_bending(each, edges) for each in (then, now)))
-    offset[fixed] = finished.offset[fixed]
+    offset[state.fixed] = finished.offset[state.fixed]
     return np.asarray(offset)
 
 

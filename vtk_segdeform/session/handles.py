@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..checks import shown
-from ..deformer import FARTHEST_APART, checked_constraints
+from ..deformer import FARTHEST_APART, checked_constraints, checked_point
 from ..errors import CageError, ConstraintError
+from ..geometry import rigid_fit
 from ..mesh import Mesh
 from .naming import fault_of
-from .state import Pose, State, split_rows
+from .state import State, split_rows
 
 Handles = Mapping[str, IntArray]
 Targets = Mapping[str, FloatArray]
@@ -53,10 +54,33 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
     return MappingProxyType({**state.handles, name: own})
 
 
-def without_handle(handles: Handles, name: str) -> Handles:
-    """Return *handles* without *name*; ConstraintError if there is no such handle."""
-    require_handle(handles, name)
-    return MappingProxyType({other: ids for other, ids in handles.items() if other != name})
+def without_handle(state: State, name: str) -> State:
+    """Return *state* without handle *name*; ConstraintError if there is no such handle."""
+    require_handle(state.handles, name)
+    others = {other: ids for other, ids in state.handles.items() if other != name}
+    state = replace(state, handles=MappingProxyType(others))
+    if name not in state.pivots:
+        return state
+    pivots = {other: point for other, point in state.pivots.items() if other != name}
+    return replace(state, pivots=MappingProxyType(pivots))
+
+
+def with_fixed(mesh: Mesh, state: State, fixed: IntArray, vertices: FloatArray) -> State:
+    """Return *state* with other *fixed* vertices (f,), at their places among *vertices* (n, 3).
+
+    Vertices that are already fixed keep theirs.  Without a pose they are fixed at rest.
+    """
+    own = fixed.copy()
+    frozen(own)
+    if state.pose is None:
+        return replace(state, fixed=own, fixed_at=None)
+    places = vertices[own]
+    _, new, old = np.intersect1d(own, state.fixed, return_indices=True)
+    kept = mesh.vertices[state.fixed] if state.fixed_at is None else state.fixed_at
+    places[new] = kept[old]
+    frozen(places)
+    at_rest = np.array_equal(places, mesh.vertices[own])
+    return replace(state, fixed=own, fixed_at=None if at_rest else places)
 
 
 def renamed(state: State, name: str, new_name: str) -> State:
@@ -102,18 +126,47 @@ def targets_at(handles: Handles, vertices: FloatArray) -> Targets:
     return MappingProxyType(places)
 
 
-def with_handles(pose: Pose, before: Handles, after: Handles, vertices: FloatArray) -> Pose:
-    """Return *pose* with targets for the handles *after*.
+def stacked(targets: Targets) -> FloatArray:
+    """Return the targets of all handles, concatenated, (k, 3)."""
+    return np.concatenate([np.empty((0, 3)), *targets.values()])
 
-    Unchanged handles keep their targets; the targets of new handles are their positions among
-    *vertices* (n, 3).
+
+def targets_of(mesh: Mesh, state: State) -> Targets:
+    """Return the targets of all handles of *state*: of its pose, or at rest."""
+    pose = state.pose
+    return targets_at(state.handles, mesh.vertices) if pose is None else pose.targets
+
+
+def with_targets(before: State, after: State, vertices: FloatArray) -> State:
+    """Return *after*, which has a pose, with targets for its handles.
+
+    Handles that are also in *before* keep their targets; the targets of others are their positions
+    among *vertices* (n, 3).
     """
-    here = targets_at(after, vertices)
+    assert before.pose is not None
+    assert after.pose is not None
+    here = targets_at(after.handles, vertices)
     kept = {
-        name: pose.targets[name] if before.get(name) is ids else here[name]
-        for name, ids in after.items()
+        name: before.pose.targets[name] if before.handles.get(name) is ids else here[name]
+        for name, ids in after.handles.items()
     }
-    return replace(pose, targets=MappingProxyType(kept))
+    return replace(after, pose=replace(after.pose, targets=MappingProxyType(kept)))
+
+
+def with_pivot(mesh: Mesh, state: State, name: str, point: ArrayLike | None) -> State:
+    """Return *state* with the pivot of a handle at *point* (3,); None is the handle's centre.
+
+    ConstraintError if there is no such handle, or *point* is not a point or too far away.
+    """
+    require_handle(state.handles, name)
+    pivots = {other: at for other, at in state.pivots.items() if other != name}
+    if point is not None:
+        place = checked_point(point, "point")
+        require_near(mesh, place, "coordinates of point")
+        R, shift = rigid_fit(mesh.vertices[state.handles[name]], targets_of(mesh, state)[name])
+        pivots[name] = (place - shift) @ R
+        frozen(pivots[name])
+    return replace(state, pivots=MappingProxyType(pivots))
 
 
 def checked_targets(

@@ -31,7 +31,7 @@ class Change(enum.Flag):
     HISTORY = enum.auto()
     """The steps to undo or redo."""
     PIVOTS = enum.auto()
-    """`Session.pivot` of a handle."""
+    """`Handles.pivot` of a handle."""
 
 
 Listener = Callable[[Change], None]

@@ -14,6 +14,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
+from ..arrays import is_whole
 from ..checks import require_sequence, shown
 from ..errors import RegionError
 
@@ -45,9 +46,13 @@ def fault_of(name: object) -> str:
 def region_name(names: Names, region: int) -> str:
     """Return the name of a *region*, also of one that does not exist yet.
 
+    RegionError if *region* is not a whole number, 0 or more.
+
     >>> region_name(("", "arm"), 0), region_name(("", "arm"), 1)
     ('region 1', 'arm')
     """
+    if not is_whole(region, 0):
+        raise RegionError(f"region must be a whole number, 0 or more; got {shown(region)}")
     return (names[region] if region < len(names) else "") or f"region {region + 1}"
 
 

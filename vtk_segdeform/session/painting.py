@@ -1,4 +1,4 @@
-"""Painting, merging and splitting of regions.
+"""Painting, merging, splitting and renaming of regions.
 
 Every vertex remains in at least one region, and no region becomes empty: an edit that would
 violate this raises an error that says what to do instead.
@@ -7,18 +7,66 @@ violate this raises an error that says what to do instead.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, as_ids, is_whole
+from ..cages import Cage
 from ..checks import as_flag, require_sequence, shown
 from ..errors import RegionError
 from ..mesh import Mesh
 from ..regions import Regions, require_region
+from . import naming
+from .state import State
 
 _OVERLAP = 0.1  # edge rings, as a fraction of the width of a new region in edges
+
+
+def with_regions(state: State, regions: Regions, names: naming.Names = ()) -> State:
+    """Return *state* at rest with other *regions*; itself if they are the same.
+
+    The cages remain if each of them still encloses its region; otherwise all are removed.
+    """
+    old = state.regions
+    cages: tuple[Cage, ...] = ()
+    if old is not None:
+        same = np.array_equal(old.membership, regions.membership)
+        if same and old.smoothness == regions.smoothness:
+            return state
+        cages = state.cages if _still_fit(old, regions, state.cages) else ()
+    return replace(state, regions=regions, cages=cages, region_names=names).at_rest()
+
+
+def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
+    """Return whether *cages*, which enclose the *old* regions, also enclose the *new* ones."""
+    if new.n_regions != old.n_regions:
+        return False
+    added = new.membership & ~old.membership
+    vertices = new.mesh.vertices
+    return all(
+        bool(cage.contains(vertices[more]).all())
+        for cage, more in zip(cages, added, strict=False)
+        if more.any()
+    )
+
+
+def renamed(state: State, region: int, name: str) -> tuple[str, State]:
+    """Return the label of the step, and *state* with a *region* renamed; "" removes its name.
+
+    Raises
+    ------
+    RegionError
+        If there is no such region, or *name* is invalid or that of another region.
+    """
+    count = 0 if state.regions is None else state.regions.n_regions
+    if not is_whole(region, 0, count - 1):
+        raise RegionError(f"there is no region {shown(region)}; there are {count}, numbered from 0")
+    names = naming.renamed(state.region_names, int(region), name)
+    label = f"rename {naming.region_name(state.region_names, region)}"
+    return label, replace(state, region_names=names)
 
 
 def painted(

@@ -22,7 +22,7 @@ from ..progress import Progress, part
 from ..regions import Regions
 from ..solver import VolumeConstraint, scale_to_volume, total_volume
 from ..subspace import Subspace, cage_subspace
-from . import pulling
+from . import pulls
 from .session import Session
 
 _CAGE_VERTICES = 60
@@ -85,7 +85,7 @@ class StandIn:
         locality: float | None = None,
     ) -> FloatArray:
         """Return the mesh (n, 3) pulled from rest; the arguments are those of `Session.pull`."""
-        point, motion = checked_place(self.mesh, vertex), pulling.checked_motion(self.mesh, to)
+        point, motion = checked_place(self.mesh, vertex), pulls.checked_motion(self.mesh, to)
         own = int(self.cluster[point.vertex])
         if motion.shape == (3,):
             motion = self.session.mesh.vertices[own] + (motion - point.at(self.mesh.vertices))

@@ -14,13 +14,13 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage
-from ..checks import all_of, require, require_sequence, shown
+from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import checked_constraints, checked_place
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
@@ -28,6 +28,9 @@ from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
+
+Cages: TypeAlias = tuple[FloatArray, ...]
+"""One (m_r, 3) float per region: the vertices of the cages in a pose."""
 
 _NO_PIVOTS: Mapping[str, FloatArray] = MappingProxyType({})
 _TINY = float(np.finfo(np.float64).tiny)
@@ -119,8 +122,8 @@ class Finished(Frozen):
     shifts: FloatArray
     """(h, 3) float: their positions minus the targets of the cages; nonzero only for vertices that
     were fixed, or made handles, in a finished pose."""
-    cage_vertices: tuple[FloatArray, ...]
-    """One (m_r, 3) float per region: the cages of the pose that was finished."""
+    cage_vertices: Cages
+    """Of the pose that was finished."""
     offset: FloatArray
     """(n, 3) float: the finished mesh then, less that of the cages."""
 
@@ -135,8 +138,7 @@ class Finished(Frozen):
 class Pose(Frozen):
     """A deformation of the cages, and the targets it was solved for; read-only arrays."""
 
-    cage_vertices: tuple[FloatArray, ...]
-    """One (m_r, 3) float per region."""
+    cage_vertices: Cages
     targets: Mapping[str, FloatArray]
     """For each handle by name, (k, 3) float: the targets of its vertices."""
     finished: Finished | None = None
@@ -146,10 +148,6 @@ class Pose(Frozen):
     def is_finished(self) -> bool:
         """Whether the mesh was finished with these cages, which were not moved since then."""
         return self.finished is not None and self.finished.cage_vertices is self.cage_vertices
-
-    def is_same_surface(self, other: Pose) -> bool:
-        """Return whether the mesh is that of *other*, whatever the targets."""
-        return self.cage_vertices is other.cage_vertices and self.finished is other.finished
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,12 +162,12 @@ class Locality(Frozen):
     """In the mesh's unit."""
     follows: float
     """0 to 1."""
-    cage_vertices: tuple[FloatArray, ...]
-    """One (m_r, 3) float per region: the pose at the press, in which the rest stays."""
+    cage_vertices: Cages
+    """At the press; the rest stays in this pose."""
 
 
-@dataclass(frozen=True, eq=False)
-class State(Frozen):
+@dataclass(frozen=True, eq=False, repr=False)
+class State(Described, Frozen):
     """Everything in a session except its mesh; immutable."""
 
     regions: Regions | None = None
@@ -192,6 +190,28 @@ class State(Frozen):
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
     fixed_at: FloatArray | None = None
     """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        pose = self.pose
+        return {
+            "regions": "none" if self.regions is None else f"{self.regions.n_regions:,}",
+            "cage vertices": f"{sum(cage.n_vertices for cage in self.cages):,}",
+            "fixed": f"{len(self.fixed):,}",
+            "handles": f"{len(self.handles):,}",
+            "pose": "at rest" if pose is None else "finished" if pose.is_finished else "deformed",
+        }
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether there are cages and at least one handle, so that a drag is possible."""
+        return bool(self.cages) and bool(self.handles)
+
+    @property
+    def cage_vertices(self) -> Cages:
+        """The vertices of the cages in the pose."""
+        pose = self.pose
+        return tuple(cage.vertices for cage in self.cages) if pose is None else pose.cage_vertices
 
     @property
     def handle(self) -> IntArray:

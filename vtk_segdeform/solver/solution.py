@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..checks import Described
 from ..freezing import read_only
 from ..mesh import Mesh
 
@@ -51,8 +52,8 @@ class Status(enum.Enum):
         return self.value
 
 
-@dataclass(frozen=True, eq=False)
-class Solution:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Described):
     """A pose of the mesh, in the coordinates of the mesh."""
 
     vertices: FloatArray
@@ -89,6 +90,16 @@ class Solution:
     def __post_init__(self) -> None:
         for name in ("vertices", "cage_vertices", "unmoved", "unfinished"):
             object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def facts(self) -> dict[str, str]:
+        """Return its numbers as texts, by what they are."""
+        return {
+            "vertices": f"{len(self.vertices):,}",
+            "status": self.status.name.lower().replace("_", " "),
+            "steps": f"{self.steps:,}",
+            "volume change": f"{self.volume_change:.1e}",
+            "handle error": f"{self.handle_error:.1e} of the diagonal",
+        }
 
     # Copies and pickles store the computed values instead of the functions.
 

@@ -51,12 +51,16 @@ _NOTHING = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
-class Subspace:
+class Subspace(Frozen):
     """W~ as blocks: rows[r] (n_r,) mesh vertices, blocks[r] (n_r, m_r), columns in cage order."""
 
     n_vertices: int
     rows: tuple[IntArray, ...]
     blocks: tuple[FloatArray | InterpolatedBlock, ...]
+
+    def __getstate__(self) -> dict[str, Any]:
+        known = vars(self)
+        return super().__getstate__() | {k: known[k] for k in ("_is_compiled",) if k in known}
 
     @cached_property
     def n_columns(self) -> int:

@@ -16,7 +16,7 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import MESH_FILES, Action, Controller, error_text, exporting, saving
+from ..editor import MESH_FILES, Action, Controller, Kind, error_text, exporting, saving
 from .dialogs import Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
@@ -66,7 +66,7 @@ def may_discard(window: Any, *, is_kept: bool = False) -> bool:
 
     It is kept if undo or redo returns to it.
     """
-    if window.has_mesh and window.editor.controller.settling.is_awaited:
+    if window.has_mesh and window.editor.controller.queue.task(Kind.SAVE):
         _settle(window)
     if is_kept or not window.is_modified:
         return True
@@ -101,12 +101,12 @@ def _mesh_is_saved(window: Any) -> bool:
 
 def _settle(window: Any) -> None:
     """Wait until the pose has settled and has been saved; the window is drawn meanwhile."""
-    events, settling = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller.settling
-    while settling.is_pending:
+    events, controller = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller
+    while controller.widgets.is_pose_to_come:
         QtWidgets.QApplication.processEvents(
             events.ExcludeUserInputEvents | events.WaitForMoreEvents
         )
-    settling.flush()
+    controller.queue.hurry(Kind.SAVE)
 
 
 def _session_saved(window: Any, path: Path) -> None:

@@ -10,9 +10,8 @@ The files, in reading order:
                      the actions behind keys, menus and panels
     keys bindings    tables of keys, and the editor's own one
     job              background work, with progress and cancellation
+    queue            what runs in the background, and what comes next
     preparing        the preparation for pulls, while the editor remains usable
-    settling         a pose that converges after its release, and saving after that
-    rest             what waits until the hand has rested
     finishing        the finish of a pose on the mesh, after a drag
     session_file     the file that the session is saved to, and meshes that are written
     autosave         autosaved work on disk, and recovery after a crash
@@ -79,6 +78,7 @@ from .panel_actions import (
     with_radius,
     with_up,
 )
+from .queue import Kind
 from .session_file import (
     MESH_FILES,
     READABLE_FILES,
@@ -105,6 +105,7 @@ __all__ = [
     "Job",
     "KeyChoice",
     "Keys",
+    "Kind",
     "Mode",
     "Neighbour",
     "Notice",

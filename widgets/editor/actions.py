@@ -77,7 +77,7 @@ def redo(controller: Controller) -> None:
     """Redo the last undone step."""
     label, session, neighbours = controller.redo_label, controller.session, controller.neighbours
     after, message = neighbours.after(session), f"Redo: {label}" if label else "Nothing to redo"
-    if after is not None and after[0] == session.position:
+    if after is not None and after[0] == session.history.position:
         after[1].enter(neighbours.count_before + after[0] + 1, message)
     else:
         session.redo()
@@ -110,12 +110,7 @@ def save(controller: Controller) -> None:
 
 def once_settled(action: Action) -> Action:
     """Return the action that waits until the pose has settled."""
-
-    def wait(controller: Controller) -> None:
-        if controller.settling.then(lambda: action(controller)):
-            controller.say("Saving once the pose has settled")
-
-    return wait
+    return lambda controller: controller.once_settled(lambda: action(controller))
 
 
 def open_file(controller: Controller) -> None:
@@ -274,7 +269,7 @@ def unpin_all(controller: Controller) -> None:
     names = controller.widgets.puller.marked
     if not names:
         raise ConstraintError("No pins to remove. Shift-click the surface to add one")
-    controller.session.remove_handle(*names)
+    controller.session.handles.remove(*names)
     controller.say(f"Removed {_count(len(names), 'point')}")
 
 
@@ -338,7 +333,7 @@ def merge_region(controller: Controller) -> None:
             f"Point at the region to merge with {controller.session.region_name(selector.region)}"
         )
     names = " and ".join(map(controller.session.region_name, sorted([selector.region, other])))
-    controller.session.merge_regions([selector.region, other])
+    controller.session.painting.merge([selector.region, other])
     selector.region = min(selector.region, other)
     controller.say(f"Merged {names}")
 
@@ -347,7 +342,7 @@ def split_region(controller: Controller) -> None:
     """Split the selected region in two."""
     _require_regions(controller, "split")
     region = controller.widgets.selector.region
-    controller.session.split_region(region)
+    controller.session.painting.split(region)
     controller.say(f"Split {controller.session.region_name(region)}")
 
 
@@ -378,7 +373,7 @@ def remove_handle(controller: Controller) -> None:
     if name is None:
         key = controller.keys.cap("next_handle")
         raise ConstraintError(f"No handle selected. Press {key} to select one")
-    controller.session.remove_handle(name)
+    controller.session.handles.remove(name)
     controller.say(f"Removed {name}")
 
 
@@ -395,7 +390,7 @@ def move_pivot(controller: Controller) -> None:
     point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
     if point is None and name not in session.state.pivots:
         raise ConstraintError("Point at the surface to place the pivot")
-    session.set_pivot(name, point)
+    session.handles.set_pivot(name, point)
     controller.say(f"Pivot of {name} {'reset' if point is None else 'moved'}")
 
 
@@ -416,9 +411,9 @@ def converting(name: str) -> Action:
     def convert(controller: Controller) -> None:
         session, widgets = controller.session, controller.widgets
         if name in widgets.puller.marked:
-            new = session.make_handle(name, radius=widgets.puller.radius)
+            new = session.handles.to_patch(name, radius=widgets.puller.radius)
         else:
-            new = session.make_pin(name)
+            new = session.handles.to_pin(name)
         widgets.selector.handle = widgets.dragger.handle = new
         controller.say(f"Converted {name} to {new}")
 
@@ -428,7 +423,7 @@ def converting(name: str) -> Action:
 def reset_pivot(controller: Controller) -> None:
     """Reset the pivot of the handle to its centre."""
     name = _dragged_handle(controller)
-    controller.session.set_pivot(name, None)
+    controller.session.handles.set_pivot(name, None)
     controller.say(f"Pivot of {name} reset")
 
 

@@ -1,9 +1,8 @@
 """The controller of the editor: one session, its widgets, the mode, the running job and the file.
 
-One job runs at a time, and the widgets are off meanwhile: a session must not be used while another
-thread binds it.  The preparation for pulls runs in the background instead, with the widgets on; a
-job cancels it.  Every error, in a callback or in a job, is shown in the status line until the next
-action succeeds.
+What runs in the background, and later, is in its `queue`.  The widgets are off during a job: a
+session must not be used while another thread binds it.  Every error, in a callback or in a task, is
+shown in the status line until the next action succeeds.
 
 Long because every widget, job and file meets here.
 """
@@ -19,22 +18,20 @@ from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Change, Preparation, Session, saved_view
+from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
 
 from ..scene import Draft, View, Widget
 from .camera import Camera, has_y_up
 from .finishing import Finishing
 from .help_card import HelpCard
 from .hints import hint
-from .job import Job, Worker, view_timer
 from .keys import Keys
 from .messages import Messages
 from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
-from .rest import Rest
+from .queue import Kind, Queue, Task
 from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
-from .settling import Settling
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
@@ -72,8 +69,8 @@ class Controller:
         The sessions before and after this one in the history.
     camera : Camera
         Navigation, views and the orientation cube.
-    settling : Settling
-        A pose that converges after its release; saving waits for it.
+    queue : Queue
+        What runs in the background, and what comes next.
     finishing : Finishing
         Finishes the pose on the mesh after each drag of a handle.
     """
@@ -88,34 +85,25 @@ class Controller:
         self.notices = Notices(view, lambda: self.messages.height)
         self.neighbours = Neighbours()
         self._mode = Mode.PULL
-        self._is_on = False
+        self._is_on = self._was_busy = False
         self._left = False, False  # by turning off: as `_ahead`
         self._instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
-        self._worker = Worker(view_timer(view), self._job_changed)
-        self._preparing = Preparing(
-            view_timer(view),
-            self._may_accept,
-            self._accept,
-            self._prepare_pulls,
-            self.refresh,
-        )
-        self._rest = Rest(view, _REST, self._is_at_rest, load_early)
-        self.settling = Settling(view, lambda: self.widgets, self.refresh)
+        self.queue = Queue(view, self._queue_changed)
+        self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
         self.finishing = Finishing(
             view,
+            self.queue,
             lambda: self.session,
             lambda: self.widgets.surface,
             self._is_free,
-            self.refresh,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
-        self._reading: Job[str | SessionError] | None = None  # of the mesh that was saved last
-        self._is_intact = True  # that file, as far as is known
+        self._is_intact = True  # the mesh file that was saved last, as far as is known
         self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
 
@@ -127,16 +115,16 @@ class Controller:
     @property
     def undo_label(self) -> str | None:
         """The step to undo: of the session, or else the one from which the session came."""
-        label, before = self.session.undo_label, self.neighbours.before
+        label, before = self.session.history.undo_label, self.neighbours.before
         return before.step if label is None and before is not None else label
 
     @property
     def redo_label(self) -> str | None:
         """The step to redo: to the session that came from this state, or else of the session."""
         after = self.neighbours.after(self.session)
-        if after is not None and after[0] == self.session.position:
+        if after is not None and after[0] == self.session.history.position:
             return after[1].step
-        return self.session.redo_label
+        return self.session.history.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -178,10 +166,10 @@ class Controller:
                     if was_on:
                         self._left = self._ahead
                     self.help.hide()
-                    self.settling.flush()
+                    self.queue.hurry(Kind.SAVE)
                     self._preparing.stop()
                     self.finishing.interrupt()
-                    self._worker.cancel()
+                    self.queue.cancel(Kind.JOB, Kind.LOAD)
                     self.wait()
             finally:
                 self._apply_mode()
@@ -189,7 +177,7 @@ class Controller:
     @property
     def _ahead(self) -> tuple[bool, bool]:
         """Whether the pose is settling, and whether it will be finished."""
-        return self.settling.is_active, self.finishing.is_pending
+        return self.widgets.is_settling, self.finishing.is_pending
 
     def complete(self, progress: Progress | None = None) -> None:
         """Settle and finish the pose now, as it would have been soon, had the editor stayed on.
@@ -207,12 +195,9 @@ class Controller:
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
         self.is_on = False
-        if self._reading is not None:
-            self._reading.abandon()
+        self.queue.stop()
         self._stop_listening()
         self._stop_failures()
-        self._rest.stop()
-        self.settling.remove()
         self.finishing.remove()
         self.camera.remove()
         self.widgets.remove()
@@ -243,19 +228,16 @@ class Controller:
     def refresh(self) -> None:
         """Update the status line."""
         mode = f"{self._mode.value} {self._mode.name}"
-        job = self._worker.job
-        self.settling.follow()
+        job = self.queue.job
+        if self.widgets.is_settling and self.queue.task(Kind.SETTLE) is None:
+            may_begin = self._has_settled
+            self.queue.add(Task(kind=Kind.SETTLE, begin=self.refresh, may_begin=may_begin))
         if job is not None:
             self.messages.show_progress(
-                mode, self._worker.text, job.fraction, is_cancelled=job.is_cancelled
+                mode, self.queue.text, job.fraction, is_cancelled=job.is_cancelled
             )
         elif self._is_on:
-            fraction = self._preparing.fraction
-            preparing = None if fraction == 1.0 else fraction  # finished, but not accepted yet
-            work, fraction = "Preparing", preparing
-            for running in (self.settling, self.finishing):
-                if fraction is None and running.fraction is not None:
-                    work, fraction = running.work, running.fraction
+            work, fraction = self.queue.aside
             self.messages.show(mode, self.hint, fraction, work=work)
         else:
             self.messages.hide()
@@ -313,7 +295,7 @@ class Controller:
         self._stop_listening = session.on_change(self._session_changed)
         waiting = self.widgets.puller.waiting
         waiting.stand_in = lambda: self._preparing.stand_in(session)
-        waiting.is_coming = lambda: self._preparing.is_running
+        waiting.is_coming = lambda: self.is_busy or self.queue.task(Kind.PREPARE) is not None
         for widget in self.widgets.interactive:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("InteractionEvent", self._gesture_moved)
@@ -323,10 +305,14 @@ class Controller:
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:
             self.messages.note(widget.remark)
-        self._rest.begin()
+        self._load_later()
         is_pull = widget is self.widgets.puller  # smooth, while a finish may end in a step
-        pulled = self.session.last_pulled
-        if is_pull and self.session.position != self._began_at and pulled in self.session.handles:
+        pulled = pulls.last_pulled(self.session.mesh, self.session.state)
+        if (
+            is_pull
+            and self.session.history.position != self._began_at
+            and pulled in self.session.handles
+        ):
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
         if widget is self.widgets.dragger:
             self._tell_unmoved()
@@ -343,11 +329,11 @@ class Controller:
         self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
-        self._began_at = self.session.position
+        self._began_at = self.session.history.position
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects
-        self.settling.flush()
+        self.queue.hurry(Kind.SAVE)
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if is_compiling():
@@ -375,19 +361,24 @@ class Controller:
     @property
     def is_busy(self) -> bool:
         """Whether a job is running."""
-        return self._worker.job is not None
+        return self.queue.job is not None
 
     @property
     def refusal(self) -> str:
         """Why an action is refused while a job is running."""
-        return self._worker.refusal
+        return self.queue.refusal
 
     def start(
         self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
     ) -> None:
         """Run *work* in another thread, then *done* here; show the outcome it returns.
 
-        An ongoing drag or stroke is finished before the work starts.  See `Worker.start`.
+        An ongoing drag or stroke is finished before the work starts.
+
+        Raises
+        ------
+        SessionError
+            If another job is running.
         """
 
         def deliver(result: T) -> None:
@@ -404,16 +395,17 @@ class Controller:
 
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
-            self.settling.flush()
+            self.queue.hurry(Kind.SAVE)
             self._preparing.interrupt()
             self.finishing.interrupt()
-            self._worker.start(name, with_kernels, deliver)
+            task = Task(kind=Kind.JOB, name=name, begin=lambda: with_kernels, done=deliver)
+            self.queue.add(task)
             self.widgets.switch_off()
             self.refresh()
 
     def wait(self) -> None:
         """Block until no job is running; for scripts."""
-        self._worker.wait()
+        self.queue.wait(Kind.JOB)
 
     @property
     def is_modified(self) -> bool:
@@ -423,16 +415,19 @@ class Controller:
     def cancel(self) -> None:
         """Cancel the job, or else the ongoing drag or stroke, or the preparation; or close help."""
         if self.is_busy:
-            self._worker.cancel()
+            self.queue.cancel(Kind.JOB)
             self.refresh()
         elif self.widgets.cancel():
             self.refresh()
         elif self.help.is_shown:
             self.help.hide()
-        elif self.settling.is_active:
+        elif self.widgets.is_settling:
             self.finishing.interrupt()
+            self.widgets.stop_refining()
+            self.queue.cancel(Kind.SETTLE)
             self.messages.note("Stopped. The pose has not settled")
-            self.settling.stop()
+            self.queue.hurry(Kind.SAVE)
+            self.refresh()
         elif self.finishing.interrupt():
             self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
@@ -440,7 +435,7 @@ class Controller:
 
     def refuse(self) -> None:
         """Show that the running job must end, or be cancelled, before anything else."""
-        self._worker.refuse()
+        self.queue.refuse()
         self.refresh()
 
     def prepare(self) -> None:
@@ -449,7 +444,7 @@ class Controller:
         if not self._is_on or self.is_busy:
             return
         self._prepare_pulls()
-        if self._mode is Mode.DEFORM and session.is_ready and not session.is_bound:
+        if self._mode is Mode.DEFORM and session.state.is_ready and not session.is_bound:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
@@ -484,19 +479,30 @@ class Controller:
         return self._is_on and not (self.is_busy or is_used or is_refined)
 
     def _is_at_rest(self) -> bool:
-        return self._is_free() and not self._preparing.is_running
+        return self._is_free() and self.queue.task(Kind.PREPARE) is None
+
+    def _load_later(self) -> None:
+        """Load kernels once the hand has rested: a press would wait for it."""
+        self.queue.cancel(Kind.LOAD)
+
+        def load() -> None:
+            load_early()
+
+        may_begin = self._is_at_rest
+        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=may_begin, rest=_REST))
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified, after = self.file.is_modified(session), self.neighbours.after(session)
         session.accept(preparation)
         self.neighbours.prepared(session, after)
-        self._rest.begin()
+        self._load_later()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
 
-    def _job_changed(self) -> None:
-        if not self.is_busy:
+    def _queue_changed(self) -> None:
+        if self._was_busy and not self.is_busy:
             self._switch_widgets()
+        self._was_busy = self.is_busy
         self.refresh()
 
     def _apply_mode(self) -> None:
@@ -512,6 +518,33 @@ class Controller:
             self.widgets.switch_off()
 
     # Files.
+
+    def once_settled(self, act: Callable[[], None]) -> None:
+        """Call *act* once the pose has settled: what is saved is the pose that is to come.
+
+        What would change the pose meanwhile, such as a press, lets *act* be called first, and so
+        does Escape, at which the pose remains as it is.
+        """
+        if not self.widgets.is_pose_to_come:
+            act()
+            return
+        may_begin = self._has_come
+        self.queue.add(Task(kind=Kind.SAVE, begin=act, may_begin=may_begin))
+        self.say("Saving once the pose has settled")
+
+    def settle(self) -> None:
+        """Settle the pose now, which may take seconds, and save what waits; for scripts."""
+        if self.widgets.is_settling:
+            self.session.refine()
+            self.queue.cancel(Kind.SETTLE)
+        if not self.widgets.is_pose_to_come:
+            self.queue.hurry(Kind.SAVE)
+
+    def _has_settled(self) -> bool:
+        return not self.widgets.is_settling
+
+    def _has_come(self) -> bool:
+        return not self.widgets.is_pose_to_come
 
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""
@@ -538,15 +571,14 @@ class Controller:
             elif loss:
                 self.say(". ".join([f"Mesh saved to {written.path}", loss, *written.remarks]))
 
-        if self._reading is not None:
-            self._reading.abandon()
+        self.queue.cancel(Kind.CHECK)
         self._is_intact = True
-        self._reading = Job(view_timer(self.view), read, done=tell, is_due=self._is_free)
+        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self._is_free)
+        self.queue.add(task)
 
     def saved_intact(self) -> bool:
         """Wait until the mesh that was saved last is read again; return whether nothing is lost."""
-        if self._reading is not None:
-            self._reading.wait()
+        self.queue.wait(Kind.CHECK)
         return self._is_intact
 
     @property

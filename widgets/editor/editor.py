@@ -33,6 +33,7 @@ from .actions import Action, show_pose, show_rest
 from .bindings import KeyChoice, keys_of
 from .controller import Controller
 from .keys import Keys, key_cap, pressed_key
+from .queue import Kind
 from .widget_set import Mode, WidgetSet
 
 if TYPE_CHECKING:
@@ -198,7 +199,7 @@ class DeformEditor:
         """
         if path is not None:
             self.path = path
-        self._controller.settling.complete()
+        self._controller.settle()
         self._controller.save()
 
     def complete(self, progress: Progress | None = None) -> None:
@@ -320,7 +321,7 @@ class DeformEditor:
             controller.widgets.finish()
         controller.messages.clear()
         if not while_busy:
-            controller.settling.flush()
+            controller.queue.hurry(Kind.SAVE)
         self._stop_waiting()
         is_edit = not while_busy and action is not show_rest
         if is_edit:  # the camera may move around the mesh at rest

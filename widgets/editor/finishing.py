@@ -18,13 +18,11 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Change, FinishedPose, Session
 
 from ..scene import Glide, SurfaceDisplay, View
-from .job import Job, view_timer
-from .rest import Rest
+from .queue import Kind, Queue, Task, Work
 
 MOST_VERTICES = 20_000  # of a mesh that is finished without a request: it takes about a second
 
 _REST = 0.4  # seconds without a change before it begins
-_STEP = 0.2  # the fraction that is shown is a multiple of this: each change draws the view
 _KEPT = Change.NAMES | Change.PIVOTS  # changes that a finish does not depend on
 
 
@@ -34,33 +32,29 @@ class Finishing:
     Parameters
     ----------
     view : View
-        Provides the timer.
+        Where the pose glides.
+    queue : Queue
+        Runs the finish.
     session : callable
         Returns the session that is edited.
     surface : callable
         Returns the surface that shows it.
     is_free : callable
         Returns whether nothing is being dragged, refined or computed.
-    changed : callable
-        Called when `fraction` has changed.
     """
 
     def __init__(
         self,
         view: View,
+        queue: Queue,
         session: Callable[[], Session],
         surface: Callable[[], SurfaceDisplay],
         is_free: Callable[[], bool],
-        changed: Callable[[], object],
     ) -> None:
-        self._view, self._session, self._surface = view, session, surface
-        self._is_free, self._changed = is_free, changed
-        self._is_wanted = True
+        self._view, self._queue, self._session = view, queue, session
+        self._surface, self._is_free = surface, is_free
+        self._is_wanted, self._is_accepting = True, False
         self.glide = Glide(view)
-        self._rest = Rest(view, _REST, is_free, self._start)
-        self._job: Job[FinishedPose] | None = None
-        self._is_accepting = False
-        self._fraction: float | None = None
 
     @property
     def is_wanted(self) -> bool:
@@ -75,67 +69,51 @@ class Finishing:
     @property
     def fraction(self) -> float | None:
         """Completed fraction, 0..1, coarsely; None if no pose is being finished."""
-        return self._fraction
-
-    @property
-    def work(self) -> str:
-        """What `fraction` is about."""
-        return "Finishing"
+        return self._queue.fraction(Kind.FINISH)
 
     @property
     def is_pending(self) -> bool:
         """Whether a pose is being finished, or will be in a moment."""
-        return self._rest.is_pending or self._job is not None
+        return self._queue.task(Kind.FINISH) is not None
 
     def rest(self) -> None:
         """Finish the pose in a moment: a drag has just ended."""
         self.interrupt()
         is_small = self._session().mesh.n_vertices <= MOST_VERTICES
         if self._is_wanted and is_small:
-            self._rest.begin()
+            task = Task(
+                kind=Kind.FINISH,
+                begin=self._begin,
+                done=self.accept,
+                may_begin=lambda: self._is_free() and not self._session().is_unsettled,
+                may_end=self._is_free,
+                rest=_REST,
+            )
+            self._queue.add(task)
 
     def follow(self, change: Change) -> None:
         """Cancel the finish if it does not suit the session after *change*."""
         if self._is_accepting or not change & ~_KEPT:
             return
-        if change is Change.POSE and self._rest.is_pending:
-            self._rest.begin()  # still converging
+        if change is Change.POSE and self.is_pending and self.fraction is None:
+            self._queue.delay(Kind.FINISH)  # still converging
         else:
             self.interrupt()
 
     def interrupt(self) -> bool:
-        """Cancel, and end the glide; False if there was nothing to cancel."""
-        is_running = self._job is not None
+        """Cancel, and end the glide; False if no pose was being finished."""
         self.glide.end()
-        self._rest.stop()
-        if self._job is not None:
-            self._job.abandon()
-            self._job = None
-        self._show(None)
-        return is_running
+        return self._queue.cancel(Kind.FINISH)
 
     def remove(self) -> None:
         """Stop permanently."""
         self.interrupt()
 
-    def _start(self) -> bool:
-        """Begin to finish the pose; True if it must converge first."""
+    def _begin(self) -> Work | None:
         session = self._session()
-        solution = session.solution  # None after undo
-        if session.is_unsettled:
-            return True  # it will be refined
-        self.interrupt()
-        if solution is None or not session.can_finish:
-            return False
-        self._job = Job(
-            view_timer(self._view),
-            measured(session.finishing()),
-            done=self.accept,
-            watch=self._watch,
-            is_due=self._is_free,
-        )
-        self._show(0.0)
-        return False
+        if session.solution is None or not session.can_finish:  # None after undo
+            return None
+        return measured(session.finishing())
 
     def accept(self, result: FinishedPose) -> bool:
         """Use a finished pose, and glide to it; False if the pose has changed since."""
@@ -149,16 +127,6 @@ class Finishing:
         finally:
             self._is_accepting = False
         return is_accepted
-
-    def _watch(self, job: Job[FinishedPose]) -> None:
-        if job is self._job and not job.is_running:
-            self._job = None
-        self._show(_STEP * int(job.fraction / _STEP) if job.is_running else None)
-
-    def _show(self, fraction: float | None) -> None:
-        if fraction != self._fraction:
-            self._fraction = fraction
-            self._changed()
 
 
 def measured(finish: Callable[[Progress], FinishedPose]) -> Callable[[Progress], FinishedPose]:

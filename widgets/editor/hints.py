@@ -77,7 +77,7 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
         return _drag_hint(session, "X Y Z: axis. R: turn. ")
     if _is_volume_off(session):
         return f"Drag the surface · {_volume_off(keys)}"
-    if session.undo_label == "pull":
+    if session.history.undo_label == "pull":
         return f"Drag the surface. Shift-click pins. {keys.cap('undo')}: undo"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
     share = f"{radius:.1f}".removesuffix(".0")  # as in the panel

@@ -13,7 +13,7 @@ from .controller import Controller
 def states_of(controller: Controller) -> tuple[str, ...]:
     """Return the names of all states, the oldest first: of each, the action that led to it."""
     session, neighbours = controller.session, controller.neighbours
-    labels, before, after = session.history, neighbours.before, neighbours.after(session)
+    labels, before, after = session.history.labels, neighbours.before, neighbours.after(session)
     earlier: tuple[str, ...] = ()
     if before is not None:
         is_whole = labels[0] == "opened"  # otherwise its first steps were discarded
@@ -27,7 +27,7 @@ def states_of(controller: Controller) -> tuple[str, ...]:
 
 def position_of(controller: Controller) -> int:
     """Return the index of the current state in `states_of`."""
-    return controller.neighbours.count_before + controller.session.position
+    return controller.neighbours.count_before + controller.session.history.position
 
 
 def jumping_to(position: int, message: str = "") -> Action:
@@ -42,10 +42,10 @@ def jumping_to(position: int, message: str = "") -> Action:
         said = message or f"History: {states_of(controller)[position]}"
         place = position - neighbours.count_before
         if after is not None and place > after[0]:
-            session.jump(after[0])
+            session.history.jump(after[0])
             after[1].enter(position, said)
         else:
-            session.jump(max(place, 0))
+            session.history.jump(max(place, 0))
             if before is not None and place < 0:
                 before.enter(position, said)
         controller.say(said)
@@ -65,9 +65,9 @@ def preview(controller: Controller, position: int | None) -> None:
             place = position - controller.neighbours.count_before
             session = controller.session
             after = controller.neighbours.after(session)
-            last = len(session.history) - 1 if after is None else after[0]
-            if 0 <= place <= last and place != session.position:
-                vertices = session.vertices_at(place)
+            last = len(session.history.labels) - 1 if after is None else after[0]
+            if 0 <= place <= last and place != session.history.position:
+                vertices = session.poses.peek(session.history.state_at(place))
         if vertices is not None:
             assert position is not None
             controller.show_instead(vertices, f"History: {states_of(controller)[position]}")

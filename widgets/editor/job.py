@@ -4,8 +4,7 @@
 
 The work runs in another thread.  A timer of the window reports its progress and, once it has
 ended, delivers its result or its error.  Everything except the work itself therefore happens in
-the window's thread.  `Worker` runs the jobs of an editor, one at a time; while one of them is
-running the editor refuses other actions.  `preparing` runs jobs that refuse nothing.
+the window's thread.  A `queue` decides which jobs of an editor run.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from concurrent import futures
 from contextlib import ExitStack
 from typing import Any, Generic, TypeVar
 
-from vtk_segdeform.errors import Cancelled, SessionError
+from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.kernels import quick_turns
 from vtk_segdeform.progress import Progress
 
@@ -127,6 +126,11 @@ class Job(Generic[T]):
         return not self._ended
 
     @property
+    def is_working(self) -> bool:
+        """Whether the thread has not ended yet."""
+        return not self._future.done()
+
+    @property
     def error(self) -> BaseException | None:
         """The error that the work raised, once the job has ended."""
         return self._future.exception() if self._ended else None
@@ -214,74 +218,3 @@ class _Shared:
         if self.is_cancelled:
             raise Cancelled("Cancelled. Nothing was changed")
         self.progress = fraction, text
-
-
-class Worker:
-    """Run the jobs of an editor, one at a time.
-
-    Parameters
-    ----------
-    timer : callable
-        Polls the jobs; see `Job`.
-    watch : callable
-        Called when the job has made progress or has ended.
-    """
-
-    def __init__(self, timer: Timer, watch: Callable[[], object]) -> None:
-        self._timer, self._watch = timer, watch
-        self._name, self._has_refused = "", False
-        self.job: Job[Any] | None = None
-        """The running job, if any."""
-
-    @property
-    def text(self) -> str:
-        """Name and current step of the job, after "Busy" if an action was refused meanwhile."""
-        step = "" if self.job is None else self.job.text
-        name = f"Busy. {self._name}" if self._has_refused else self._name
-        return ": ".join(filter(None, (name, step)))
-
-    def start(self, name: str, work: Callable[[Progress], T], done: Callable[[T], object]) -> None:
-        """Run *work* in another thread, then call *done* in this one with its result.
-
-        Parameters
-        ----------
-        name : str
-            What the job does: "Fitting cages".
-        work : callable
-            ``work(progress)``; see `Job`.
-        done : callable
-            ``done(result)``; see `Job`.
-
-        Raises
-        ------
-        SessionError
-            If another job is running.
-        """
-        if self.job is not None:
-            raise SessionError(self.refusal)
-        self._name, self._has_refused = name, False
-        self.job = Job(self._timer, work, done=done, watch=self._update)
-
-    def wait(self) -> None:
-        """Block until no job is running."""
-        while self.job is not None:
-            self.job.wait()
-
-    def cancel(self) -> None:
-        """Cancel the job, if there is one."""
-        if self.job is not None:
-            self.job.cancel()
-
-    @property
-    def refusal(self) -> str:
-        """Why an action is refused while the job is running."""
-        return f"Busy. {self._name}: wait, or press Esc to cancel"
-
-    def refuse(self) -> None:
-        """Mark the job as the reason why an action was refused; see `text`."""
-        self._has_refused = True
-
-    def _update(self, job: Job[Any]) -> None:
-        if not job.is_running:
-            self.job = None
-        self._watch()

@@ -48,7 +48,7 @@ class Neighbours:
         if self._after is None or self._place is None:
             return None
         position, state, following = self._place
-        if not session.position <= position < len(session.history):
+        if not session.history.position <= position < len(session.history.labels):
             return None
         _, now, next_now = _place(session, position)
         is_kept = now is state and next_now is following
@@ -61,6 +61,6 @@ class Neighbours:
 
 
 def _place(session: Session, position: int) -> tuple[int, State, State | None]:
-    is_last = position + 1 >= len(session.history)
-    following = None if is_last else session.state_at(position + 1)
-    return position, session.state_at(position), following
+    is_last = position + 1 >= len(session.history.labels)
+    following = None if is_last else session.history.state_at(position + 1)
+    return position, session.history.state_at(position), following

@@ -117,7 +117,7 @@ class Notices:
                 self._mark()
             self._draw()
         # Preparing sets regions and cages, too, but not as a step.
-        if change & _EDITS and self._session.can_undo and not self._was_edited:
+        if change & _EDITS and self._session.history.can_undo and not self._was_edited:
             self._was_edited = True
             self.close()
         elif change & Change.POSE and self.are_marked:

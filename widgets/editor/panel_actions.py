@@ -32,7 +32,7 @@ def merging(regions: Sequence[int]) -> Action:
         if len(regions) < 2:
             raise RegionError("Select two or more regions to merge")
         *names, last = map(controller.session.region_name, sorted(regions))
-        controller.session.merge_regions(sorted(regions))
+        controller.session.painting.merge(sorted(regions))
         controller.widgets.choose_region(min(regions))
         controller.say(f"Merged {', '.join(names)} and {last}")
 
@@ -44,7 +44,7 @@ def naming_region(region: int, name: str) -> Action:
 
     def rename(controller: Controller) -> None:
         before = controller.session.region_name(region)
-        controller.session.rename_region(region, name)
+        controller.session.painting.rename(region, name)
         controller.say(f"Renamed {before} to {controller.session.region_name(region)}")
 
     return rename
@@ -103,7 +103,7 @@ def renaming(name: str, new_name: str) -> Action:
 
     def rename(controller: Controller) -> None:
         was_pull = name in controller.session.state.pulls
-        controller.session.rename_handle(name, new_name)
+        controller.session.handles.rename(name, new_name)
         if controller.widgets.selector.handle == name:
             controller.widgets.selector.handle = new_name
         is_pull = new_name in controller.session.state.pulls

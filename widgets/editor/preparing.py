@@ -5,8 +5,8 @@
     `Session.accept`    ->  here, once no gesture runs; no undo step
 
 A stage is cancelled if its inputs change: the mesh, the regions, the cages or the options of the
-binding.  The next stage starts once the last one has ended, so only one runs at a time.  A stage
-that failed, or that the user has cancelled, is not repeated for the same inputs unless requested.
+binding.  A stage that failed, or that the user has cancelled, is not repeated for the same inputs
+unless requested.
 
 A new mesh gets a `StandIn` first, which can be pulled long before the session is bound.
 """
@@ -23,11 +23,10 @@ from vtk_segdeform.kernels import load_for
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Preparation, Session, StandIn
 
-from .job import Job, Timer
 from .messages import error_text
+from .queue import Kind, Queue, Task
 
 _STAND_IN = 0.15  # of the progress of the first stage
-_STEP = 0.05  # the fraction that is shown is a multiple of this: each change draws the view
 
 _log = logging.getLogger(__name__)
 
@@ -79,43 +78,32 @@ class Preparing:
 
     Parameters
     ----------
-    timer : callable
-        Polls the stages; see `Job`.
+    queue : Queue
+        Runs the stages.
     is_due : callable
         Returns whether a result may change the session now.
     accept : callable
         ``accept(session, preparation)``, called with each result.
     ended : callable
         Called after a stage has ended without an error: the session may lack another one.
-    changed : callable
-        Called when `fraction` has changed.
     """
 
     def __init__(
         self,
-        timer: Timer,
+        queue: Queue,
         is_due: Callable[[], bool],
         accept: Callable[[Session, Preparation], object],
         ended: Callable[[], object],
-        changed: Callable[[], object],
     ) -> None:
-        self._timer, self._is_due, self._accept = timer, is_due, accept
-        self._ended, self._changed = ended, changed
-        self._job: Job[Preparation] | None = None
+        self._queue, self._is_due, self._accept, self._ended = queue, is_due, accept, ended
         self._inputs: tuple[Any, ...] = ()  # of the running stage
         self._declined: tuple[Any, ...] = ()
-        self._fraction: float | None = None
         self._stand_in: StandIn | None = None
 
     @property
     def fraction(self) -> float | None:
         """Completed fraction of the running stage, 0..1, coarsely; None if none is running."""
-        return self._fraction
-
-    @property
-    def is_running(self) -> bool:
-        """Whether a stage is running, or ending."""
-        return self._job is not None
+        return self._queue.fraction(Kind.PREPARE)
 
     def stand_in(self, session: Session) -> StandIn | None:
         """Return what can be pulled instead of *session*; None if there is nothing yet."""
@@ -130,56 +118,41 @@ class Preparing:
         inputs = _key(session)
         if again:
             self._declined = ()
-        if self._job is not None:
-            if inputs != self._inputs:
-                self._job.cancel()
-            return
-        made = None if self.stand_in(session) is not None else self._made
-        work = lacking(session, made) if start and inputs != self._declined else None
-        if work is not None:
+        if self._queue.task(Kind.PREPARE) is not None:
+            if inputs == self._inputs:
+                return
+            self.interrupt()
+        if start and inputs != self._declined and not session.is_bound:
             self._inputs = inputs
-            self._job = Job(
-                self._timer,
-                work,
+            made = None if self.stand_in(session) is not None else self._made
+            task = Task(
+                kind=Kind.PREPARE,
+                begin=lambda: lacking(session, made),
                 done=lambda result: self._finish(session, result),
                 failed=self._fail,
-                watch=self._watch,
-                is_due=self._is_due,
+                may_end=self._is_due,
             )
-            self._show(0.0)
+            self._queue.add(task)
 
     def cancel(self) -> bool:
         """Cancel the running stage, and decline its inputs; False if none is running."""
-        if self._job is None or self._job.is_cancelled:
+        if self._queue.task(Kind.PREPARE) is None:
             return False
         self._declined = self._inputs
-        self._job.cancel()
-        self._show(None)
+        self.interrupt()
         return True
 
     def interrupt(self) -> None:
-        """Cancel the running stage; the next `update` after its end may start it again."""
-        if self._job is not None:
-            self._job.cancel()
-            self._show(None)
+        """Cancel the running stage; the next `update` may start it again."""
+        self._queue.cancel(Kind.PREPARE)
 
     def stop(self) -> None:
-        """Cancel the running stage without waiting for its end."""
-        if self._job is not None:
-            self._job.abandon()
-            self._job = self._stand_in = None
-            self._show(None)
+        """Cancel the running stage and drop the stand-in."""
+        self.interrupt()
+        self._stand_in = None
 
     def _made(self, stand_in: StandIn) -> None:
         self._stand_in = stand_in  # in the thread of the work
-
-    def _watch(self, job: Job[Preparation]) -> None:
-        if not job.is_running:
-            self._job = None
-        is_shown = job.is_running and not job.is_cancelled
-        self._show(_STEP * int(job.fraction / _STEP) if is_shown else None)
-        if job.is_cancelled and not job.is_running:
-            self._ended()
 
     def _finish(self, session: Session, result: Preparation) -> None:
         self._stand_in = None
@@ -195,11 +168,6 @@ class Preparing:
                 "other regions, or drag again to retry"
             ) from error
         raise error
-
-    def _show(self, fraction: float | None) -> None:
-        if fraction != self._fraction:
-            self._fraction = fraction
-            self._changed()
 
 
 def _key(session: Session) -> tuple[Any, ...]:

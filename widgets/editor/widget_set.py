@@ -212,6 +212,22 @@ class WidgetSet:
         progress(0.0, "")
         self.overlay.prepare()
 
+    @property
+    def is_settling(self) -> bool:
+        """Whether a released pose still converges, above all a far one that avoids contact."""
+        is_refined = self.puller.is_refining or self.dragger.is_refining
+        return is_refined and not self.session.is_dragging and self.session.is_unsettled
+
+    @property
+    def is_pose_to_come(self) -> bool:
+        """Whether a released pose still converges, or a released pull waits for its session."""
+        return self.is_settling or self.puller.waiting.has_pull
+
+    def stop_refining(self) -> None:
+        """Keep the present pose, although it has not settled."""
+        self.puller.stop_refining()
+        self.dragger.stop_refining()
+
     def leave(self) -> None:
         """Show nothing at the pointer until it moves again, as the view has moved under it."""
         self.puller.leave()

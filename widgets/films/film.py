@@ -2,8 +2,8 @@
 
     film("bend.gif", session, targets)             a drag, one picture for each of its targets
     film("turn.mp4", view, [turn_camera] * 90)     one picture after each call: a turntable
-    film("work.gif", session, [partial(session.jump, k) for k in range(len(session.history))])
-                                                   the history, one picture for each state
+    jumps = [partial(session.history.jump, k) for k in range(len(session.history.labels))]
+    film("work.gif", session, jumps)               the history, one picture for each state
     film = Film(view); stop = film.watch()         every picture drawn from now on
     ...; stop(); film.save("work.gif")
 

@@ -31,7 +31,7 @@ import numpy as np
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.checks import as_flag, require
 from vtk_segdeform.geometry import rigid_fit
-from vtk_segdeform.session import Change, Session, middle_vertex, require_handle
+from vtk_segdeform.session import Change, Session, pulls, require_handle
 from vtk_segdeform.solver import Solution
 
 from ..picking import Picker
@@ -119,7 +119,7 @@ class HandleDragger(Widget):
         self._marks.hidden = (
             self.hidden | {name} if as_flag(hidden, "hidden") else (self.hidden - {name})
         )
-        self._marks.show(bool(self.GetEnabled()) and self.session.is_ready)
+        self._marks.show(bool(self.GetEnabled()) and self.session.state.is_ready)
         self._update_gizmo()
 
     def set_locked(self, name: str, locked: bool) -> None:
@@ -167,7 +167,7 @@ class HandleDragger(Widget):
     def On(self) -> None:  # noqa: N802 - VTK's word
         """Start handling events, show the handles, and refine a pose that has not converged."""
         super().On()
-        self._marks.show(self.session.is_ready)
+        self._marks.show(self.session.state.is_ready)
         self._update_gizmo()
         self.resume_refining()
 
@@ -277,7 +277,7 @@ class HandleDragger(Widget):
         session, ids = self.session, self.session.handles[name]
         if len(ids) > 1 and name not in session.state.pulls:
             return lambda matrix: partial(session.move_handle, name, matrix)
-        vertex, (radius, locality) = middle_vertex(session.mesh, ids), self.pulls_with()
+        vertex, (radius, locality) = pulls.middle_vertex(session.mesh, ids), self.pulls_with()
         start = session.targets[name][ids == vertex][0]
         pull = partial(session.pull, vertex, radius=radius, locality=locality)
 
@@ -304,7 +304,7 @@ class HandleDragger(Widget):
                 point = start + shift
                 gizmo.place(point, axes)
             if pointer.phase is Phase.RELEASE and (point != start).any():
-                session.set_pivot(name, point)
+                session.handles.set_pivot(name, point)
         finally:
             gizmo.set_caption("")
             self._update_gizmo()
@@ -315,7 +315,7 @@ class HandleDragger(Widget):
         is_there = self.GetEnabled() and self.gizmo.part_at(pointer) == FREE
         if not is_there or name not in session.state.pivots:
             return False
-        session.set_pivot(name, None)
+        session.handles.set_pivot(name, None)
         return True
 
     def _motion_of(self, part: Part, grip: Grip, press: Pointer) -> Motion:
@@ -327,7 +327,7 @@ class HandleDragger(Widget):
 
     def _handle_at(self, pointer: Pointer) -> tuple[str, FloatArray] | None:
         """Return the visible handle at *pointer* and the point of its surface there."""
-        hit = self._picker.hit(pointer) if self.session.is_ready else None
+        hit = self._picker.hit(pointer) if self.session.state.is_ready else None
         if hit is None:
             return None
         owners = (name for name, ids in self.session.handles.items() if hit.vertex in ids)
@@ -344,7 +344,7 @@ class HandleDragger(Widget):
             self._update_handle()  # a pull adds its handle at its first move, but may be cancelled
         if self.GetEnabled():
             if change & (Change.CONSTRAINTS | Change.CAGES):
-                self._marks.show(self.session.is_ready)
+                self._marks.show(self.session.state.is_ready)
             elif change & Change.POSE:
                 self._marks.follow()
             self._update_gizmo()
@@ -374,7 +374,7 @@ class HandleDragger(Widget):
     def _update_gizmo(self) -> None:
         """Place the gizmo at the active handle, or hide it."""
         session, name = self.session, self._handle
-        is_shown = session.is_ready and self.GetEnabled()
+        is_shown = session.state.is_ready and self.GetEnabled()
         if name is None or not is_shown or self._is_out_of_reach(name):
             self.gizmo.place(None)
             return
@@ -382,4 +382,4 @@ class HandleDragger(Widget):
         axes = np.eye(3)
         if self._local:
             axes = rigid_fit(session.mesh.vertices[ids], session.targets[name])[0].T
-        self.gizmo.place(session.pivot(name), axes)
+        self.gizmo.place(session.handles.pivot(name), axes)

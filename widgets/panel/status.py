@@ -44,7 +44,7 @@ def status(editor: DeformEditor) -> Status:
             "cancel",
             "button",
             "Cancel",
-            "Stop at this pose" if controller.settling.is_active else "Cancel; nothing is changed",
+            "Stop at this pose" if controller.widgets.is_settling else "Cancel; nothing is changed",
             "cancel",
             visible=messages.fraction is not None,
             while_busy=True,

@@ -16,7 +16,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import COLOURS, PAPER, rgb
-from vtk_segdeform.session import Session, middle_vertex
+from vtk_segdeform.session import Session, pulls
 
 from ..picking import Picker
 from ..scene import Phase, Pointer, SurfaceDisplay
@@ -137,7 +137,7 @@ def marked_vertices(session: Session) -> dict[str, int]:
     found = {}
     for name, ids in session.handles.items():
         if len(ids) == 1 or name in session.state.pulls:
-            found[name] = middle_vertex(session.mesh, ids)
+            found[name] = pulls.middle_vertex(session.mesh, ids)
     return found
 
 

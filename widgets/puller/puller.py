@@ -28,7 +28,7 @@ from vtk_segdeform.checks import require, shown
 from vtk_segdeform.deformer import checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
-from vtk_segdeform.session import Change, Session, SurfacePoint, automatic_locality
+from vtk_segdeform.session import Change, Session, SurfacePoint, pulls
 from vtk_segdeform.solver import Solution
 
 from ..handle_dragger import Gizmo, LiveSolve, step_of
@@ -137,7 +137,7 @@ class Puller(Widget):
     @property
     def effective_locality(self) -> float:
         """`locality`, or the value that the pins and fixed vertices lead to."""
-        return automatic_locality(self.session.state) if self._locality is None else self._locality
+        return pulls.locality_of(self.session.state, self._locality)
 
     @property
     def is_refining(self) -> bool:
@@ -210,12 +210,12 @@ class Puller(Widget):
             point = hit.place
         else:
             return None
-        name = self.session.grabbed(point, self.radius)
+        name = pulls.grabbed(self.session.mesh, self.session.state, point, self.radius)
         if name is not None and self.is_locked(name):
             return self._refuse(LOCKED.format(name))
         if np.isin(point.vertex, self.session.fixed):
             return self._refuse(_FIXED)
-        can_grab = self.session.can_grab(point, self.radius)
+        can_grab = pulls.can_grab(self.session.mesh, point, self.radius)
         return self._pull(point, press) if can_grab else self._refuse(_TOO_COARSE)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
@@ -312,10 +312,10 @@ class Puller(Widget):
         session, before = self.session, self.effective_locality
         owners = [name for name, ids in session.handles.items() if vertex in ids]
         if owners:
-            session.remove_handle(owners[0])
+            session.handles.remove(owners[0])
             self.remark = f"Removed {owners[0]}"
         else:
-            self.remark = f"Added {session.pin(vertex)}"
+            self.remark = f"Added {session.handles.pin(vertex)}"
         if self.effective_locality != before:
             self.remark += f". Local is now {100.0 * self.effective_locality:.0f} %"
 

@@ -104,11 +104,11 @@ class PaintTarget:
                 )
             return self.handle
         if self.paint is Paint.REGION:
-            self.session.paint_region(self.region, new)
+            self.session.painting.paint(self.region, new)
         elif self.paint is Paint.FIXED:
             self.session.set_fixed(self.members() | new)
         else:
-            return self.session.add_handle(self.members() | new, self.handle)
+            return self.session.handles.add(self.members() | new, self.handle)
         return self.handle
 
     def erase(self, vertices: BoolArray) -> str | None:
@@ -134,13 +134,13 @@ class PaintTarget:
         after = self.members() & ~old
         if self.paint is Paint.REGION:
             # With *old*, the session raises an error that gives the reason.
-            self.session.paint_region(self.region, free if free.any() else old, subtract=True)
+            self.session.painting.paint(self.region, free if free.any() else old, subtract=True)
         elif self.paint is Paint.FIXED:
             self.session.set_fixed(after)
         elif after.any():
-            return self.session.add_handle(after, self.handle)
+            return self.session.handles.add(after, self.handle)
         else:
-            self.session.remove_handle(str(self.handle))
+            self.session.handles.remove(str(self.handle))
             return None
         return self.handle
 
@@ -199,7 +199,7 @@ class PaintTarget:
         if self.paint is Paint.FIXED:
             self.session.set_fixed(others)
             return self.handle
-        return self.session.add_handle(others, self.handle)
+        return self.session.handles.add(others, self.handle)
 
     @property
     def _name(self) -> str:

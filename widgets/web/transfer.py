@@ -135,7 +135,7 @@ class Transfer:
             return _refusal(403, "Only the page of the editor may download files.")
         if suffix != _SESSION and suffix not in writable_suffixes():
             return _refusal(404, f"There is no format {suffix}.")
-        while self._editor.controller.settling.is_pending:
+        while self._editor.widgets.is_pose_to_come:
             await asyncio.sleep(_PERIOD)
         place = self._new_folder() / f"download{suffix}"
         self._downloads.add(place.parent)

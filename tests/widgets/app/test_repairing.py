@@ -198,7 +198,7 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     comes(original)
     assert hand.window.editor.status.startswith("Undo: repair")
     assert hand.title == "bottle.ply* - segdeform"
-    assert original.undo_label == "set fixed vertices"
+    assert original.history.undo_label == "set fixed vertices"
     assert len(original.mesh.borders) == 3
     assert shows(1)
     hand.choose("Edit", "Undo set fixed vertices")
@@ -209,7 +209,10 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     comes(session)
     assert hand.window.editor.status.startswith("Redo: repair")
     assert hand.title == "bottle (repaired)* - segdeform"
-    assert (session.undo_label, session.redo_label) == (None, "set fixed vertices")
+    assert (session.history.undo_label, session.history.redo_label) == (
+        None,
+        "set fixed vertices",
+    )
     assert shows(2)
     hand.window.editor.do(jumping_to(0))
     comes(original)

@@ -88,7 +88,7 @@ def test_a_dropped_file_is_bent_by_the_mouse_and_saved_with_only_its_shape_chang
     session.set_regions(Regions.single(session.mesh))
     session.fit_cages()
     session.set_fixed(z < np.quantile(z, 0.2))
-    session.add_handle(z > np.quantile(z, 0.9))
+    session.handles.add(z > np.quantile(z, 0.9))
     view = hand.view_hand()
     view.drag(hand.way(by=(40.0, 0.0)))
     hand.settle()

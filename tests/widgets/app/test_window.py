@@ -114,7 +114,7 @@ def choose_file(monkeypatch, path):
 
 def change(hand):
     """Make an unsaved change."""
-    hand.window.session.add_handle([40, 41], "knob")
+    hand.window.session.handles.add([40, 41], "knob")
     hand.settle()
 
 
@@ -287,7 +287,7 @@ def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     assert hand.title == "knob.segdeform - segdeform"
     assert slots(tmp_path) == []
     assert list(load_session(tmp_path / "knob.segdeform").handles) == ["knob"]
-    hand.window.session.add_handle([50], "another")
+    hand.window.session.handles.add([50], "another")
     choose_file(monkeypatch, None)
     plotter = hand.window.editor_widget.plotter
     QtTest.QTest.keyClick(
@@ -328,7 +328,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
 @pytest.mark.parametrize("is_saving", [False, True])
 def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes, is_saving):
     hand = start(arm_file)
-    session, settling = hand.window.session, hand.window.editor.controller.settling
+    session, widgets = hand.window.session, hand.window.editor.widgets
     tick, rests = LiveSolve._tick, [True]
     monkeypatch.setattr(LiveSolve, "_tick", lambda live: None if rests else tick(live))
     hand.window.editor.mode = Mode.DEFORM
@@ -338,7 +338,7 @@ def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, 
         session.drag({"handle 1": session.targets["handle 1"] + by}, max_steps=1)
         session.commit()
         hand.window.editor.widgets.dragger.resume_refining()
-        assert settling.is_active
+        assert widgets.is_settling
 
     bend([0.0, 0.0, 0.4])
     hand.choose("File", "Save session")
@@ -391,7 +391,7 @@ def test_closing_asks_about_a_pull_that_waits_and_saves_it(
     boxes.answers.append("Save session")
     threading.Timer(0.2, go_on.set).start()
     assert hand.window.close()
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     assert_array_equal(load_session(tmp_path / "ball.segdeform").vertices, session.vertices)
 
 
@@ -843,7 +843,7 @@ def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxe
     application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
     application().processEvents()
     assert not editor.GetEnabled()
-    session.add_handle([40, 41], "knob")  # no error in a former listener
+    session.handles.add([40, 41], "knob")  # no error in a former listener
     application().processEvents()
 
 

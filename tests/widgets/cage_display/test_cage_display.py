@@ -31,7 +31,7 @@ def fitted() -> tuple[Scene, State]:
     session.set_regions(scene.regions)
     session.fit_cages()
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     session.change_options(preserve_volume=False)
     return scene, session.state
 
@@ -157,7 +157,7 @@ def test_cages_follow_the_pose(cages):
 
 def test_a_change_of_regions_replaces_the_wireframes(cages):
     session = cages.session
-    session.merge_regions([1, 2])
+    session.painting.merge([1, 2])
     image = picture(cages.view)
     assert all(count(cages, of_region(region), image) < 20 for region in range(3))
     session.undo()
@@ -199,11 +199,11 @@ def test_a_dragged_vertex_follows_the_pointer_at_constant_depth(cages, hand):
     assert np.abs(session.vertices - rest).max() > 0.01
     hand.release()
     assert view.camera.GetPosition() == camera
-    assert session.undo_label == "drag the cage of region 2"
+    assert session.history.undo_label == "drag the cage of region 2"
     assert not session.is_dragging
     session.undo()
     assert np.array_equal(session.vertices, rest)
-    assert session.undo_label != "drag the cage of region 2"
+    assert session.history.undo_label != "drag the cage of region 2"
     assert not hand.failures
 
 
@@ -221,7 +221,7 @@ def test_the_volume_is_preserved_at_every_move_if_the_option_is_on(cages, hand):
 
 def test_escape_and_the_right_button_cancel_the_drag(cages, hand):
     session = cages.session
-    before, step = picture(cages.view), session.undo_label
+    before, step = picture(cages.view), session.history.undo_label
     x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
     for cancel in (lambda: hand.key("Escape"), lambda: hand.event("RightButtonPressEvent")):
         hand.press((x, y))
@@ -234,14 +234,14 @@ def test_escape_and_the_right_button_cancel_the_drag(cages, hand):
         hand.event("RightButtonReleaseEvent")
         hand.hover((5, 5))
         assert (picture(cages.view) == before).all()
-    assert session.undo_label == step
+    assert session.history.undo_label == step
     assert not hand.failures
 
 
 def test_a_click_makes_no_undo_step(cages, hand):
-    step = cages.session.undo_label
+    step = cages.session.history.undo_label
     hand.click(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
-    assert cages.session.undo_label == step
+    assert cages.session.history.undo_label == step
     assert cages.session.state.pose is None
 
 
@@ -334,7 +334,7 @@ def test_a_move_that_is_refused_is_reported_and_the_drag_cancelled(cages, hand):
     assert not cages.is_grabbing
     hand.release((x, y))
     hand.drag([(x, y), (x + 10, y)])
-    assert session.undo_label == "drag the cage of region 2"
+    assert session.history.undo_label == "drag the cage of region 2"
     assert len(hand.failures) == 1
 
 

@@ -34,7 +34,7 @@ def no_progress(fraction, text):
 def work(top=0.8):
     """Return a session with unsaved changes."""
     session = Session(BALL)
-    session.add_handle(BALL.vertices[:, 2] > top)
+    session.handles.add(BALL.vertices[:, 2] > top)
     return session
 
 
@@ -63,12 +63,12 @@ def test_the_autosave_of_a_crashed_program_is_found_unchanged(folder):
 
 def test_the_given_surface_is_autosaved_once_and_recovered(folder, monkeypatch):
     session = Session(Surface(tube()))
-    session.add_handle([0, 1, 2])
+    session.handles.add([0, 1, 2])
     slot = Autosaves(folder).new(ABOUT)
     slot.write(session)
     given = slot.path.with_name("surface.segdeform")
     before = given.stat()
-    session.add_handle([5, 6], "other")
+    session.handles.add([5, 6], "other")
     slot.write(session)
     assert given.stat() == before  # neither replaced nor written
     assert sd.load_session(slot.path).surface is None
@@ -92,7 +92,7 @@ def test_work_is_recovered_over_the_mesh_if_the_file_of_its_surface_is_damaged(f
         lambda path: sd.save_session(path, Session(Surface(holed()))),
     ):
         session = Session(Surface(tube()))
-        session.add_handle([0, 1, 2])
+        session.handles.add([0, 1, 2])
         place = crash(folder, session)
         spoil(place / "surface.segdeform")
         (slot,) = Autosaves(folder).abandoned()
@@ -266,7 +266,7 @@ def test_another_thread_can_save_a_session_while_it_changes(folder):
     known = [tuple(np.flatnonzero(BALL.vertices[:, 2] > top)) for top in (*tops, 0.8)]
     while len(kept) < 10:
         for top in tops:
-            session.add_handle(BALL.vertices[:, 2] > top, "handle 1")
+            session.handles.add(BALL.vertices[:, 2] > top, "handle 1")
     done.set()
     thread.join()
     assert {tuple(ids) for ids in kept} <= set(known)

@@ -163,7 +163,7 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     bench.hand.key("Escape")
     View.render(bench.view)
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
-    assert bench.editor.session.undo_label is None
+    assert bench.editor.session.history.undo_label is None
     assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
     count = bench.view.window.GetRenderers().GetNumberOfItems()
     bench.editor.remove()
@@ -175,16 +175,16 @@ def test_a_left_press_during_a_drag_of_another_button_edits_nothing(bench, butto
     """A finger that slips onto the left button ends the drag; the next press edits again."""
     bench.editor.mode = Mode.HANDLES
     session, hand, start = bench.editor.session, bench.hand, bench.middle
-    position = session.position
+    position = session.history.position
     hand.hover(start)
     hand.event(f"{button}ButtonPressEvent", start)
     hand.move(start + (10, 4))
     hand.drag([start + (10, 4), start + (30, 10), start + (60, 30)])
     hand.event(f"{button}ButtonReleaseEvent", start + (60, 30))
-    assert session.position == position
+    assert session.history.position == position
     after = bench.camera
     hand.drag([start, start + (30, 10)])
-    assert session.position > position
+    assert session.history.position > position
     assert np.array_equal(bench.camera, after)
     session.undo()
 
@@ -213,12 +213,12 @@ def test_the_mesh_at_rest_stays_while_the_camera_moves_until_a_press_on_it(bench
     assert controller.shows_rest
     controller.camera.viewpoint.home()
     View.render(bench.view)
-    before, position = bench.camera, bench.editor.session.position
+    before, position = bench.camera, bench.editor.session.history.position
     hand.drag([bench.middle, bench.middle + [20, 10]])
     assert not controller.shows_rest
     assert "The pose is shown again" in bench.editor.status
     assert np.array_equal(bench.camera, before)
-    assert bench.editor.session.position == position
+    assert bench.editor.session.history.position == position
 
 
 @pytest.mark.parametrize("axis", [1, 2])
@@ -249,7 +249,7 @@ def test_a_session_file_keeps_the_view_and_ignores_a_damaged_one(tmp_path):
     bench.hand.key("KP_3")
     bench.editor.mode = Mode.CAGES
     for k in range(3):
-        bench.editor.session.add_handle([k])
+        bench.editor.session.handles.add([k])
     bench.editor.widgets.dragger.set_hidden("handle 1", True)
     bench.editor.widgets.dragger.set_locked("handle 2", True)
     bench.editor.save(path)

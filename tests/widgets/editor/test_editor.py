@@ -96,7 +96,7 @@ def ready():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     return scene.mesh, session.state
 
 
@@ -147,7 +147,7 @@ def test_the_whole_story(any_view, tmp_path):
     assert bench.editor.widgets.selector.region == 1
     before = bench.session.regions.membership[1].copy()
     hand.drag([hand.at([0.0, -0.1, height]) for height in (0.45, 0.5, 0.55)])
-    assert bench.session.undo_label == "paint region 2"
+    assert bench.session.history.undo_label == "paint region 2"
     assert np.count_nonzero(bench.session.regions.membership[1]) > np.count_nonzero(before)
 
     bench.type("f")
@@ -174,7 +174,7 @@ def test_the_whole_story(any_view, tmp_path):
         for a in np.radians(np.linspace(0.0, 60.0, 13))
     ]
     hand.drag(way)
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
     there = bench.session.vertices[handle].mean(axis=0)
     assert np.linalg.norm(np.array(hand.at(there)) - way[-1]) < 12.0
     turn_by_a_ring(bench)
@@ -183,14 +183,14 @@ def test_the_whole_story(any_view, tmp_path):
     assert max(drawn) < 1e-12
 
     steps = 0
-    while bench.session.can_undo:
+    while bench.session.history.can_undo:
         bench.type("z")
         steps += 1
     assert steps == 7  # regions, brush, cages, fixed, handle, drag, turn
     assert bench.session.regions is None
     assert_array_equal(bench.editor.widgets.surface.points, mesh.vertices)
     bench.type(*["ctrl+y", "ctrl+shift+z"] * 3, "y")
-    assert not bench.session.can_redo
+    assert not bench.session.history.can_redo
     assert_array_equal(bench.session.vertices, turned)
     assert not bench.session.state.changes(replace(marked, pose=bench.session.state.pose))
 
@@ -211,7 +211,7 @@ def turn_by_a_ring(bench):
     ring = dragger.gizmo.line(Part(Kind.ROTATION))[:, :2]
     before = bench.session.targets[dragger.handle]
     bench.hand.drag(ring[np.linspace(0, len(ring) // 6 - 1, 5).astype(int)])
-    assert bench.session.undo_label == "rotate handle 1"
+    assert bench.session.history.undo_label == "rotate handle 1"
     a, b = (x - x.mean(axis=0) for x in (before, bench.session.targets[dragger.handle]))
     turn = Rotation.align_vectors(b, a)[0]
     assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
@@ -245,7 +245,7 @@ def test_each_mode_shows_what_is_missing_and_the_key_that_adds_it(bare):
     assert bare.session.is_bound
     assert "Move or rotate a handle" in bare.editor.status
     pull_handle(bare)
-    assert bare.session.undo_label == "drag handle 1"
+    assert bare.session.history.undo_label == "drag handle 1"
     assert bare.hand.failures == []
 
 
@@ -354,11 +354,11 @@ def test_a_refit_is_one_step_and_keeps_the_pose(bench):
     up[2, 3] = 0.3
     session.move_handle(next(iter(session.handles)), up)
     session.commit()
-    before, count = session.vertices, len(session.history)
+    before, count = session.vertices, len(session.history.labels)
     bench.editor.do(actions_of_panel.fitting_with(60))
     bench.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 60
-    assert len(session.history) == count + 1
+    assert len(session.history.labels) == count + 1
     assert np.linalg.norm(session.vertices - before, axis=1).max() < 0.01 * session.mesh.diagonal
     assert abs(session.volume_change) < 1e-12
     assert session.options.n_cage_vertices == 60
@@ -384,7 +384,7 @@ def test_a_stroke_paints_a_handle_once_something_is_fixed(bench):
     session, selector = bench.session, bench.editor.widgets.selector
     bench.type("3", "s", "2", "3")
     assert selector.paints is Paint.FIXED  # as before, since there is a handle
-    session.remove_handle(next(iter(session.handles)))
+    session.handles.remove(next(iter(session.handles)))
     for fixed, paints in ((session.fixed, Paint.HANDLE), ([], Paint.FIXED)):
         session.set_fixed(fixed)
         bench.type("2", "3")
@@ -527,11 +527,11 @@ def test_keys_for_axes_the_pivot_and_pins(bench):
             hand.key(key)
         hand.release()
         if not key:
-            assert session.undo_label == "move the pivot of handle 1"
-            assert np.allclose(hand.at(session.pivot("handle 1")), ball + 12.0, atol=0.5)
+            assert session.history.undo_label == "move the pivot of handle 1"
+            assert np.allclose(hand.at(session.handles.pivot("handle 1")), ball + 12.0, atol=0.5)
             for _ in range(2):
                 hand.click(ball + 12.0)
-            assert session.undo_label == "reset the pivot of handle 1"
+            assert session.history.undo_label == "reset the pivot of handle 1"
         assert np.allclose(dragger.gizmo.centre, middle)
         assert not session.state.pivots
     assert session.undo() == "reset the pivot of handle 1"
@@ -655,7 +655,7 @@ def test_an_error_is_shown_until_an_action_succeeds(bench):
     bench.hand.hover((5, 5))
     assert "are only in region 1" in bench.editor.status
     bench.hand.click(bench.hand.at([1.0, -0.7, 0.0]))
-    assert bench.session.undo_label == "paint region 1"
+    assert bench.session.history.undo_label == "paint region 1"
     assert bench.editor.status.startswith("Brush: paint region 1.")
     bench.hand.hover((5, 5))
     bench.type("m")  # the pointer is beside the mesh
@@ -763,11 +763,11 @@ def test_escape_cancels_a_job_and_nothing_is_changed(bare):
         bare.hand.key("Escape")
         bare.settle()
     assert bare.session.regions is None
-    assert not bare.session.can_undo
+    assert not bare.session.history.can_undo
     assert "Cancelled" in bare.editor.status
     assert bare.hand.failures == []
     bare.hand.click(bare.hand.at([0.0, -0.8, 0.0]))  # the brush works again
-    assert bare.session.undo_label == "paint region 2"
+    assert bare.session.history.undo_label == "paint region 2"
     bare.type("g")
     assert bare.session.regions is not None
 
@@ -792,7 +792,7 @@ def test_cages_fitted_to_outdated_regions_are_rejected(bare):
     bare.settle()
     bare.hand.key("f")
     assert bare.editor.is_busy
-    bare.session.paint_region(bare.session.regions.n_regions, np.arange(40))
+    bare.session.painting.paint(bare.session.regions.n_regions, np.arange(40))
     bare.settle()
     assert not bare.session.cages
     assert isinstance(bare.hand.failures.pop(), RegionError)
@@ -809,7 +809,7 @@ def test_a_failed_job_shows_its_error_and_the_editor_continues(bench):
     assert bench.editor.status == " ".join(str(bench.hand.failures.pop()).split())
     bench.type("4")
     pull_handle(bench)
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
 
 
 def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
@@ -863,11 +863,11 @@ def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     assert bench.session is not first
     assert "Opened" in bench.editor.status
     assert_array_equal(bench.editor.widgets.surface.points, posed)
-    assert not bench.session.can_undo
+    assert not bench.session.history.can_undo
     first.set_fixed([])  # no longer observed
     assert "Opened" in bench.editor.status
     pull_handle(bench, (0, -20))
-    assert bench.session.can_undo
+    assert bench.session.history.can_undo
     assert not first.is_dragging
 
 

@@ -17,7 +17,7 @@ from test_editor import pull_handle as pull_handle_in
 
 from vtk_segdeform import Mesh, Regions, Session, fit_cages, load_session, read_mesh
 from vtk_segdeform.kernels import compiled_kernels
-from vtk_segdeform.session import save_session
+from vtk_segdeform.session import pulls, save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets.editor import (
     Mode,
@@ -25,9 +25,9 @@ from vtk_segdeform.widgets.editor import (
     finishing,
     finishing_after_drags,
     opening,
+    queue,
     saving,
 )
-from vtk_segdeform.widgets.editor import settling as settling_poses
 from vtk_segdeform.widgets.panel import status
 from vtk_segdeform.widgets.scene import Phase, Pointer, glide
 
@@ -65,7 +65,7 @@ def test_a_pose_is_finished_after_each_drag(bench):  # noqa: F811
     bench.type("4")
     pull_handle(bench, (15, 25))
     until(bench, lambda: is_finished(bench))
-    assert len(bench.session.history) == 2
+    assert len(bench.session.history.labels) == 2
     assert bench.session.solution.handle_error < 1e-12
     first = bench.session.vertices
     pull_handle(bench, (-10, 12))
@@ -129,15 +129,15 @@ def test_what_is_saved_is_what_was_shown_and_is_not_changed_later(bench, tmp_pat
 @pytest.fixture
 def settling(bench, monkeypatch):  # noqa: F811
     """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
-    monkeypatch.setattr(settling_poses, "_SHOWN_AFTER", 0.0)
+    monkeypatch.setattr(queue, "_SHOWN_AFTER", 0.0)
     for each in ("_EVENT_TIME", "_REFINE_TIME"):  # the fewest steps, however fast the machine is
         monkeypatch.setattr(f"vtk_segdeform.widgets.handle_dragger.live_solve.{each}", 0.0)
     bench.editor.do(finishing_after_drags(False))
     bench.type("4")
     pull_handle(bench, (-40, 90))
     assert bench.session.solution.status is Status.STEP_LIMIT
-    assert bench.editor.controller.settling.is_active
-    return bench.editor.controller.settling
+    assert bench.editor.widgets.is_settling
+    return bench.editor.widgets
 
 
 def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa: F811
@@ -147,7 +147,7 @@ def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa
     assert now.cancel.visible
     assert now.cancel.tip == "Stop at this pose"
     assert bench.editor.controller.messages._line.aside == "Settling ... (Esc)"
-    while settling.is_active:
+    while settling.is_settling:
         bench.hand.tick()
     until(bench, lambda: bench.editor.controller.messages._line.aside == "")
     assert bench.session.solution.status is not Status.STEP_LIMIT
@@ -157,7 +157,7 @@ def test_a_pose_that_settles_after_its_release_says_so(bench, settling):  # noqa
 def test_escape_stops_a_pose_that_settles(bench, settling, tmp_path):  # noqa: F811
     shown, bench.editor.path = bench.session.vertices, tmp_path / "work.segdeform"
     bench.type("escape")
-    assert not settling.is_active
+    assert not settling.is_settling
     assert "Stopped. The pose has not settled" in bench.editor.status
     bench.type("0", "4")
     for _ in range(5):
@@ -177,7 +177,7 @@ def test_saving_waits_until_the_pose_has_settled(bench, settling, tmp_path, writ
     assert "Saving once the pose has settled" in bench.editor.status
     assert status(bench.editor).work == "Saving"
     until(bench, path.exists)
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert f"aved to {path}" in bench.editor.status
     read = read_mesh if write == "mesh" else load_session
@@ -190,7 +190,7 @@ def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, c
     bench.editor.path = tmp_path / "work.segdeform"
     shown = bench.session.vertices
     bench.type("ctrl+s")
-    assert settling.is_active
+    assert settling.is_settling
     assert not bench.editor.path.exists()
     ends = {
         "escape": lambda: bench.type("escape"),
@@ -205,7 +205,7 @@ def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, c
 
 def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, tmp_path):  # noqa: F811
     bench.editor.save(tmp_path / "work.segdeform")
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
 
@@ -214,7 +214,7 @@ def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, t
 def test_a_pose_that_settled_when_the_editor_was_turned_off_is_completed(bench, settling, end):  # noqa: F811
     shown = bench.session.vertices
     getattr(bench.editor, end)()
-    assert not settling.is_active
+    assert not settling.is_settling
     assert bench.session.solution.status is Status.STEP_LIMIT
     bench.editor.complete()
     assert bench.session.solution.status is not Status.STEP_LIMIT
@@ -261,7 +261,7 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
     """Otherwise Remove would remove the point that was pulled before it."""
     bench.session.bind()
     bench.type("0")
-    bench.session.remove_handle(*bench.session.handles)
+    bench.session.handles.remove(*bench.session.handles)
     puller, dragger = bench.editor.widgets.puller, bench.editor.widgets.dragger
     grabbed(bench, 0.6)
     grabbed(bench, -0.4)
@@ -273,7 +273,8 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
         place
         for place in dot + 14.0 * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
         if (hit := puller._picker.hit(Pointer(Phase.HOVER, *place))) is not None
-        and bench.session.grabbed(hit.vertex, puller.radius) == "pull 1"
+        and pulls.grabbed(bench.session.mesh, bench.session.state, hit.vertex, puller.radius)
+        == "pull 1"
     )
     bench.hand.hover(beside)
     assert puller.marker_under_pointer() is None
@@ -288,7 +289,7 @@ def test_pulls_are_finished_and_add_up(bench):  # noqa: F811
     poses = []
     for fraction in (0.7, 0.3):
         grabbed(bench, fraction)
-        assert bench.session.undo_label == "pull"
+        assert bench.session.history.undo_label == "pull"
         bench.type("shift+f")
         until(bench, lambda: is_finished(bench))
         assert bench.session.solution.handle_error < 1e-12
@@ -405,11 +406,12 @@ def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F8
     bench.type("4")
     pull_handle(bench)
     bench.type("shift+f")
-    session, (pose, solution) = bench.session, bench.session._solution
+    session, solution = bench.session, bench.session.solution
     few, many, controller = np.arange(3), np.arange(1200), bench.editor.controller
 
     def told(**changes):
-        session._solution = pose, dataclasses.replace(solution, **changes)
+        changed = dataclasses.replace(solution, **changes)
+        session.poses.keep_solution(session.state.pose, changed)
         controller.refresh()
         return bench.editor.status
 
@@ -444,7 +446,7 @@ def test_a_part_that_no_handle_moves_is_named_once():
     moved = mesh.with_vertices(both.vertices[n:])
     session.set_cages([*scene.cages, *fit_cages(moved, Regions.single(moved), 20)])
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     session.bind()
     made = Bench(plain_view((400, 320)), session, Mode.DEFORM)
     made.editor.do(finishing_after_drags(False))

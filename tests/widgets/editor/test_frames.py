@@ -31,7 +31,7 @@ def test_every_frame_of_a_drag_has_the_exact_volume(monkeypatch, kept_by, mode):
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     session.bind()
     bench, shown, changes = Bench(plain_view((400, 320)), session), [], []
     bench.editor.do(finishing_after_drags(False))

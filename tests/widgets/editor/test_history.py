@@ -32,7 +32,7 @@ def editor():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session = Session(scene.mesh, state=session.state)
-    session.add_handle(scene.handle, "tip")
+    session.handles.add(scene.handle, "tip")
     draw_seldom(view)
     editor = DeformEditor(view, session)
     editor.mode = Mode.REGIONS
@@ -50,12 +50,12 @@ def test_states_are_named_and_a_jump_reaches_even_the_one_before_the_session(edi
     assert (position_of(controller), len(states_of(controller))) == (1, 3)
 
     def enter(position, message):
-        undone.append((session.position, position, message))
+        undone.append((session.history.position, position, message))
 
     controller.neighbours.before = Neighbour("repair", ("Opened", "Pull"), enter)
     assert states_of(controller) == ("Opened", "Pull", "Repair", "Set tip", "Drag tip")
     editor.do(jumping_to(4))
-    assert (session.position, position_of(controller), undone) == (2, 4, [])
+    assert (session.history.position, position_of(controller), undone) == (2, 4, [])
     editor.do(jumping_to(0))
     assert undone == [(0, 0, "History: Opened")]
     assert controller.undo_label == "repair"
@@ -67,22 +67,22 @@ def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_r
     editor,
 ):
     controller, session, entered = editor.controller, editor.session, []
-    session.jump(1)
+    session.history.jump(1)
 
     def enter(position, message):
-        entered.append((session.position, position, message))
+        entered.append((session.history.position, position, message))
 
     after = Neighbour("repair", ("Pull",), enter)
     controller.neighbours.follow(session, 1, after)
     assert states_of(controller) == ("Opened", "Set tip", "Repair", "Pull")
     assert controller.redo_label == "repair"
-    session.jump(0)
+    session.history.jump(0)
     assert controller.redo_label == "set tip"
     assert states_of(controller)[2:] == ("Repair", "Pull")
     for position in (2, 3):
-        session.jump(0)
+        session.history.jump(0)
         editor.do(jumping_to(position))
-    session.jump(1)
+    session.history.jump(1)
     editor.do(redo)
     assert entered == [
         (1, 2, "History: Repair"),
@@ -136,8 +136,8 @@ def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):
     for k in range(3):
         session.change_options(stretch=float(k + 2))  # only the last three are bound
         session.bind()
-    session.jump(0)
-    assert session.vertices_at(2) is None
+    session.history.jump(0)
+    assert session.poses.peek(session.history.state_at(2)) is None
     preview(controller, 2)
     assert surface.instead is None
     editor.do(jumping_to(2))

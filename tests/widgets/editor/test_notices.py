@@ -124,7 +124,7 @@ def test_a_click_on_show_marks_the_holes_and_a_second_one_removes_the_marks(open
     scene.click("Hide")
     assert not scene.notices.are_marked
     assert not scene.shade(LOOP_RGB).any()
-    assert scene.editor.session.undo_label is None  # the click did not paint
+    assert scene.editor.session.history.undo_label is None  # the click did not paint
 
 
 def test_the_buttons_work_in_a_part_of_the_window(open_editor):

@@ -168,7 +168,7 @@ def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, nam
     along = int(np.ptp(x, axis=0).argmax())
     low, high = np.quantile(x[:, along], [0.1, 0.9])
     session.set_fixed(x[:, along] < low)
-    session.add_handle(x[:, along] > high)
+    session.handles.add(x[:, along] > high)
     scene.editor.mode = Mode.DEFORM
     scene.editor.wait()
     scene.editor.widgets.dragger.refine_while_resting = False

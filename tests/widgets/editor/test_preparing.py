@@ -18,7 +18,7 @@ from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import actions, controller, rest, saving
+from vtk_segdeform.widgets.editor import actions, controller, queue, saving
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_everything_works_meanwhile_and_the_result_is_no_step(bench):
     bench.finish()
     assert bench.aside is None
     assert bench.session.is_bound
-    assert not bench.session.can_undo
+    assert not bench.session.history.can_undo
     assert not editor.controller.file.is_modified(bench.session)
     assert bench.gate.begun == 1
     assert hand.failures == []
@@ -155,9 +155,9 @@ def test_a_press_during_opening_becomes_a_pull(bench, tmp_path, monkeypatch):
     bench.until(lambda: bench.hand.move(start + [40.0, 0.0]) or session.is_dragging)
     assert np.abs(session.vertices - before).max() > 0.01
     bench.hand.release(start + [40.0, 0.0])
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     session.undo()
-    assert not session.can_undo
+    assert not session.history.can_undo
     assert session.is_bound
     assert bench.hand.failures == []
 
@@ -172,7 +172,7 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     volume = signed_volume(rest, mesh.faces)
     assert abs(signed_volume(surface.points, mesh.faces) / volume - 1.0) < 1e-12
     assert_array_equal(session.vertices, rest)
-    assert not session.can_undo
+    assert not session.history.can_undo
     hand.key("Escape")
     assert_array_equal(surface.points, rest)
     hand.release()
@@ -185,12 +185,12 @@ def test_a_stand_in_follows_until_the_session_does(standing_in):
     hand.tick(3)
     assert_array_equal(surface.points, shown)  # it stays, and the pull follows
     bench.gate.is_open.set()
-    bench.until(lambda: session.can_undo)
-    assert session.undo_label == "pull"
+    bench.until(lambda: session.history.can_undo)
+    assert session.history.undo_label == "pull"
     assert_array_equal(surface.points, session.vertices)
     assert np.linalg.norm(session.vertices - shown, axis=1).mean() < 0.05 * mesh.diagonal
     session.undo()
-    assert not session.can_undo  # the stand-in is no step
+    assert not session.history.can_undo  # the stand-in is no step
     assert_array_equal(surface.points, rest)
     assert hand.failures == []
 
@@ -211,7 +211,7 @@ def test_a_drag_goes_on_with_the_session_as_soon_as_it_is_bound(standing_in):
         assert np.abs(x - session.mesh.vertices).max() > 0.8 * farthest
     hand.move(to)
     hand.release()
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     assert hand.failures == []
 
 
@@ -242,9 +242,9 @@ def test_a_released_pull_can_be_given_up_while_it_waits(standing_in, way):
     assert editor.is_preparing  # a second Escape would cancel that
     bench.finish()
     bench.hand.tick(5)
-    assert not bench.session.can_undo
+    assert not bench.session.history.can_undo
     bench.hand.drag([bench.place, bench.place + [30.0, 0.0]])
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
     assert bench.hand.failures == []
 
 
@@ -259,10 +259,10 @@ def test_turning_the_camera_keeps_a_pull_that_waits_and_another_press_is_refused
     assert "not computed yet" in bench.editor.status
     assert_array_equal(bench.surface.points, shown)
     bench.finish()
-    bench.until(lambda: bench.session.can_undo)
-    assert bench.session.undo_label == "pull"
+    bench.until(lambda: bench.session.history.can_undo)
+    assert bench.session.history.undo_label == "pull"
     assert bench.session.undo() == "pull"
-    assert not bench.session.can_undo
+    assert not bench.session.history.can_undo
     assert hand.failures == []
 
 
@@ -278,7 +278,7 @@ def test_the_stand_in_is_hidden_if_the_preparation_fails(standing_in):
     assert not bench.editor.controller.is_modified
     bench.gate.error = None
     bench.hand.drag([bench.place, bench.place + [30.0, 0.0]])  # retries
-    bench.until(lambda: bench.session.can_undo)
+    bench.until(lambda: bench.session.history.can_undo)
 
 
 def test_a_pull_that_waits_is_an_unsaved_change_and_is_saved(standing_in, tmp_path):
@@ -290,7 +290,7 @@ def test_a_pull_that_waits_is_an_unsaved_change_and_is_saved(standing_in, tmp_pa
     bench.finish()
     bench.until((tmp_path / "pulled.segdeform").exists)
     assert_array_equal(load_session(tmp_path / "pulled.segdeform").vertices, bench.session.vertices)
-    assert bench.session.can_undo
+    assert bench.session.history.can_undo
     assert not controller.is_modified
 
 
@@ -305,7 +305,7 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     hand, session = bench.hand, bench.session
     bench.until(bench.gate.has_begun.is_set)
     if change == "pin":
-        session.pin(0)
+        session.handles.pin(0)
     hand.press(bench.place)
     hand.move(bench.place + [30.0, 0.0])
     hand.tick(5)
@@ -314,7 +314,7 @@ def test_without_a_stand_in_the_pull_waits(monkeypatch, request, change):
     bench.gate.is_open.set()
     bench.until(lambda: session.is_dragging)
     hand.release()
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     assert hand.failures == []
 
 
@@ -341,16 +341,16 @@ def kernels(monkeypatch):
     """Return a list of what has been loaded; the clock of a rest stands still."""
     loaded = []
     monkeypatch.setattr(controller, "load_early", lambda: loaded.append("kernels"))
-    monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: 0.0))
+    monkeypatch.setattr(queue, "time", SimpleNamespace(monotonic=lambda: 0.0))
     return loaded
 
 
 def test_kernels_are_loaded_once_the_hand_has_rested(kernels, bench, monkeypatch):
     def wait(seconds):
-        monkeypatch.setattr(rest, "time", SimpleNamespace(monotonic=lambda: seconds))
+        monkeypatch.setattr(queue, "time", SimpleNamespace(monotonic=lambda: seconds))
         bench.hand.tick(3)
 
-    bench.editor.controller._rest._seconds = 1.0  # as in the program
+    monkeypatch.setattr(controller, "_REST", 1.0)  # as in the program
     bench.until(bench.gate.has_begun.is_set)
     bench.hand.press(bench.place + [0.0, 10.0])
     bench.hand.release()
@@ -360,7 +360,7 @@ def test_kernels_are_loaded_once_the_hand_has_rested(kernels, bench, monkeypatch
     wait(5.0)
     assert not kernels
     bench.finish()
-    bench.until(lambda: bench.session.can_undo and not bench.puller.is_refining)
+    bench.until(lambda: bench.session.history.can_undo and not bench.puller.is_refining)
     wait(5.9)
     assert not kernels
     bench.hand.press(bench.place)
@@ -425,7 +425,7 @@ def test_the_result_waits_for_mode_pull_and_a_changed_session_refuses_it(bench):
     bench.editor.mode = Mode.PULL
     bench.hand.tick(5)
     assert bench.session.is_bound
-    assert bench.session.undo_label == "set fixed vertices"
+    assert bench.session.history.undo_label == "set fixed vertices"
     assert bench.gate.begun == 1
 
 

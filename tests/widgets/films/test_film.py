@@ -44,7 +44,7 @@ def session():
     session.set_regions(SCENE.regions)
     session.set_cages(SCENE.cages)
     session.set_fixed(SCENE.fixed)
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     return session
 
 
@@ -145,7 +145,7 @@ def test_a_failure_leaves_no_file_and_the_session_as_it_was(tmp_path, session):
     with pytest.raises(ValueError, match="targets require a session"):
         film(tmp_path / "a.gif", plain_view(SIZE), TURNS)
     empty = Session(SCENE.mesh)
-    empty.add_handle(SCENE.handle)
+    empty.handles.add(SCENE.handle)
     with pytest.raises(CageError):
         film(tmp_path / "a.gif", empty, TURNS, size=SIZE)
     with pytest.raises(SessionError, match="without pictures"):
@@ -174,11 +174,11 @@ def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
 def test_the_history_becomes_a_picture_for_each_state(tmp_path, session):
     film(tmp_path / "bend.gif", session, TURNS)
     film(tmp_path / "reset.gif", session, [SCENE.turned(40.0)])
-    here, n_states = session.position, len(session.history)
-    film(tmp_path / "all", session, [partial(session.jump, k) for k in range(n_states)])
+    here, n_states = session.history.position, len(session.history.labels)
+    film(tmp_path / "all", session, [partial(session.history.jump, k) for k in range(n_states)])
     pictures = read(tmp_path / "all")
     assert len(pictures) == n_states
-    assert (session.position, len(session.history)) == (here, n_states)
+    assert (session.history.position, len(session.history.labels)) == (here, n_states)
     assert len({picture.tobytes() for picture in pictures[-3:]}) == 3
 
 

@@ -43,8 +43,8 @@ class Bench:
         self.session.set_cages(SCENE.cages)
         self.session.set_fixed(SCENE.fixed)
         x, _, z = SCENE.mesh.vertices.T
-        self.session.add_handle(SCENE.handle)
-        self.session.add_handle((np.abs(x) < 0.5) & (z > 0.6))
+        self.session.handles.add(SCENE.handle)
+        self.session.handles.add((np.abs(x) < 0.5) & (z > 0.6))
         self.view = plain_view()
         self.dragger = HandleDragger(self.view, self.session)
         self.gizmo = self.dragger.gizmo
@@ -233,7 +233,7 @@ def test_a_ring_rotates_by_the_angle_on_the_screen(ring, parallel):
         R = rotation([0.0, -1.0, 0.0], angle)  # towards the viewer, counterclockwise
         assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)
     hand.release(there)
-    assert bench.session.undo_label == "rotate handle 1"
+    assert bench.session.history.undo_label == "rotate handle 1"
     assert not hand.failures
 
 
@@ -250,7 +250,7 @@ def turned_along(session, axis):
 def test_a_typed_turn_winds_the_body_in_its_direction(degrees):
     bench = Bench((0.0, -12.0, 0.0), parallel=True)
     hand, session = bench.hand, bench.session
-    session.remove_handle(TOP)
+    session.handles.remove(TOP)
     hand.press(bench.aim(VIEW_RING))
     for key in ("x", *degrees.replace("-", ""), *("minus" for _ in degrees if _ == "-")):
         hand.key(key)
@@ -413,7 +413,7 @@ def test_keys_constrain_a_translation_to_an_axis_then_a_plane_then_not(bench):
     hand.key("z")
     assert np.array_equal(bench.shift()[:2], [0.0, 0.0])
     hand.release(place + [-30.0, 40.0])
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
 
 
 @about_targets
@@ -439,7 +439,7 @@ def test_a_hidden_or_locked_handle_cannot_be_dragged_and_keeps_its_place(bench, 
     bench.dragger.handle = TOP
     assert bench.gizmo.centre is None
     bench.dragger.handle = TIP
-    bench.session.rename_handle(TOP, "hat")
+    bench.session.handles.rename(TOP, "hat")
     assert {*bench.dragger.hidden, *bench.dragger.locked} == {"hat"}
     assert (picture(bench.view) != before).any() == (change == "set_hidden")
     state = bench.session.state
@@ -450,8 +450,8 @@ def test_a_hidden_or_locked_handle_cannot_be_dragged_and_keeps_its_place(bench, 
     assert bench.gizmo.centre is not None
     getattr(bench.dragger, change)("hat", True)
     ids = bench.session.handles["hat"]
-    bench.session.remove_handle("hat")
-    bench.session.add_handle(ids, "hat")  # another one of the same name
+    bench.session.handles.remove("hat")
+    bench.session.handles.add(ids, "hat")  # another one of the same name
     assert not {*bench.dragger.hidden, *bench.dragger.locked}
 
 
@@ -545,7 +545,7 @@ def test_control_moves_in_whole_steps(part):
 def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
     session, hand = bench.session, bench.hand
     pivot = bench.gizmo.centre + [0.3, -0.2, 0.1]
-    session.set_pivot(TIP, pivot)
+    session.handles.set_pivot(TIP, pivot)
     assert np.allclose(bench.gizmo.centre, pivot, atol=1e-12)
     start = bench.targets()
     for keys, degrees, caption in (
@@ -567,7 +567,7 @@ def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
     hand.press(bench.aim(VIEW_RING))
     for key in ("z", "3", "Return"):
         hand.key(key)
-    assert session.undo_label == "rotate handle 1"
+    assert session.history.undo_label == "rotate handle 1"
 
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
@@ -594,7 +594,7 @@ def test_the_amount_along_an_axis_is_the_number_to_type(bench, way):
 @pytest.mark.parametrize("part", [FREE, VIEW_RING])
 def test_a_pulled_point_is_moved_by_a_pull_and_what_was_pulled_elsewhere_stays(bench, part):
     session, mesh = bench.session, SCENE.mesh
-    session.remove_handle(TIP, TOP)
+    session.handles.remove(TIP, TOP)
     session.set_fixed([])
     ends = [int(np.argmin(mesh.vertices @ way)) for way in ([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0])]
     for vertex in ends:
@@ -631,7 +631,7 @@ def test_a_press_on_the_vertices_of_a_handle_grabs_it_at_that_point(bench):
     assert np.abs(seen - (place + [30.0, 20.0])).max() < 1.5
     assert abs(bench.shift(TOP) @ view.view_direction) < 1e-12
     hand.release(place + [30.0, 20.0])
-    assert bench.session.undo_label == "drag handle 2"
+    assert bench.session.history.undo_label == "drag handle 2"
     assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
 
 
@@ -650,7 +650,7 @@ def test_a_press_on_a_handle_moves_it_from_more_than_three_pixels_on(bench, dire
     bench.hand.move(place + 1.0 * np.array(direction))  # a drag remains one near the press
     assert bench.session.is_dragging
     bench.hand.release(place)
-    assert bench.session.undo_label == "drag handle 2"
+    assert bench.session.history.undo_label == "drag handle 2"
 
 
 @about_targets
@@ -665,12 +665,12 @@ def test_the_other_handle_keeps_its_targets(bench):
 
 
 def test_a_click_activates_a_handle_and_makes_no_undo_step(bench):
-    label = bench.session.undo_label
+    label = bench.session.history.undo_label
     top = SCENE.mesh.vertices[bench.session.handles[TOP]].mean(axis=0)
     bench.hand.click(bench.hand.at(top))
     assert bench.dragger.handle == TOP
     bench.hand.click(bench.aim(FREE))
-    assert bench.session.undo_label == label
+    assert bench.session.history.undo_label == label
     assert np.allclose(bench.gizmo.centre, top)
 
 
@@ -689,11 +689,11 @@ def test_presses_on_hidden_handles_and_other_vertices_move_the_camera():
 def test_when_the_active_handle_is_removed_the_next_one_is_active_and_a_renamed_one_stays(bench):
     session, dragger = bench.session, bench.dragger
     dragger.handle = TOP
-    session.rename_handle(TOP, "back")
+    session.handles.rename(TOP, "back")
     assert dragger.handle == "back"
-    session.remove_handle("back")
+    session.handles.remove("back")
     assert dragger.handle == TIP
-    session.remove_handle(TIP)
+    session.handles.remove(TIP)
     assert dragger.handle is None
     assert bench.gizmo.centre is None
     session.undo()
@@ -707,7 +707,7 @@ def test_when_the_active_handle_is_removed_the_next_one_is_active_and_a_renamed_
 
 def test_removing_the_handle_during_a_drag_ends_it(bench):
     place = bench.aim(FREE)
-    for end in (lambda: bench.session.remove_handle(TIP), bench.session.undo):
+    for end in (lambda: bench.session.handles.remove(TIP), bench.session.undo):
         bench.dragger.handle = TIP
         bench.hand.press(place)
         bench.hand.move(place + [20.0, 0.0])
@@ -715,17 +715,17 @@ def test_removing_the_handle_during_a_drag_ends_it(bench):
         bench.hand.move(place + [30.0, 0.0])
         assert not bench.dragger.is_grabbing
         bench.hand.release(place)
-        while bench.session.undo_label != "set handle 2":
+        while bench.session.history.undo_label != "set handle 2":
             bench.session.undo()
     bench.hand.press(place)
-    bench.session.remove_handle(bench.dragger.handle)
+    bench.session.handles.remove(bench.dragger.handle)
     bench.hand.move(place + [20.0, 0.0])
     assert not bench.dragger.is_grabbing
 
 
 def test_without_cages_nothing_is_shown_or_grabbed():
     session, view = Session(SCENE.mesh), plain_view()
-    session.add_handle(SCENE.handle)
+    session.handles.add(SCENE.handle)
     dragger, hand = HandleDragger(view, session), Hand(view)
     view.renderer.ResetCamera()
     before = picture(view)
@@ -756,7 +756,7 @@ def test_refining_ends_when_the_pose_has_converged(bench):
     assert bench.has_timer
     hand.tick(2)
     hand.release()
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
     assert not bench.session.is_dragging
     for _ in range(400):
         hand.tick()
@@ -813,7 +813,7 @@ def test_escape_and_the_right_button_restore_the_pose_before_the_press(bench):
         assert bench.session.state.pose is not pose
         cancel()
         assert bench.session.state.pose is pose
-        assert bench.session.undo_label == "before"
+        assert bench.session.history.undo_label == "before"
         assert not bench.has_timer
         hand.move(place)
         hand.release(place)
@@ -828,7 +828,7 @@ def test_cancelling_keeps_an_earlier_unfinished_drag(bench):
     bench.hand.move(place + [-40.0, 60.0])
     bench.hand.key("Escape")
     assert bench.session.state.pose is pose
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
 
 
 def test_a_pose_reached_by_undo_is_not_refined(bench):
@@ -905,7 +905,7 @@ def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatc
     hand.release(place)
     hand.drag([place, place + [-20.0, 30.0]])
     assert len(hand.failures) == 1
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
 
 
 def test_targets_too_far_away_are_refused_and_the_drag_continues():
@@ -928,7 +928,7 @@ def test_targets_too_far_away_are_refused_and_the_drag_continues():
     bench.hand.key("BackSpace")
     start = bench.session.mesh.vertices[bench.session.handles["handle 1"]]
     bench.hand.key("Return")
-    assert bench.session.undo_label == "drag handle 1"
+    assert bench.session.history.undo_label == "drag handle 1"
     shift = bench.session.targets["handle 1"] - start
     np.testing.assert_allclose(shift, np.broadcast_to([9.0, 0.0, 0.0], shift.shape), atol=1e-9)
 
@@ -1018,7 +1018,7 @@ def test_a_jerk_is_followed_and_ends_as_without_hurry(bench, monkeypatch):
         shown = session.vertices
         assert np.array_equal(bench.dragger._surface.points, shown)
     hand.release()
-    assert session.undo_label == f"drag {TIP}"
+    assert session.history.undo_label == f"drag {TIP}"
     monkeypatch.setattr(draft, "_REST", 0.0)
     for _ in range(60):
         bench.view.interactor.TimerEvent()

@@ -49,9 +49,9 @@ def start() -> tuple[Mesh, State]:
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    name = session.add_handle(scene.handle)
-    session.pin(int(np.argmin(np.abs(scene.mesh.vertices[:, 0]))))
-    session.set_pivot(name, scene.mesh.vertices[0])
+    name = session.handles.add(scene.handle)
+    session.handles.pin(int(np.argmin(np.abs(scene.mesh.vertices[:, 0]))))
+    session.handles.set_pivot(name, scene.mesh.vertices[0])
     session.drag({name: scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.3]})
     session.commit()
     return session.mesh, session.state

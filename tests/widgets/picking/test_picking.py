@@ -94,7 +94,7 @@ def test_hits_are_in_the_displayed_pose():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     side = np.abs(scene.mesh.vertices - [2.7, -0.3, 0.1]).sum(axis=1)
     tip = int(np.argmin(side))
 
@@ -298,7 +298,7 @@ def test_visible_vertices_are_cached_until_the_camera_or_the_pose_changes():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
 
     def now():
         return visible_vertices(view.to_display(surface.points), scene.mesh.faces)

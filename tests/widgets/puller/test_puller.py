@@ -71,13 +71,13 @@ def bench():
 
 def test_a_pull_is_one_step_and_every_frame_has_the_volume(bench):
     session, hand = bench.session, bench.hand
-    before = session.undo_label
+    before = session.history.undo_label
     place, _ = bench.on()
     hand.press(place)
     hand.move(place + [1, 1])
     hand.release(place)
     assert session.state.pose is None  # a click pulls nothing
-    assert session.undo_label == before
+    assert session.history.undo_label == before
     hand.press(place)
     for k in range(1, 6):
         hand.move(place + [0, 8 * k])
@@ -85,10 +85,10 @@ def test_a_pull_is_one_step_and_every_frame_has_the_volume(bench):
         hand.tick()
         assert abs(session.volume_change) < 1e-12
     hand.release()
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     assert (session.vertices - SCENE.mesh.vertices)[:, 2].max() > 0.2
     assert session.undo() == "pull"
-    assert (session.state.pose, session.undo_label) == (None, before)
+    assert (session.state.pose, session.history.undo_label) == (None, before)
     hand.press(place)
     hand.move(place + [0, 20])
     hand.key("Escape")
@@ -112,7 +112,7 @@ def test_the_point_under_the_pointer_is_pulled_also_between_vertices(bench):
     hand.release()
     bench.puller.radius = 1e-3 * session.mesh.diagonal
     hand.press(bench.on(0.0)[0] + [5, 3])
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     hand.release()
     assert "subdivide the mesh" in bench.puller.remark
 
@@ -122,12 +122,12 @@ def test_shift_click_pins_and_unpins_and_markers_are_grabbed(bench):
     place, _ = bench.on(0.5)
     hand.click(place, shift=True)
     assert list(session.handles) == ["pin 1"]
-    assert session.undo_label == "pin"
+    assert session.history.undo_label == "pin"
     hand.press(place + [4, 0])  # near it
     hand.move(place + [4, 25])
     assert list(session.handles) == ["pin 1"]
     hand.release()
-    assert session.undo_label == "pull"
+    assert session.history.undo_label == "pull"
     place = np.array(hand.at(session.vertices[session.handles["pin 1"]][0]))
     hand.click(place + [0, 5], shift=True)
     assert session.handles == {}
@@ -169,7 +169,7 @@ def test_a_number_that_is_too_large_can_be_corrected():
         bench.hand.key(key)
     np.testing.assert_allclose(bench.target - start, [0.0, 0.0, 0.5], atol=1e-9)
     assert not bench.puller.is_grabbing
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
 
 
 def test_x_constrains_to_the_axis_and_then_to_the_plane(bench):
@@ -214,7 +214,7 @@ def test_r_turns_about_the_point_and_a_number_is_degrees(bench):
     after = after - after[ids == vertex]  # the centre is the point under the pointer
     c, s = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
     np.testing.assert_allclose(after, before @ [[c, 0, -s], [0, 1, 0], [s, 0, c]], atol=1e-9)
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
 
 
 def test_r_leaves_the_surface_as_it_has_turned_by_itself(bench):
@@ -268,7 +268,7 @@ def test_fixed_points_are_refused_with_advice(bench):
 
 def test_a_locked_point_stays_and_the_reason_is_said(bench):
     place, _ = bench.on()
-    (name,) = [bench.session.pin(bench.on()[1])]
+    (name,) = [bench.session.handles.pin(bench.on()[1])]
     bench.puller.is_locked = lambda each: each == name
     bench.hand.drag([place, place + [0, 30]])
     assert bench.puller.remark == f"{name} is locked. Clear Lock in the list of handles to move it"
@@ -277,12 +277,12 @@ def test_a_locked_point_stays_and_the_reason_is_said(bench):
     assert bench.session.state.pose is None
     bench.puller.is_locked = bench.puller.is_hidden = lambda _: False
     bench.hand.drag([place, place + [0, 30]])
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
 
 
 def test_a_hidden_point_is_not_drawn_and_the_surface_there_is_pulled(bench):
     place, vertex = bench.on()
-    name = bench.session.pin(vertex)
+    name = bench.session.handles.pin(vertex)
     View.render(bench.view)
     pinned = picture(bench.view)
     bench.puller.is_hidden = lambda each: each == name
@@ -290,7 +290,7 @@ def test_a_hidden_point_is_not_drawn_and_the_surface_there_is_pulled(bench):
     bench.hand.hover(place)
     assert bench.puller.marker_under_pointer() is None
     bench.hand.drag([place, place + [0, 30]])
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
 
 
 @pytest.mark.parametrize("released", [False, True])
@@ -309,7 +309,7 @@ def test_a_pull_before_the_cages_are_there_begins_as_soon_as_they_are(released):
     assert not bench.puller.waiting.is_active
     assert (bench.target - SCENE.mesh.vertices[vertex])[2] > 0.2
     bench.hand.release()
-    assert bench.session.undo_label == "pull"
+    assert bench.session.history.undo_label == "pull"
     assert bench.hand.failures == []
     bench.puller.remove()
 

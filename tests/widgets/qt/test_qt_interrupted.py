@@ -120,14 +120,14 @@ def test_undo_in_the_panel_reverts_the_drag_and_redo_restores_it(stand, during):
     assert stand.session.state is stand.start
     QtTest.QTest.mouseClick(panel.toolbar.buttons["redo"], Qt.LeftButton)
     stand.settle()
-    assert stand.session.undo_label == DRAG
+    assert stand.session.history.undo_label == DRAG
 
 
 @MOMENTS
 def test_a_job_started_by_the_host_finishes_the_drag_first(stand, during):
     place = dragged(stand, during=during)
     with stand.job() as delivered:
-        assert stand.session.undo_label == DRAG
+        assert stand.session.history.undo_label == DRAG
         pose = stand.session.state.pose
         stand.hand.move(place + [-40.0, -30.0])
         stand.hand.release(place)
@@ -242,7 +242,7 @@ def test_closing_a_widget_is_immediate_and_keeps_the_drag(another, moment):
     another.widget.close()
     assert not another.editor.is_busy
     assert not another.has_timers()
-    assert session.undo_label == DRAG
+    assert session.history.undo_label == DRAG
     assert not session.is_dragging
     assert abs(session.volume_change) < 1e-12
     session.undo()

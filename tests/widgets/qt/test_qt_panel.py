@@ -25,7 +25,7 @@ def widget(unprepared):
     application()
     mesh, state = small()
     session = Session(mesh, state=state)
-    session.pin(int(np.argmin(np.abs(mesh.vertices[:, 0]))))
+    session.handles.pin(int(np.argmin(np.abs(mesh.vertices[:, 0]))))
     widget = DeformWidget(session)
     widget.plotter.setUpdatesEnabled(False)  # the view is not tested, and slow to draw
     widget.resize(900, 900)
@@ -174,7 +174,7 @@ def test_a_control_that_the_editor_refuses_shows_the_value_again(widget):
     panel, editor = widget.panel, widget.editor
     editor.mode = Mode.CAGES
     settle(widget)
-    editor.session.merge_regions([0, 1])  # which removes the cages
+    editor.session.painting.merge([0, 1])  # which removes the cages
     panel.controls["cages.shown"].click()  # before the panel is refreshed
     settle(widget)
     assert not panel.controls["cages.shown"].isChecked()

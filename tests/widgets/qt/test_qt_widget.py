@@ -367,10 +367,10 @@ def test_a_tick_shows_one_cage_and_hides_it(seen):
 
 def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
     panel, session = seen.panel, seen.session
-    session.remove_handle(*session.handles)
+    session.handles.remove(*session.handles)
     seen.mode(Mode.PULL)
     assert not panel.boxes["handles"].isVisible()
-    session.pin(int(np.setdiff1d(np.arange(session.mesh.n_vertices), session.fixed)[0]))
+    session.handles.pin(int(np.setdiff1d(np.arange(session.mesh.n_vertices), session.fixed)[0]))
     seen.settle()
     seen.click_row(panel.controls["handles.list"], 0)
     assert panel.controls["handles.convert"].text() == "Make handle"
@@ -380,10 +380,10 @@ def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
     seen.click(panel.controls["handles.local_axes"])
     assert seen.editor.widgets.dragger.local
     assert not panel.controls["handles.pivot"].isEnabled()
-    session.set_pivot("handle 1", session.mesh.vertices[0])
+    session.handles.set_pivot("handle 1", session.mesh.vertices[0])
     seen.settle()
     seen.click(panel.controls["handles.pivot"])
-    assert session.undo_label == "reset the pivot of handle 1"
+    assert session.history.undo_label == "reset the pivot of handle 1"
     assert panel.controls["handles.convert"].text() == "Make pin"
     seen.click(panel.controls["handles.convert"])
     assert list(session.handles) == ["pin 1"]
@@ -409,7 +409,7 @@ def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
 
 
 def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
-    seen.session.rename_handle(next(iter(seen.session.handles)), "Fixed")
+    seen.session.handles.rename(next(iter(seen.session.handles)), "Fixed")
     seen.mode(Mode.HANDLES)
     tree, selector = seen.panel.controls["handles.list"], seen.editor.widgets.selector
     assert [name for name, *_ in rows(tree)][:2] == ["Fixed", "Fixed"]
@@ -585,7 +585,7 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     for height in (0.4, 0.2):
         bend(seen, height)
         poses.append(seen.session.vertices)
-    until(lambda: rows.count() == len(seen.session.history), "the second drag")
+    until(lambda: rows.count() == len(seen.session.history.labels), "the second drag")
     start = rows.count() - 3
 
     def place(row):
@@ -597,7 +597,7 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
 
     def looks(position, shown):
         seen.settle()
-        assert seen.session.position == start + position
+        assert seen.session.history.position == start + position
         assert_array_equal(surface().points, poses[shown])
         assert [rows.item(k).font().bold() for k in range(rows.count())].index(True) == (
             start + position
@@ -737,7 +737,7 @@ def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path)
     assert overlay().half_range == 0.5
     seen.type_number(part["deform.range"], 37.5)
     assert overlay().half_range == 0.375
-    assert seen.session.undo_label == "drag handle 1"  # the range is not an undo step
+    assert seen.session.history.undo_label == "drag handle 1"  # the range is not an undo step
     seen.editor.save(tmp_path / "a.segdeform")
     seen.editor.load(tmp_path / "a.segdeform")
     seen.settle()
@@ -780,11 +780,11 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert seen.sessions == [seen.session]
     assert seen.session is not before
     assert seen.session.regions.n_regions == len(rows(seen.panel.controls["regions.list"])) == 2
-    before.merge_regions([0, 1])  # the previous session is no longer observed
+    before.painting.merge([0, 1])  # the previous session is no longer observed
     assert seen.regions == []
-    seen.session.merge_regions([0, 1])
+    seen.session.painting.merge([0, 1])
     assert seen.regions == [seen.session.regions]
-    seen.session.remove_handle("handle 1")
+    seen.session.handles.remove("handle 1")
     seen.mode(Mode.HANDLES)
     assert len(seen.session.fixed) == int(rows(seen.panel.controls["handles.list"])[0][1]) > 0
 
@@ -836,7 +836,7 @@ def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypat
     seen = make(surface)
     seen.session.set_regions(state.regions)
     seen.session.set_cages(state.cages)
-    seen.session.add_handle(state.handle)
+    seen.session.handles.add(state.handle)
     bend(seen)
     now = seen.widget.deformed_polydata()
     assert_array_equal(now.points, seen.session.vertices)
@@ -881,7 +881,7 @@ def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, m
     session.set_regions(Regions.single(session.mesh))
     session.fit_cages()
     session.set_fixed(session.mesh.vertices[:, 2] < 0.3)
-    session.add_handle(session.mesh.vertices[:, 2] > 2.7)
+    session.handles.add(session.mesh.vertices[:, 2] > 2.7)
     up = np.eye(4)
     up[0, 3] = 0.2
     session.move_handle("handle 1", up)
@@ -945,7 +945,7 @@ def test_a_window_deleted_by_qt_releases_everything(state):
     window.deleteLater()
     delete_now()
     assert not editor.GetEnabled()
-    session.merge_regions([0, 1])  # no longer observed, and no error
+    session.painting.merge([0, 1])  # no longer observed, and no error
     application().processEvents()
 
 
@@ -962,7 +962,7 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     dock.deleteLater()
     delete_now()
     editor.mode = Mode.CAGES
-    editor.session.merge_regions([0, 1])
+    editor.session.painting.merge([0, 1])
     application().processEvents()
     assert editor.GetEnabled()
     assert failures == []

@@ -125,7 +125,7 @@ def test_a_stroke_is_previewed_and_escape_cancels_it(desk):
     desk.hand.key("Escape")
     desk.hand.release(desk.under(0.2, 0.6))
     assert desk.session.regions.membership is membership
-    assert not desk.session.can_undo or desk.session.undo_label == "set regions"
+    assert not desk.session.history.can_undo or desk.session.history.undo_label == "set regions"
     desk.hand.hover((5, 5))
     assert (picture(desk.view) == idle).all()
 
@@ -266,7 +266,7 @@ def test_vertices_of_no_other_region_cannot_be_erased(
 
 
 def test_a_region_cannot_be_emptied(desk):
-    desk.session.paint_region(1, desk.points[:, 2] < np.inf)  # contains all of region 0
+    desk.session.painting.paint(1, desk.points[:, 2] < np.inf)  # contains all of region 0
     desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
     regions = desk.session.regions
     desk.hand.drag([(2, 2), (398, 398)], control=True)
@@ -371,11 +371,11 @@ def test_the_preview_shows_only_vertices_that_will_change(desk):
 
 def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    label = desk.session.undo_label
+    label = desk.session.history.undo_label
     desk.hand.drag([(2, 2), (30, 30)])
     desk.hand.drag([(2, 2), (30, 30)], control=True)
     desk.hand.drag([desk.under(-0.2, -0.2), desk.under(0.2, 0.2)], control=True)
-    assert desk.session.undo_label == label
+    assert desk.session.history.undo_label == label
 
 
 def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk):
@@ -401,7 +401,7 @@ def test_painting_a_handle_keeps_the_pose_and_painting_a_region_resets_it():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     selector = RegionSelector(view, session)
     view.camera.SetPosition(0.0, -9.0, 1.0)
     view.camera.SetViewUp(0.0, 0.0, 1.0)
@@ -514,7 +514,7 @@ def test_fixed_vertices_are_grey_handles_red_and_overlaps_mixed(desk):
     assert np.abs(upper - lower).max() > 0.3
     assert np.abs(between - (upper + lower) / 2 / ((upper + lower) / 2).max()).max() < 0.25
     desk.session.set_fixed(desk.points[:, 2] < -0.7)
-    desk.session.add_handle(desk.points[:, 2] > 0.7)
+    desk.session.handles.add(desk.points[:, 2] > 0.7)
     for (x, z), name in (((0.0, -0.85), FIXED), ((0.0, 0.85), HANDLE)):
         wanted = rgb(name) / rgb(name).max()
         assert np.abs(colour(x, z) - wanted).max() < 0.12
@@ -559,7 +559,7 @@ def targets(desk):
 
 def test_all_none_and_invert_skip_what_is_taken_and_are_single_undo_steps(desk):
     selector, session, z = desk.selector, desk.session, desk.points[:, 2]
-    session.add_handle(z > 0.5, "tip")
+    session.handles.add(z > 0.5, "tip")
     selector.paints = Paint.FIXED
     selector.select_all()
     assert selector.remark == f"{(z > 0.5).sum()} vertices skipped: already fixed or in a handle"

@@ -68,12 +68,12 @@ class Bench:
     def require_works(self) -> None:
         """Assert that a drag works and can be undone, and that no gesture is running."""
         session, before = self.session, self.session.vertices
-        step, camera = session.undo_label, self.view.camera.GetPosition()
+        step, camera = session.history.undo_label, self.view.camera.GetPosition()
         assert not session.is_dragging
         assert not any(widget.is_grabbing for widget in self.widgets.interactive)
         self.hand.failures.clear()
         self.drags()
-        assert session.undo_label == f"drag {NAME}"
+        assert session.history.undo_label == f"drag {NAME}"
         assert np.abs(session.vertices - before).max() > 0.01
         faces, rest = session.mesh.faces, session.mesh.vertices
         change = signed_volume(session.vertices, faces) / signed_volume(rest, faces) - 1.0
@@ -81,7 +81,7 @@ class Bench:
         self.require_seen()
         self.hand.key("z", control=True)
         assert np.array_equal(session.vertices, before)
-        assert session.undo_label == step
+        assert session.history.undo_label == step
         self.require_seen()
         self.hand.move((10, 10))
         assert self.view.camera.GetPosition() == camera
@@ -157,7 +157,7 @@ def raises_in_a_drag(bench, place, moment=None) -> bool:
     finally:
         stop()
         draw_seldom(bench.view)
-    if bench.session.undo_label == f"drag {NAME}":  # committed before the callback raised
+    if bench.session.history.undo_label == f"drag {NAME}":  # committed before the callback raised
         bench.session.undo()
     bench.require_works()
     return has_raised

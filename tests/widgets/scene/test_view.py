@@ -322,7 +322,7 @@ def test_the_surface_follows_the_pose_in_place():
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     surface = SurfaceDisplay(view, session)
     before, memory = picture(view), surface.points
     session.drag(scene.turned(30.0), max_steps=5)

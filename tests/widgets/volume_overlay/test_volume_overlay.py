@@ -44,7 +44,7 @@ def session_of(n_regions: int, *, is_coarse: bool = True) -> Session:
     session.set_regions(scene.regions)
     session.set_cages(scene.cages)
     session.set_fixed(scene.fixed)
-    session.add_handle(scene.handle)
+    session.handles.add(scene.handle)
     session.change_options(preserve_volume=False)
     return session
 
@@ -278,9 +278,9 @@ def test_the_line_of_a_region_has_its_colour(overlay):
         style = lines[f"region {region + 1}: 0 %"]
         assert np.allclose(style.GetBackgroundColor(), of_region(region) / 255.0)
         assert style.GetBackgroundOpacity() == 1.0
-    overlay.session.merge_regions([0, 1])
+    overlay.session.painting.merge([0, 1])
     assert len(lines_of(overlay)) == 4
-    overlay.session.merge_regions([0, 1])
+    overlay.session.painting.merge([0, 1])
     assert len(lines_of(overlay)) == 2  # a single region has no line
 
 
@@ -395,7 +395,7 @@ def test_of_more_than_eight_regions_the_rest_is_counted():
     overlay.show()
     regions = [f"region {r}: 0 %" for r in range(1, 9)]
     assert lines_of(overlay)[2:] == [*regions, "2 more regions"]
-    session.merge_regions([0, 1])
+    session.painting.merge([0, 1])
     assert lines_of(overlay)[-1] == "1 more region"
     overlay.remove()
 
@@ -425,7 +425,7 @@ def overlay_of(mesh):
     session = Session(mesh)
     z = mesh.vertices[:, 2]
     session.set_fixed(z <= z.min() + 1e-9)
-    session.add_handle(z >= z.max() - 1e-9, "end")
+    session.handles.add(z >= z.max() - 1e-9, "end")
     session.segment(2)
     session.change_options(n_cage_vertices=40)
     session.fit_cages()

@@ -37,7 +37,7 @@ pytestmark = [
 ]
 _SHORT = [
     "import vtk_segdeform as sd\nmesh = sd.models.cactus()\neditor = sd.edit(mesh)\neditor",
-    "editor.session.position",
+    "editor.session.history.position",
     "editor.session.volume_change",
     "float(abs(editor.mesh.vertices - mesh.vertices).max() / mesh.diagonal)",
     "editor.session.regions.n_regions",

@@ -81,14 +81,14 @@ def test_a_pull_in_the_page_is_there_in_the_next_cell(cells: Kernel, browser: Ch
     cells.run("preparing.lacking = prepare")
     cells.run("pulled = sd.edit(mesh)")
     cells.wait("pulled.web.server.running")
-    before = cells.value("pulled.session.position")
+    before = cells.value("pulled.session.history.position")
     page = browser.page(cells.value("pulled.address").strip("'"), size=(700, 480))
     page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
     cells.wait("not (pulled.web.editor.is_busy or pulled.web.editor.is_preparing)")
     left, top, width, height = page.box(".sd-canvas")
     start = left + 0.5 * width, top + 0.5 * height
     page.drag(line(start, (start[0] + 90, start[1] - 30), 8), pause=0.02)
-    cells.wait(f"pulled.session.position > {before}")
+    cells.wait(f"pulled.session.history.position > {before}")
     assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
     page.close()
     assert abs(float(cells.value("pulled.session.volume_change"))) < 1e-12
@@ -149,7 +149,7 @@ def test_a_page_cannot_end_its_server_and_the_end_of_that_does_not_end_the_kerne
     cells.run("await editor.web.server.stop()")
     cells.wait("not editor.is_live")
     assert status(address) is None
-    assert cells.value("editor.session.position") == "0"
+    assert cells.value("editor.session.history.position") == "0"
     assert "This editor is closed." in cells.html("editor")
 
 
@@ -198,4 +198,4 @@ def test_without_trame_one_sentence_says_what_to_install(cells: Kernel) -> None:
     assert "pip install &#x27;vtk-segdeform[jupyter]&#x27;" in html
     assert html.count("<p>") == 1
     assert "<img" in html
-    assert cells.value("e.session.position, e.is_live") == "(0, False)"
+    assert cells.value("e.session.history.position, e.is_live") == "(0, False)"

@@ -150,11 +150,11 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     page.release(end)
     drawn.rest()
     assert drawn.renders == 0
-    assert session.position == 1
+    assert session.history.position == 1
     assert abs(session.volume_change) < 1e-12
     assert overlap(held, drawn.body()) > 0.99
     page.key("z")
-    drawn.served.wait(lambda: session.position == 0)
+    drawn.served.wait(lambda: session.history.position == 0)
     drawn.rest()
     assert overlap(before, drawn.body()) > 0.99
 
@@ -248,7 +248,7 @@ def test_when_the_page_cannot_draw_the_server_does(drawn: Drawn, cause: str) -> 
     drawn.hold((end[0] + 15.0, end[1]))
     page.release((end[0] + 15.0, end[1]))
     drawn.rest()
-    assert drawn.web.session.position == 1
+    assert drawn.web.session.history.position == 1
     page.evaluate("memory.restoreContext()" if cause == "lost" else "location.reload()")
     drawn.await_surface()
     page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
@@ -318,7 +318,7 @@ def test_slow_software_draws_a_quarter_of_the_pixels_in_the_same_place(drawn: Dr
     assert drawn.renders == 0
     assert overlap(held, drawn.body()) > 0.97
     page.key("z")
-    drawn.served.wait(lambda: session.position == 0)
+    drawn.served.wait(lambda: session.history.position == 0)
     end = drawn.drag((70.0, 20.0))  # whose first picture is cut out of the server's
     drawn.hold(end)
     assert overlap(held, drawn.body()) > 0.97

@@ -155,7 +155,7 @@ def test_a_download_waits_until_the_pose_has_settled(web, tmp_path):
     session.commit()
     editor.mode = Mode.REGIONS
     editor.mode = Mode.PULL  # which refines the pose
-    assert editor.controller.settling.is_active
+    assert editor.widgets.is_settling
 
     async def downloaded():
         request = SimpleNamespace(match_info={"suffix": "segdeform"}, headers={"X-Segdeform": "1"})

@@ -63,7 +63,7 @@ def tell(served: Served, page: Any) -> None:
     def rest(position: int) -> None:
         finishing = web.editor.controller.finishing
         served.wait(
-            lambda: web.session.position == position and served.is_at_rest
+            lambda: web.session.history.position == position and served.is_at_rest
             and not finishing.is_pending
         )  # fmt: skip
 

@@ -111,7 +111,7 @@ def _step_by_step(
 ) -> None:
     """Undo or redo with the key and with the button in turn, one step each."""
     session, seen = served.web.session, list[int]()
-    stop = served.call(lambda: session.on_change(lambda _: seen.append(session.position)))
+    stop = served.call(lambda: session.on_change(lambda _: seen.append(session.history.position)))
     for turn, position in enumerate(positions):
         seen.clear()
         if turn % 2:
@@ -140,7 +140,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
     served.call(lambda: session.on_change(notice))
     start = served.seen(page, _top(served))
     page.drag(line(start, (start[0] + 60, start[1] + 15), 8), pause=0.02)
-    served.wait(lambda: session.undo_label == "pull" and served.is_at_rest)
+    served.wait(lambda: session.history.undo_label == "pull" and served.is_at_rest)
     assert np.abs(session.vertices - rest).max() > 0.03 * session.mesh.diagonal
     assert len(changes) > 2
 
@@ -165,7 +165,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
     page.key("4")
     served.wait(lambda: editor.mode is Mode.DEFORM and served.is_at_rest)
     for turns in (False, True):
-        steps = session.position
+        steps = session.history.position
         gizmo = served.call(lambda: editor.widgets.dragger.gizmo.centre)
         start = served.seen(page, np.asarray(gizmo))
         page.drag(line(start, (start[0] + 30, start[1]), 5), pause=0.02, release=False)
@@ -173,11 +173,11 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
             page.key("r")
             page.move((start[0] + 45, start[1] + 5))
         page.release((start[0] + 45, start[1] + 5))
-        served.wait(lambda steps=steps: session.position == steps + 1 and served.is_at_rest)
+        served.wait(lambda steps=steps: session.history.position == steps + 1 and served.is_at_rest)
     assert np.abs(changes).max() < 1e-12
 
     served.wait(lambda: not editor.controller.finishing.is_pending)  # which changes the last step
-    posed, steps = session.vertices, session.position
+    posed, steps = session.vertices, session.history.position
     _step_by_step(served, page, range(steps - 1, -1, -1), "z", "undo")
     np.testing.assert_array_equal(session.vertices, rest)
     _step_by_step(served, page, range(1, steps + 1), "y", "redo")
@@ -248,13 +248,13 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     surface = web.editor.widgets.surface
     start = served.seen(page, _top(served))
     page.drag(line(start, (start[0] + 60, start[1]), 5), pause=0.02)
-    served.wait(lambda: web.session.position == 1 and served.is_at_rest)
+    served.wait(lambda: web.session.history.position == 1 and served.is_at_rest)
     page.wait("document.querySelectorAll('.sd-history .sd-row').length == 2")
     page.move(page.centre(".sd-history .sd-row"))
     served.wait(lambda: web.editor.widgets.surface.instead is not None)
     page.move(start)
     served.wait(lambda: web.editor.widgets.surface.instead is None)
-    assert web.session.position == 1
+    assert web.session.history.position == 1
 
     page.key("F6")
     page.wait("document.activeElement.dataset.name == 'open'")
@@ -266,7 +266,7 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     page.key("Escape")
     page.wait("!document.querySelector('.sd-help')")
     served.wait(lambda: not len(web.stream.inputs))
-    assert web.session.position == 1
+    assert web.session.history.position == 1
     page.evaluate("document.activeElement.blur()")
     page.key("Tab")
     page.wait("document.activeElement != document.body")
@@ -288,14 +288,14 @@ def test_one_finger_pulls_and_two_turn(
     for shift in (15, 30, 45):
         page.touch("touchMove", [(x + shift, y)])
     page.touch("touchEnd")
-    served.wait(lambda: web.session.position == 1)
+    served.wait(lambda: web.session.history.position == 1)
     assert camera.position == where
     page.touch("touchStart", [(x, y), (x - 60, y)])
     for shift in (15, 30, 45):
         page.touch("touchMove", [(x + shift, y), (x - 60 + shift, y)])
     page.touch("touchEnd")
     served.wait(lambda: camera.position != where)
-    assert web.session.position == 1
+    assert web.session.history.position == 1
     page.close()
 
 

@@ -29,7 +29,9 @@ from ..arrays import FloatArray, IntArray, frozen, plain
 from ..deformer import (
     SPREAD,
     Deformer,
+    checked_place,
     checked_point,
+    checked_radius,
     checked_vertex,
     fault_of_grab,
     reach_and_follows,
@@ -59,7 +61,7 @@ class Grip(NamedTuple):
     radius: float
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
-    """0 to 1; None is `automatic_locality`."""
+    """0 to 1; None is `locality_of`."""
     turns: bool
     """Whether a patch around the point turns with the motion, which a single vertex cannot."""
 
@@ -104,18 +106,23 @@ class Grasp:
         return MappingProxyType({self.name: own, **more})
 
 
-def automatic_locality(state: State) -> float:
-    """Return the locality of a pull if none is given, by fixed vertices, pins and other handles."""
+def locality_of(state: State, locality: float | None = None) -> float:
+    """Return *locality*, or for None that by fixed vertices, pins and other handles."""
+    if locality is not None:
+        return locality
     others = (ids for name, ids in state.handles.items() if name not in state.pulls)
     return deformer.automatic_locality(len(state.fixed) + sum(map(len, others)))
 
 
-def grabbed(mesh: Mesh, state: State, point: SurfacePoint, radius: float) -> str | None:
-    """Return the handle that a pull of *point* moves; None if it makes a new one.
+def grabbed(
+    mesh: Mesh, state: State, vertex: int | ArrayLike | SurfacePoint, radius: float | None = None
+) -> str | None:
+    """Return the handle that `Session.pull` of a point would move; None if it makes a new one.
 
     It has the vertex of that point, or else is the nearest pulled point within a quarter of the
     *radius*.
     """
+    point, radius = checked_place(mesh, vertex), checked_radius(mesh, radius)
     x = mesh.vertices
     near = []
     for name, ids in state.handles.items():
@@ -125,6 +132,13 @@ def grabbed(mesh: Mesh, state: State, point: SurfacePoint, radius: float) -> str
         if name in state.pulls and away < _SAME_POINT * radius:
             near.append((away, name))
     return min(near, key=lambda each: each[0])[1] if near else None
+
+
+def can_grab(
+    mesh: Mesh, vertex: int | ArrayLike | SurfacePoint, radius: float | None = None
+) -> bool:
+    """Return whether a vertex is so near that `Session.pull` can grab the surface there."""
+    return not fault_of_grab(mesh, checked_place(mesh, vertex), checked_radius(mesh, radius))
 
 
 def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
@@ -144,8 +158,7 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         for name, ids in state.handles.items()
     }
     name = grabbed(mesh, state, point, radius)
-    if locality is None:
-        locality = automatic_locality(state)
+    locality = locality_of(state, locality)
     handles = state.handles
     if name is None:
         name = _new_name(state, "pull")
@@ -192,6 +205,14 @@ def released(state: State, vertices: FloatArray) -> State:
     }
     pose = replace(pose, targets=MappingProxyType({**pose.targets, **own})) if own else pose
     return replace(state, pose=pose, locality=None)
+
+
+def last_pulled(mesh: Mesh, state: State) -> str | None:
+    """Return the handle of the last pull; None if the pose does not come from a pull."""
+    locality = state.locality
+    if locality is None:
+        return None
+    return grabbed(mesh, state, locality.point, locality.spread / SPREAD)
 
 
 def turned(grasp: Grasp, mesh: Mesh, before: FloatArray, now: FloatArray) -> FloatArray:

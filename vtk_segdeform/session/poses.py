@@ -1,0 +1,318 @@
+"""Everything that is computed from states: one cache, by its frozen inputs.
+
+    regions, cages, options of binding       ->  a bound `Deformer`; takes seconds
+    + fixed vertices, handles, volumes       ->  a constrained deformer; milliseconds
+    + locality of a pull                     ->  a local one
+    + pose                                   ->  `Path`, from where the next solve continues
+    regions, cages of a pose                 ->  W~ p, always the same product
+
+Nothing in it is ever changed: a solve continues with a copy of a deformer, so one that fails or is
+cancelled leaves everything as it was.
+
+The vertices of a pose do not depend on how it was reached: after undo, redo or loading they are
+bitwise identical.  Only the frames of a drag of a large mesh show those of the solution, which
+differ from W~ p by rounding, so that each frame maps the mesh once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import sizes
+from ..arrays import FloatArray, frozen
+from ..deformer import Deformer
+from ..errors import CageError
+from ..files import cache_folder
+from ..geometry import Lids, lids_of
+from ..mesh import Mesh
+from ..progress import Progress, part, tell
+from ..solver import Solution, VolumeConstraint, total_volume
+from . import pulls
+from .handles import stacked
+from .memo import Memo
+from .state import Cages, Pose, State
+
+_MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
+_MAX_ROTATIONS = 3  # of the finished pose, the last one and the next
+_MAX_SURFACES = 2  # of the pose that is shown, and of another one
+_BIND_SHARE = 0.95  # share of binding in the progress of `prepare`; the rest adds constraints
+_VOLUME_TOLERANCE = 1e-9  # relative; a pose with a larger error does not meet a new constraint
+
+
+class Shown(NamedTuple):
+    """The mesh in a pose."""
+
+    vertices: FloatArray
+    """(n, 3) float, read-only."""
+    volume_change: Callable[[], float]
+    """Returns (V - V0) / V0, signed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """The targets of handles in a finished pose, and the shift that the cages must leave out.
+
+    The shift of a handle rotates with the surface around it, and this rotation depends on the
+    shift: repeated solves need not converge, and can alternate between three poses for ever.  So
+    after a few solves the mean of their shifts is used (Mann 1953), and finally kept.
+    """
+
+    wanted: FloatArray  # (k, 3), the targets
+    shift: FloatArray  # (k, 3), subtracted from the targets of the cages
+    turns: int = 1
+
+    TURNS = 3  # solves in which the shifts turn with the surface, at most
+    LIVE_TURNS = 12  # the same of live solves for the same targets
+
+    def turned(self, wanted: FloatArray, shift: FloatArray) -> Aim:
+        """Return the aim of the next solve, with the *shift* that the last pose has."""
+        if not np.array_equal(wanted, self.wanted):
+            return Aim(wanted, shift)
+        if self.turns >= self.LIVE_TURNS:
+            return self
+        share = 1.0 / max(1, self.turns - self.TURNS + 2)
+        return Aim(wanted, self.shift + share * (shift - self.shift), self.turns + 1)
+
+
+class Path(NamedTuple):
+    """From where a solve continues."""
+
+    held: Deformer
+    """With the constraints, in any pose."""
+    deformer: Deformer
+    """The same in the pose, with what the last solve has learned; solve with copies of it."""
+    aim: Aim | None = None
+    """Of a pose dragged on from a finished one, after its solve."""
+
+
+class Poses:
+    """The surfaces and deformers of the states of one mesh; cached.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        n vertices.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self.memo = Memo()
+
+    # Deformers.
+
+    def is_bound(self, state: State) -> bool:
+        """Return whether the cages of *state* are bound, so that `bind` returns at once."""
+        return self.memo.find("bound", _binding(state)) is not None
+
+    def bind(self, state: State, progress: Progress | None = None) -> Deformer:
+        """Return a deformer for the cages of *state* without constraints; bind it if necessary.
+
+        Raises
+        ------
+        CageError
+            If there are no cages, or they do not fit.
+        """
+
+        def bound() -> Deformer:
+            if state.regions is None or not state.cages:
+                raise CageError("there are no cages to deform with; fit or set cages first")
+            return Deformer(
+                self.mesh,
+                state.regions,
+                state.cages,
+                stretch=state.options.stretch,
+                rotation_groups=state.options.rotation_groups,
+                cache=cache_folder() if self.mesh.n_vertices >= sizes.CACHED_BINDING else None,
+                progress=progress,
+            )
+
+        return self.memo.get("bound", _binding(state), bound, _MAX_BOUND)
+
+    def adopt(self, state: State, deformer: Deformer) -> None:
+        """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
+        self.memo.keep("bound", _binding(state), deformer, _MAX_BOUND)
+
+    def prepare(self, state: State, progress: Progress | None = None) -> None:
+        """Bind, and constrain the fixed vertices and handles of *state* if there are any."""
+        self.bind(state, part(progress, 0.0, _BIND_SHARE))
+        if len(state.fixed) or state.handles:
+            self.constrained(state)
+        tell(progress, 1.0, "ready")
+
+    def constrained(self, state: State) -> Deformer:
+        """Return a deformer with the fixed vertices, handles and volumes of *state*, at rest."""
+        places, shift = state.fixed_at, self.shift(state)
+        key: object = places
+        if shift is not None and shift[state.fixed].any():
+            places = self.fixed_places(state) - shift[state.fixed]
+            key = places.tobytes()  # as it is a new array each time
+        held = tuple(state.handles.values())
+        inputs = self.bind(state), state.fixed, key, held, *_volumes(state).values()
+        return self.memo.get("held", inputs, partial(self.held, state, places))
+
+    def held(self, state: State, fixed_at: FloatArray | None) -> Deformer:
+        """Return a deformer with the constraints of *state*, its fixed vertices at *fixed_at*."""
+        return self.bind(state).hold(
+            fixed=state.fixed, handle=state.handle, fixed_at=fixed_at, **_volumes(state)
+        )
+
+    def path(self, state: State) -> Path:
+        """Return the path to the pose of *state*, by resuming the pose if it is not known."""
+        held, pose = self._local(state), state.pose
+        known: Path | None = self.memo.find("path", (held, pose))
+        if known is not None:
+            return known
+        deformer = held.copy()
+        deformer.reset()
+        # Every step of the solver meets the constraints, so its starting pose must do so too.
+        if pose is not None and self._meets_constraints(state, pose, held):
+            places, shift = stacked(pose.targets), self.shift(state)
+            places = places if shift is None else places - shift[held.handle]
+            deformer.resume(pose.cage_vertices, places)
+        return Path(held, deformer)
+
+    def keep_path(self, pose: Pose, path: Path) -> None:
+        """Let the next solve from *pose* with the same constraints continue with *path*."""
+        self.memo.keep("path", (path.held, pose), path)
+
+    def continue_from(self, pose: Pose, state: State) -> None:
+        """Let the next solve from *pose*, which has the cages of *state*, continue as from that."""
+        path: Path | None = self.memo.find("path", (self._local(state), state.pose))
+        if path is not None:
+            self.keep_path(pose, path)
+
+    def solution(self, state: State) -> Solution | None:
+        """Return the solver's result for the pose of *state*; None if another one came since."""
+        found: Solution | None = self.memo.find("solution", (state.pose,))
+        return found
+
+    def keep_solution(self, pose: Pose, solution: Solution) -> None:
+        """Keep the *solution* of a pose until that of the next one."""
+        self.memo.keep("solution", (pose,), solution)
+
+    def start_afresh(self) -> None:
+        """Make the next solve bitwise reproducible, as in a session that was just loaded.
+
+        Otherwise, the solver reuses information from previous solves.
+        """
+        self.memo.drop("path")
+
+    def _local(self, state: State) -> Deformer:
+        """Return `constrained`, local if the pose comes from a pull."""
+        held, locality = self.constrained(state), state.locality
+        if locality is None:
+            return held
+
+        def local() -> Deformer:
+            return pulls.localised(held, locality, self.surface(state, locality.cage_vertices))
+
+        return self.memo.get("local", (held, locality), local)
+
+    def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
+        x = self.surface(state, pose.cage_vertices)
+        return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
+
+    # Surfaces.
+
+    def shown(self, state: State, *, live: bool = False) -> Shown:
+        """Return the mesh in the pose of *state*; if *live*, as in the frames of a drag."""
+        pose = state.pose
+        if pose is None:
+            return Shown(self.mesh.vertices, float)
+        inputs = pose.cage_vertices, pose.finished, state.regions, state.cages, state.options.lids
+        known: Shown | None = self.memo.find("live", inputs) if live else None
+        return known or self.memo.get("shown", inputs, lambda: self._measured(state, pose))
+
+    def keep_live(self, state: State, shown: Shown) -> None:
+        """Let the frames of a drag show the pose of *state* like this; of a pose not finished."""
+        pose = state.pose
+        assert pose is not None
+        inputs = pose.cage_vertices, None, state.regions, state.cages, state.options.lids
+        self.memo.keep("live", inputs, shown)
+
+    def _measured(self, state: State, pose: Pose) -> Shown:
+        own = pose.finished
+        x = self.surface(state, pose.cage_vertices) if own is None else own.vertices
+        _, volume = self.enclosed(state)
+        return Shown(x, cache(partial(volume.relative, x)))
+
+    def vertices(self, state: State, *, live: bool = False) -> FloatArray:
+        """Return the vertices (n, 3) of `shown`, read-only."""
+        return self.shown(state, live=live).vertices
+
+    def peek(self, state: State) -> FloatArray | None:
+        """Return `vertices` of a state that is not shown; None if its cages are not bound."""
+        pose = state.pose
+        if pose is None:
+            return self.mesh.vertices
+        if pose.finished is not None:
+            return pose.finished.vertices
+        if not self.is_bound(state):
+            return None
+        inputs = state.regions, state.cages, pose.cage_vertices
+        known: FloatArray | None = self.memo.find("surface", inputs)
+        return self._mapped(state, pose.cage_vertices) if known is None else known
+
+    def surface(self, state: State, cages: Cages) -> FloatArray:
+        """Return W~ p, (n, 3) float, read-only; *cages* are p."""
+        mapped = partial(self._mapped, state, cages)
+        return self.memo.get("surface", (state.regions, state.cages, cages), mapped, _MAX_SURFACES)
+
+    def _mapped(self, state: State, cages: Cages) -> FloatArray:
+        x = self.bind(state).surface(cages)
+        frozen(x)
+        return x
+
+    def rotations(self, state: State, cages: Cages) -> FloatArray:
+        """Return `Deformer.rotations`, (n, 3, 3) float."""
+        rotations = partial(self.bind(state).rotations, cages)
+        return self.memo.get("rotations", (state.regions, cages), rotations, _MAX_ROTATIONS)
+
+    def shift(self, state: State) -> FloatArray | None:
+        """Return `Finished.shifted` (n, 3) of the pose; None if it is not finished."""
+        pose = state.pose
+        if pose is None or pose.finished is None:
+            return None
+        return pose.finished.shifted(self.surface(state, pose.cage_vertices))
+
+    def fixed_places(self, state: State) -> FloatArray:
+        """Return where the fixed vertices stay, (f, 3)."""
+        return self.mesh.vertices[state.fixed] if state.fixed_at is None else state.fixed_at
+
+    def carry(self, state: State, points: ArrayLike) -> FloatArray:
+        """Return *points* (k, 3), given at rest, moved along with the mesh to the pose."""
+        return self.bind(state).passengers(points).moved(state.cage_vertices)
+
+    # Volumes.
+
+    def lids(self, state: State) -> Lids:
+        """Return the lids of the mesh with the option of *state*."""
+        return self.enclosed(state)[0]
+
+    def enclosed(self, state: State) -> tuple[Lids, VolumeConstraint]:
+        """Return the lids and the total volume with the option of *state*."""
+        wanted = state.options.lids
+
+        def enclosed() -> tuple[Lids, VolumeConstraint]:
+            lids = lids_of(self.mesh, wanted)
+            return lids, total_volume(self.mesh, lids)
+
+        return self.memo.get("enclosed", (wanted,), enclosed, most=3)  # None, True, False
+
+
+def _binding(state: State) -> tuple[Any, ...]:
+    """Return the inputs of a bound deformer."""
+    options = state.options
+    return state.regions, state.cages, options.stretch, options.rotation_groups
+
+
+def _volumes(state: State) -> dict[str, Any]:
+    """Return the options of *state* for `Deformer.hold`."""
+    names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
+    return {name: getattr(state.options, name) for name in names}

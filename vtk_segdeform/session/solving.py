@@ -1,0 +1,146 @@
+"""The next pose of a state: solved for, or with cages that were moved by hand.
+
+Poses dragged on from a finished one are solved for as in `finishing`: the cages for the places of
+handles and fixed vertices less the shifts in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from types import MappingProxyType
+
+import numpy as np
+
+from .. import sizes
+from ..arrays import FloatArray, frozen
+from ..errors import ConstraintError
+from ..geometry import volume_gradient
+from ..progress import Progress
+from ..solver import Solution
+from .finishing import errors, moved_on
+from .handles import require_near, stacked, targets_at
+from .poses import Aim, Path, Poses, Shown
+from .state import Cages, Pose, State
+
+_CARRIED = 4000  # about as many vertices, at most, to which cages are carried
+_HELD, _DAMPING = 30.0, 1e-6  # weights of fixed vertices and handles, and of cages at rest
+
+
+def solve(
+    poses: Poses,
+    state: State,
+    targets: Mapping[str, FloatArray],
+    max_steps: int | None = None,
+    *,
+    live: bool = False,
+    progress: Progress | None = None,
+) -> tuple[Pose, Solution]:
+    """Solve for *targets* (k, 3) of every handle, starting from the pose of *state*.
+
+    If *live*, `Poses.shown` of a large mesh may be the vertices of the solution.
+
+    Raises
+    ------
+    CageError
+        If *state* has no cages, or they do not fit.
+    ConstraintError
+        If no finite pose is found.
+    Cancelled
+        If *progress* raised it.
+    """
+    held, deformer, aim = poses.path(state)
+    deformer = deformer.copy()
+    before, shift, wanted = state.pose, poses.shift(state), stacked(targets)
+    for _ in range(1 if shift is None or max_steps is not None else Aim.TURNS):
+        places = wanted
+        if shift is not None:
+            own = shift[deformer.handle]
+            aim = Aim(wanted, own) if aim is None else aim.turned(wanted, own)
+            places = wanted - aim.shift
+        solution = deformer.solve(places, max_steps=max_steps, progress=progress)
+        if not np.isfinite(solution.vertices).all():
+            raise ConstraintError("no finite pose for these targets; move the handles less")
+        cages, finished = solution.cage_vertices, None if before is None else before.finished
+        for vertices in cages:
+            frozen(vertices)
+        if before is not None and all(map(np.array_equal, cages, before.cage_vertices)):
+            cages = before.cage_vertices  # so that their vertices are known
+        elif finished is not None:
+            finished = moved_on(poses, state, cages)
+        if shift is None or finished is None:
+            break
+        # The offset of a handle may have turned with it: then its cages have another target.
+        last, shift = shift, finished.shifted(poses.surface(state, cages))
+        if np.array_equal(shift[deformer.handle], last[deformer.handle]):
+            break
+    pose = Pose(cages, MappingProxyType({**targets}), finished)
+    after = replace(state, pose=pose)
+    is_large = poses.mesh.n_vertices > sizes.SCALED_VOLUME
+    if live and is_large and finished is None and cages is solution.cage_vertices:
+        frozen(solution.vertices)
+        poses.keep_live(after, Shown(solution.vertices, cache(solution.volume)))
+    x, change = poses.shown(after, live=live)
+    poses.keep_path(pose, Path(held, deformer, aim))
+    solution = replace(solution, vertices=x, volume=change)
+    if shift is not None:
+        solution = replace(solution, errors=errors(poses, state, deformer, wanted))
+    return pose, solution
+
+
+def free_form(poses: Poses, state: State, cage_vertices: Sequence[FloatArray]) -> Pose:
+    """Return the pose with the given *cage_vertices* (m_r, 3), corrected to preserve volume.
+
+    If the options preserve volume, all cages move along the gradients of their own volumes until
+    the mesh has its rest volume.  The targets of handles become their positions.
+
+    Raises
+    ------
+    ConstraintError
+        If the correction moves the cages too far away.
+    """
+    p, before = tuple(cage_vertices), state.pose
+    if state.options.preserve_volume or state.options.preserve_region_volumes:
+        p = _with_rest_volume(poses, state, p)
+    for vertices in p:
+        frozen(vertices)
+    has_finished = before is not None and before.finished is not None
+    pose = Pose(p, MappingProxyType({}), moved_on(poses, state, p) if has_finished else None)
+    x = poses.vertices(replace(state, pose=pose))
+    return replace(pose, targets=targets_at(state.handles, x))
+
+
+def _with_rest_volume(poses: Poses, state: State, cage_vertices: Cages) -> Cages:
+    _, volume = poses.enclosed(state)
+    if not volume.has_volume:
+        return cage_vertices
+    pairs = zip(cage_vertices, state.cages, strict=True)
+    outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
+    outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
+    deformer = poses.bind(state)
+    path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
+    p = np.concatenate(cage_vertices) + volume.exact_step(path) * outward
+    require_near(poses.mesh, p, "cage vertices that preserve the volume")
+    return tuple(p[columns] for columns in deformer.subspace.columns)
+
+
+def carried(poses: Poses, state: State, x: FloatArray, progress: Progress | None = None) -> Cages:
+    """Return the cage vertices (m_r, 3) of *state* whose mesh is nearest to *x* (n, 3).
+
+    In the sense of least squares over some thousand vertices, of which fixed ones and handles count
+    most.  It binds *state*, and may run in another thread, as `Poses.bind`.
+    """
+    deformer, mesh = poses.bind(state, progress), poses.mesh
+    held = np.concatenate([state.fixed, state.handle])
+    every = np.arange(mesh.n_vertices)
+    some = [each[:: max(1, len(each) // _CARRIED)] for each in (every, held)]
+    ids, counts = np.concatenate(some), [len(each) for each in some]
+    weights = np.repeat([1.0, _HELD], counts)[:, None]
+    rows = weights * deformer.subspace.at(ids)
+    moved = rows.T @ (weights * (x - mesh.vertices)[ids])
+    normal = rows.T @ rows
+    normal[np.diag_indices_from(normal)] += _DAMPING * np.trace(normal) / len(normal)
+    rest = np.concatenate([cage.vertices for cage in state.cages])
+    p = rest + np.linalg.solve(normal, moved)
+    return tuple(p[columns] for columns in deformer.subspace.columns)
