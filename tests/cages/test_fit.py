@@ -375,7 +375,7 @@ def test_numbers_of_vertices_grow_with_the_root_of_the_area_and_are_equal_for_eq
     numbers = fit._distributed(patches, 800, None)
     assert numbers.sum() == 800
     assert numbers[0] == numbers[1]
-    assert_allclose((numbers - 8) / (numbers[0] - 8), radii, rtol=0.01)
+    assert_allclose((numbers - 12) / (numbers[0] - 12), radii, rtol=0.01)
     assert_array_equal(fit._distributed(patches, 8 * 4, None), [8] * 4)
     spacing = np.repeat([0.5, 0.25, 1.0, 1.0], n)
     numbers = fit._distributed(patches, 500, spacing)

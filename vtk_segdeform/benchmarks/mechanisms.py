@@ -267,7 +267,7 @@ def _bends(_case: str, own: Hand, ways: Ways) -> list[dict[str, float]]:
         for (way, preparation), bends in zip(ways, found, strict=True):
             with way():
                 bends.append(bend(own, preparation))
-    return [{name: min(bend[name] for bend in bends) for name in bends[0]} for bends in found]
+    return [{k: min(each[k] for each in bends) for k in bends[0]} for bends in found]
 
 
 def begun(

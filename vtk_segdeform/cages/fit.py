@@ -46,19 +46,20 @@ from .spacing import bending_density, cage_spacing
 
 _OFFSET_SHARE = 0.4  # of sqrt(area of the region / vertices of its cage)
 _STEP_SHARE = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
-_LARGER = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offset:
+_OFFSET_GROWTH = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offset:
 _ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
-_GOOD = 0.2  # least roundness of faces, and least distance in offsets, of a good cage
+_GOOD_QUALITY = 0.2  # least roundness of faces, and least distance in offsets, of a good cage
 _MOST_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
 _FEWER_NODES = 3.0  # times, if spacing varies: half the time, and as good poses
 _FEWEST = 8  # vertices of a cage, and of each component of a cage with several
+_FLOOR = 12  # vertices of each cage before the rest is distributed
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each part; half alone
 _UNIT_QUANTILE, _MOST_STRETCH = 0.05, 12.0  # of spacings: the unit, and the largest in that unit
 _LEAST_WIDTH = 1e-3  # width over length that a region counts with, at least
 _LEAST_CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
 _PUSHES = 30  # rounds of moving faces away
 _MEASURED_VERTICES = 200  # nearest ones, whose exact distance is computed
-_LEAST_GAP, _MOST_GAP = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
+_LEAST_OFFSET, _MOST_OFFSET = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 # Barycentric coordinates of samples of a face.
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
 
@@ -241,10 +242,10 @@ def _check_offset(offset: float | None, mesh: Mesh) -> None:
         return
     if not (is_number(offset) and offset > 0.0):
         raise CageError(f"offset must be a positive length; got {shown(offset)}")
-    if not _LEAST_GAP <= offset / mesh.diagonal <= _MOST_GAP:
+    if not _LEAST_OFFSET <= offset / mesh.diagonal <= _MOST_OFFSET:
         raise CageError(
-            f"offset must be {_LEAST_GAP:.0e} to {_MOST_GAP:.0e} diagonals of the mesh, of length "
-            f"{mesh.diagonal:.3g}; got {shown(offset)}"
+            f"offset must be {_LEAST_OFFSET:.0e} to {_MOST_OFFSET:.0e} diagonals of the mesh, "
+            f"of length {mesh.diagonal:.3g}; got {shown(offset)}"
         )
 
 
@@ -259,15 +260,17 @@ def _distributed(patches: list[Patch], n_vertices: int, spacing: FloatArray | No
     """
     if spacing is not None:
         need = np.array([patch.weights @ spacing**-2.0 for patch in patches])
+        floor = _FEWEST
     else:
         area = np.array([patch.area for patch in patches])
         spread = np.array([patch.spread for patch in patches])
         length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
         width = np.maximum(spread[:, 1:].sum(axis=1), _LEAST_WIDTH * length)
         need = np.sqrt(area * length / width)
+        floor = min(_FLOOR, n_vertices // len(patches))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
-    ends = np.rint((n_vertices - _FEWEST * len(patches)) * np.cumsum(share) / share.sum())
-    return np.asarray(_FEWEST + np.diff(ends, prepend=0.0).astype(np.int64))
+    ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
+    return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
 
 
 def _fit(
@@ -291,7 +294,7 @@ def _fit(
     for attempt in range(_ATTEMPTS):
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
-        larger = _LARGER ** (attempt * (attempt + 1) / 2)
+        larger = _OFFSET_GROWTH ** (attempt * (attempt + 1) / 2)
         nodes = max(_MOST_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER_NODES)
         field = solid_field(
             patch, offset * larger, _STEP_SHARE * length * larger, most_nodes=nodes, stretch=stretch
@@ -369,4 +372,4 @@ def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     closest = np.argsort(gap / unit, kind="stable")[:_MEASURED_VERTICES]
     clearance = distance_to_surface(x[closest], vertices, faces) / unit[closest]
     clearance = clearance.min() / field.offset
-    return float(min(roundness(vertices, faces).min(), clearance) / _GOOD)
+    return float(min(roundness(vertices, faces).min(), clearance) / _GOOD_QUALITY)

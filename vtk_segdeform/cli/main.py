@@ -328,7 +328,7 @@ def _bench(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     _output_folder(parser, "bench-output")
     scale = parser.add_mutually_exclusive_group()
-    scale.add_argument("--quick", action="store_true", help="small meshes; a few minutes")
+    scale.add_argument("--quick", action="store_true", help="small meshes; some ten minutes")
     scale.add_argument("--full", action="store_true", help="up to 500,000 vertices; an hour")
     text = f"run one experiment: {', '.join(EXPERIMENTS)}; may be repeated"
     add("--only", action="append", default=[], choices=EXPERIMENTS, metavar="NAME", help=text)

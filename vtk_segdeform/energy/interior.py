@@ -32,7 +32,7 @@ from ..mesh import Mesh
 from ..subspace import Subspace
 from .energy import Energy
 
-_SHARE = 0.3  # of the trace of the energy; with 0.1, the twist of a bar jumps
+_TRACE_SHARE = 0.3  # of the trace of the energy; with 0.1, the twist of a bar jumps
 _PATCHES = 200  # with 100, the twist of a bar jumps
 _DEPTH = 0.75  # of the points, in radii of their balls
 _DIFFERENCE = 1e-3  # of the central differences, in radii
@@ -115,7 +115,7 @@ def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) ->
         return energy
     flat = gradients.reshape(3 * len(volumes), -1)
     stiffness = float(np.repeat(volumes, 3) @ np.einsum("km,km->k", flat, flat))
-    v = _SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
+    v = _TRACE_SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
     load = np.repeat(v, 3)[:, None] * flat
     return replace(
         energy,

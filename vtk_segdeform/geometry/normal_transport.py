@@ -27,7 +27,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import BoolArray, FloatArray, IntArray
 
 _EQUAL_NORMALS = 1e-3  # distance of two unit normals that are the same one, stored in few bits
-_RANK_VALUE = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
+_LEAST_EIGENVALUE = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
 _LARGEST_COORDINATE = 1e100
 _FLAT_AREA = (
     1e-5  # area over longest edge squared: the normal of a flatter face is rounding.  A normal
@@ -123,7 +123,7 @@ class NormalTransport:
         outer = vectors[:, :, None] * (vectors / areas[:, None])[:, None, :]
         moments = (around @ (outer / areas.max(initial=0.0)).reshape(-1, 9)).reshape(-1, 3, 3)
         values, axes = np.linalg.eigh(moments)
-        spans = values > _RANK_VALUE * np.maximum(values[:, 2:], np.finfo(float).tiny)
+        spans = values > _LEAST_EIGENVALUE * np.maximum(values[:, 2:], np.finfo(float).tiny)
         inverse = np.where(spans, 1.0 / np.where(spans, values, 1.0), 0.0) / areas.max(initial=0.0)
         local = np.einsum("gij,gi->gj", axes, n)
         dual = np.einsum("gij,gj->gi", axes, inverse * local)

@@ -18,9 +18,10 @@ from scipy import sparse
 from ..arrays import IntArray
 from ..geometry import distinct_lengths, nearest_source
 from ..mesh import Mesh, connected
-from .coarse import COARSE_POINTS, symmetric
+from .coarse import symmetric
 
 _CREASE_RADIUS = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
+_SCALE_POINTS = 3000  # diffusion acts at the scale of an edge in a mesh of so many vertices
 _ROUNDS = 3  # of diffusion
 _MOST_STEPS = 60  # of diffusion, per round
 
@@ -30,11 +31,10 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
 
     A border moves by a limited number of rings per round, and diffusion reaches one ring per step;
     so vertices farther than that from all borders keep their labels and are not processed.
-    Diffusion acts at the scale of an edge of the coarse surface.
     """
     area = mesh.face_areas.sum()
     edge = np.median(mesh.adjacency.data)
-    steps = int(np.clip(np.ceil(4.0 * area / COARSE_POINTS / edge**2), 4, _MOST_STEPS))
+    steps = int(np.clip(np.ceil(4.0 * area / _SCALE_POINTS / edge**2), 4, _MOST_STEPS))
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
     zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)

@@ -40,8 +40,8 @@ from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from .subspace import Subspace
 
-_NEAREST = 24  # K
-_FARTHEST = 1e60  # sizes of the mesh; beyond it, distances overflow
+_NEIGHBOURS = 24  # K
+_FARTHEST_POINT = 1e60  # sizes of the mesh; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,9 +127,12 @@ def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> F
             f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
             f"got {weights.shape}"
         )
-    if np.abs(points - vertices[0]).max(initial=0.0) > _FARTHEST * np.ptp(vertices, axis=0).max():
-        raise ArgumentError(f"points are more than {_FARTHEST:.0e} sizes of the mesh away")
-    count = min(_NEAREST, len(vertices))
+    if (
+        np.abs(points - vertices[0]).max(initial=0.0)
+        > _FARTHEST_POINT * np.ptp(vertices, axis=0).max()
+    ):
+        raise ArgumentError(f"points are more than {_FARTHEST_POINT:.0e} sizes of the mesh away")
+    count = min(_NEIGHBOURS, len(vertices))
     distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]
     on_vertex = distance[:, 0] <= 1e-12 * farthest[:, 0]
