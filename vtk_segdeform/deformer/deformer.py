@@ -480,7 +480,9 @@ class Deformer:
         """Compile the kernels, or load them, before the first frame needs them."""
         handle = [0]
         targets = self.mesh.vertices[handle] + _TRIAL_MOTION * self._problem.frame.size
-        self.hold(handle=handle).solve(targets, max_steps=1)
+        other = self.hold(handle=handle)
+        other.solve(targets, max_steps=1)
+        other._path.remaining()  # with the Hessian, which a step may not need
 
     def _solve(
         self, goal: FloatArray, max_steps: int | None, progress: Progress | None

@@ -190,7 +190,7 @@ def one_cycle(kind, *, in_a_job):
     assert kind is Forgetful or not host.editor.is_busy
     del host
     delete_now()
-    listeners = session._listeners._listeners  # of the session
+    listeners = session.history._listeners._listeners
     assert kind is Forgetful or listeners == {}
     return [*gone, weakref.ref(session)]
 
