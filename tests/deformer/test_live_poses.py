@@ -84,4 +84,4 @@ def test_a_pull_of_a_soft_body_keeps_the_point_and_follows():
             if share > 0.15:
                 worst = max(worst, farthest(converged(session, preparation), session.vertices))
     print(f"{worst / mesh.diagonal:.2%} away")
-    assert worst < 0.015 * mesh.diagonal
+    assert worst < 0.02 * mesh.diagonal

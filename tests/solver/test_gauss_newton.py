@@ -126,7 +126,7 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
     assert distance(found, expected) < 5e-3
 
 
-def is_slow(lengths, *, max_steps=500, age=1):
+def is_slow(lengths, *, max_steps=500, age=1, is_new=False):
     """Tell whether H is out of date for the last of steps with these *lengths*.
 
     The tolerance is 1e-4, and *age* is that of H at the start of the call: 1 if it is that of rest.
@@ -134,6 +134,7 @@ def is_slow(lengths, *, max_steps=500, age=1):
     nowhere = np.zeros((0, 3))
     state = _State(None, age=age)
     state.begin(nowhere, nowhere, SolverOptions(tolerance=1e-4, max_steps=max_steps))
+    state.is_new = is_new
     *taken, last = (Step(nowhere, (), length) for length in lengths)
     for step in taken:
         state.took(step)
@@ -160,6 +161,12 @@ def test_nor_where_as_many_steps_as_are_left_do_not():
 def test_the_rate_of_steps_is_known_after_two_with_one_h():
     assert not is_slow([1.0, 0.9], age=0)
     assert is_slow([1.0, 0.95, 0.9], age=0)
+
+
+def test_an_h_of_the_same_call_serves_until_acceleration_has_its_steps():
+    for count in range(1, 7):
+        lengths = [0.9**k for k in range(count + 1)]
+        assert is_slow(lengths, age=0, is_new=True) == (count >= 5)
 
 
 def test_a_call_continues_the_last_one_only_from_its_end_and_for_its_targets():

@@ -32,7 +32,8 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
    takes as long as some 12 steps.  So the paper's H is used first, and H is computed at the present
    pose if steps at the present rate would not converge within 12 steps, or those that are left, and
-   if no share of a step lowers the objective.  If it is not convex, it contains a share of the
+   if no share of a step lowers the objective.  An H of the same call serves 5 steps at least, which
+   fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
    rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
    lowers the objective, the paper's H takes its place.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  In pulls of soft
@@ -137,6 +138,7 @@ class _State:
 
     factor: Factor  # of H
     age: int = 1  # of the factor, in steps; that of the start is of rest
+    is_new: bool = False  # whether the factor was computed in this call
     length: float = math.inf  # of the last step in this call
     left: int = 0  # steps, in this call
     tolerance: float = 0.0  # of this call
@@ -146,7 +148,7 @@ class _State:
 
     def begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> None:
         """Begin a call; forget the last steps unless it begins where the last one ended."""
-        self.tolerance, self.left = options.tolerance, options.max_steps
+        self.tolerance, self.left, self.is_new = options.tolerance, options.max_steps, False
         if self.end is None or self.end[0] is not p or not np.array_equal(targets, self.end[1]):
             self.acceleration.forget()
             self.length = math.inf
@@ -154,7 +156,8 @@ class _State:
     def is_slow(self, step: Step) -> bool:
         """Tell whether *step* and the next ones would not converge while a new H pays."""
         rate, steps = min(step.length / self.length, 1.0), min(self.left, _COST)
-        return self.age >= _SETTLED and step.length * rate**steps > self.tolerance
+        least = _WINDOW if self.is_new else _SETTLED
+        return self.age >= least and step.length * rate**steps > self.tolerance
 
     def took(self, step: Step) -> None:
         """Count a step."""
@@ -370,7 +373,8 @@ class GaussNewton:
     def _renew(self, here: _Iterate) -> None:
         """Let H be that of this pose; the paper's if it is not convex."""
         state = self._state
-        state.factor, state.age, state.has_terms = self._factor_at(here), 0, here.is_active
+        state.factor, state.age, state.is_new = self._factor_at(here), 0, True
+        state.has_terms = here.is_active
 
     def _factor_at(self, here: _Iterate) -> Factor:
         """Return the factor of the exact Hessian; of the paper's if it is not convex."""
