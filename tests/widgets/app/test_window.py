@@ -240,7 +240,7 @@ def test_a_mesh_that_lost_digits_is_told_of_and_closes_no_window(
     boxes.answers.append("Cancel")
     assert not hand.window.close()
     assert "regions, cages and handles" in boxes.seen[-1]
-    assert "In the file" not in words.text()
+    until(lambda: "In the file" not in words.text(), "the new message")
 
 
 @BLANK
