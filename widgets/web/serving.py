@@ -7,6 +7,7 @@ other end, a crash as well, the next ``segdeform serve`` of the same file contin
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import secrets
 import signal
@@ -26,6 +27,7 @@ from ..editor import About, Autosaves, SessionFile, Slot, is_mesh, read_session
 from .web_editor import WebEditor
 
 _PAUSE = 1.0  # seconds after a change; changes meanwhile are saved with it
+_MOST_FILES = 65_536  # that the process may open, connections included
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
@@ -151,6 +153,7 @@ def serve_until_stopped(
     OSError
         If the port is in use.
     """
+    allow_many_connections()
     autosaves = Autosaves()
     slot, session = recoverable(autosaves, file), None
     about = _about(file) if slot is None else slot.about
@@ -176,6 +179,23 @@ def serve_until_stopped(
     finally:
         if not is_kept:
             autosaver.discard()
+
+
+def allow_many_connections() -> None:
+    """Raise the number of files that the process may open, as far as the system lets it.
+
+    Anyone who reaches the port can open connections and send nothing, without the secret.  At the
+    usual limit of 1,024 such a crowd would keep out the page.
+    """
+    if sys.platform == "win32":
+        return  # no such limit
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, _MOST_FILES)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        with contextlib.suppress(ValueError, OSError):  # macOS has a lower limit of its own
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 def _about(file: Path | None) -> About:

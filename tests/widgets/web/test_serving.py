@@ -219,6 +219,28 @@ def test_half_sent_requests_keep_out_nobody(served):
     do(story())
 
 
+def test_a_crowd_larger_than_the_usual_limit_of_files_keeps_out_nobody(tmp_path):
+    """1,200 half-sent requests, without the secret, to a program that may open 1,024 files."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    hard = before[1]
+    if hard != resource.RLIM_INFINITY and hard < 4096:
+        pytest.skip("the system allows no more files")
+    crowd = []
+    try:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (1024, hard))
+        with serving(tmp_path) as program:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (4096, hard))  # for this process
+            for _ in range(1200):
+                crowd.append(socket.create_connection(("127.0.0.1", program.port), timeout=5.0))
+                crowd[-1].sendall(b"GET / HTTP/1.1\r\nHost: local")
+            assert " 200 " in get(program, f"/{program.secret}/index.html")[0]
+    finally:
+        for each in crowd:
+            each.close()
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
 def test_a_command_line_names_an_address_that_works_once(tmp_path):
     browser = tmp_path / "browser"
     browser.write_text(f'#!/bin/sh\necho "$1" > {tmp_path}/opened\n')
