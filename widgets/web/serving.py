@@ -26,6 +26,9 @@ from vtk_segdeform.session import Session
 from ..editor import About, Autosaves, SessionFile, Slot, is_mesh, read_session
 from .web_editor import WebEditor
 
+if sys.platform != "win32":
+    import resource
+
 _PAUSE = 1.0  # seconds after a change; changes meanwhile are saved with it
 _MOST_FILES = 65_536  # that the process may open, connections included
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -189,8 +192,6 @@ def allow_many_connections() -> None:
     """
     if sys.platform == "win32":
         return  # no such limit
-    import resource
-
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, _MOST_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:
