@@ -159,11 +159,7 @@ def test_selected_vertices_can_be_fixed_a_handle_or_a_region():
 @pytest.mark.usefixtures("with_pymeshlab")
 def test_a_session_becomes_layers_of_its_mesh_and_cages_in_their_pose():
     scene = sausage(2)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     session.drag(scene.turned(20), max_steps=3)
     meshset = meshlab.to_meshset(session)
     assert_array_equal(meshlab.selected_vertices(meshset), scene.handle)

@@ -129,7 +129,7 @@ def test_every_copy_and_step_has_the_same_finished_pose(tmp_path):
     loaded = load_session(tmp_path / "posed")
     assert_array_equal(loaded.vertices, second)
     for each in (session, loaded):
-        each.poses.start_afresh()
+        each.poses.memo.drop("path")
         each.drag(each.targets)
         each.commit()
         each.finish()
@@ -283,7 +283,7 @@ def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
     loaded = load_session(tmp_path / "pulled")
     for each in (session, loaded):
         assert_array_equal(each.vertices, poses[2])
-        each.poses.start_afresh()
+        each.poses.memo.drop("path")
         pulled(each, ends[1], 0.02)
         each.finish()
     assert_array_equal(loaded.vertices, session.vertices)

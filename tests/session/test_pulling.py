@@ -110,7 +110,7 @@ def test_nothing_moves_at_the_press_after_loading(tmp_path):
     assert vars(loaded.state.locality).keys() == vars(session.state.locality).keys()
     assert_array_equal(loaded.vertices, session.vertices)
     for each in (session, loaded):
-        each.poses.start_afresh()
+        each.poses.memo.drop("path")
         each.pull(HIGH, x[HIGH], max_steps=8)
         assert moved(each, x) < 1e-12
         each.pull(HIGH, X[HIGH] + UP)

@@ -887,11 +887,7 @@ def test_a_state_of_another_mesh_or_against_itself_is_refused():
 def test_far_from_the_origin_a_pose_keeps_its_volume():
     shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
     scene = SCENE.transformed(shift=shift)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     for degrees in (10, 20, 30):
         session.drag(scene.turned(degrees, about=shift), max_steps=3)
         assert abs(session.volume_change) < 1e-10
@@ -902,11 +898,7 @@ def test_far_from_the_origin_a_pose_keeps_its_volume():
 def test_the_volume_change_is_that_of_the_vertices_after_a_drag_and_after_loading(diagonals):
     shift = diagonals * SCENE.mesh.diagonal * np.array([0.6, -0.64, 0.48])
     scene = SCENE.transformed(shift=shift)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     solution = session.drag(scene.turned(40, about=shift))
     session.commit()
     loaded = Session(scene.mesh, state=session.state)

@@ -30,12 +30,7 @@ INTERVAL = 0.3  # seconds
 def ready_session() -> Session:
     """Return a session, complete except for a pose."""
     scene = sausage(is_coarse=True)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
-    return session
+    return scene.session()
 
 
 def digest(session: Session) -> str:

@@ -13,7 +13,6 @@ import numpy as np
 from hands import Hand, plain_view
 from scenes import sausage
 
-from vtk_segdeform import Session
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
@@ -47,11 +46,7 @@ class Monkey:
     def __init__(self, seed: int, folder):
         self.rng = np.random.default_rng(seed)
         scene = sausage()
-        session = Session(scene.mesh)
-        session.set_regions(scene.regions)
-        session.set_cages(scene.cages)
-        session.set_fixed(scene.fixed)
-        session.handles.add(scene.handle)
+        session = scene.session()
         self.view = plain_view(SIZE)
         self.editor = DeformEditor(self.view, session)
         self.editor.path = folder / "monkey.segdeform"

@@ -13,6 +13,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session import Session
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,15 @@ class Scene:
         """Return a deformer with options of `Deformer.hold` only; the cages are bound only once."""
         bound = _bound(self.mesh, self.regions, self.cages)
         return bound.hold(fixed=self.fixed, handle=self.handle, **volumes)
+
+    def session(self) -> Session:
+        """Return a session of the scene, complete except for a pose."""
+        session = Session(self.mesh)
+        session.set_regions(self.regions)
+        session.set_cages(self.cages)
+        session.set_fixed(self.fixed)
+        session.handles.add(self.handle)
+        return session
 
     def turned(self, degrees: float, axis=(0.0, 1.0, 0.0), about=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Return targets: the handle rotated about a line."""

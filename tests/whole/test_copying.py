@@ -75,7 +75,7 @@ def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
     assert other.region_names == ("trunk", "region 2")
     assert_array_equal(other.vertices, session.vertices)
     for one in (session, other):
-        one.poses.start_afresh()
+        one.poses.memo.drop("path")
     again = [one.refine().vertices for one in (session, other)]
     assert_array_equal(*again)
     labels = [[one.undo() for _ in range(7)] for one in (session, other)]

@@ -45,11 +45,7 @@ MOST = 0.02  # of the pixels may differ more: text and thin lines
 @pytest.fixture(scope="module")
 def ready():
     scene = sausage()
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     return scene, session.state
 
 

@@ -52,12 +52,7 @@ def bar() -> pv.PolyData:
 
 @pytest.fixture
 def session() -> sd.Session:
-    session = sd.Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.handles.add(SCENE.handle)
-    return session
+    return SCENE.session()
 
 
 @pytest.fixture

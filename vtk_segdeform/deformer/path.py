@@ -1,7 +1,4 @@
-"""Where a deformer is, the only value of it that changes, and how it goes on from there.
-
-targets  ->  waypoints  ->  p, a minimum for each  ->  x = W~ p with exact volumes
-"""
+"""The path of a deformer: its last pose, and how it gets to the next.  Nothing else changes."""
 
 from __future__ import annotations
 

@@ -196,13 +196,6 @@ class Poses:
         """Keep the *solution* of a pose until that of the next one."""
         self.memo.keep("solution", (pose,), solution)
 
-    def start_afresh(self) -> None:
-        """Make the next solve bitwise reproducible, as in a session that was just loaded.
-
-        Otherwise, the solver reuses information from previous solves.
-        """
-        self.memo.drop("path")
-
     def _local(self, state: State) -> Deformer:
         """Return `constrained`, local if the pose comes from a pull."""
         held, locality = self.constrained(state), state.locality

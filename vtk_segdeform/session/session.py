@@ -101,7 +101,7 @@ class Session(Described):
     Notes
     -----
     A copy, by `copy` or `pickle`, has the mesh, the state, an ongoing drag and the history.  It has
-    no listeners, and its next solve starts as after `Poses.start_afresh`.
+    no listeners, and its next solve starts as in a session that was just loaded.
 
     Raises
     ------

@@ -180,7 +180,7 @@ class Queue:
                 self._begin(task)
 
     def delay(self, kind: Kind) -> None:
-        """Let the tasks of a kind rest anew."""
+        """Restart the waiting time of the tasks of a kind."""
         for task in self._tasks:
             if task.kind is kind:
                 task.since = time.monotonic()

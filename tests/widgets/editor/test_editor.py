@@ -92,11 +92,7 @@ def any_view(request):
 def ready():
     """Return the state of a small session, complete except for a pose."""
     scene = sausage(is_coarse=True)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     return scene.mesh, session.state
 
 

@@ -10,7 +10,7 @@ from solids import exact_volume_change
 from test_editor import Bench, pull_handle
 from test_finishing_poses import grabbed
 
-from vtk_segdeform import Session, sizes
+from vtk_segdeform import sizes
 from vtk_segdeform.widgets.editor import finishing_after_drags
 from vtk_segdeform.widgets.scene.view import View
 
@@ -27,11 +27,7 @@ def test_every_frame_of_a_drag_has_the_exact_volume(monkeypatch, kept_by, mode):
         monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
     if kept_by == "scaling":
         monkeypatch.setattr(sizes, "SCALED_VOLUME", 250)
-    session = Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.handles.add(SCENE.handle)
+    session = SCENE.session()
     session.bind()
     bench, shown, changes = Bench(plain_view((400, 320)), session), [], []
     bench.editor.do(finishing_after_drags(False))

@@ -40,12 +40,7 @@ def renderer():
 
 @pytest.fixture
 def session():
-    session = Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.handles.add(SCENE.handle)
-    return session
+    return SCENE.session()
 
 
 @pytest.fixture

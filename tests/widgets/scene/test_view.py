@@ -318,11 +318,7 @@ def test_a_widget_that_is_off_receives_no_events(scribble):
 def test_the_surface_follows_the_pose_in_place():
     view = plain_view()
     scene = sausage(is_coarse=True)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     surface = SurfaceDisplay(view, session)
     before, memory = picture(view), surface.points
     session.drag(scene.turned(30.0), max_steps=5)

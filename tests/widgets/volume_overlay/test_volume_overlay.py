@@ -40,11 +40,7 @@ RNG = np.random.default_rng(5)
 
 def session_of(n_regions: int, *, is_coarse: bool = True) -> Session:
     scene = sausage(n_regions, is_coarse=is_coarse)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle)
+    session = scene.session()
     session.change_options(preserve_volume=False)
     return session
 
