@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..geometry import distortion, triangle_distortion
+from ..kernels import one_blas_thread
 from ..mesh import Mesh, SurfacePoint
 from ..session import Preparation, Session
 from ..solver import Solution
@@ -81,6 +82,7 @@ class Drag:
         """Return a quantity of `shapes`."""
         return np.array([vars(shape)[name] for shape in self.shapes], dtype=float)
 
+    @one_blas_thread()  # whose threads, once they have begun, also spin during later frames
     def measure(self, session: Session, preparation: Preparation) -> None:
         """Measure the present pose of *session*."""
         x, solution = session.vertices, session.solution
