@@ -74,6 +74,32 @@ again, _ = told()
 np.savez(out, shifted=shifted, turned=turned, again=again, volume=volume)
 """
 
+# A ball whose top is shifted by .2; prints how far it has come.
+BEND = """
+import numpy as np
+from vtk_segdeform.filters import SegmentedCageDeformFilter
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkFiltersSources import vtkSphereSource
+
+source = vtkSphereSource()
+source.SetThetaResolution(24)
+source.SetPhiResolution(24)
+source.Update()
+surface = source.GetOutput()
+vertices = vtk_to_numpy(surface.GetPoints().GetData()).copy()
+height = vertices[:, 2]
+for name, marked in (("fixed", height < -0.3), ("handle", height > 0.4)):
+    array = numpy_to_vtk(marked.astype(float))
+    array.SetName(name)
+    surface.GetPointData().AddArray(array)
+bent = SegmentedCageDeformFilter()
+bent.SetInputDataObject(surface)
+bent.SetTranslation(0.2, 0.0, 0.0)
+bent.Update()
+moved = vtk_to_numpy(bent.GetOutputDataObject(0).GetPoints().GetData())
+print(round(float((moved - vertices)[height > 0.4, 0].mean()), 3))
+"""
+
 needs_paraview = pytest.mark.skipif(
     not (shutil.which("pvpython") and os.environ.get("SEGDEFORM_PARAVIEW")),
     reason="needs ParaView's pvpython: make test-paraview",
@@ -178,6 +204,20 @@ def test_a_copy_needs_the_package_in_the_path(loaded, tmp_path):
     assert text.startswith("RuntimeError: the plugin needs the package vtk_segdeform, which ParaV")
     assert "paraview_plugin --path prints" in text
     assert "PYTHONPATH=FOLDER" in text
+
+
+def test_numpy_scipy_and_vtk_are_enough(tmp_path):
+    """All that the Python of a ParaView has to have; the others are not in its path here."""
+    site = Path(np.__file__).parents[1]
+    for name in ("numpy", "scipy", "numpy.libs", "scipy.libs", "vtkmodules", "vtk.libs"):
+        if (site / name).exists():
+            (tmp_path / name).symlink_to(site / name)
+    path = os.pathsep.join(map(str, (tmp_path, ROOT)))
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", BEND], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.strip() == "0.2", done.stderr
 
 
 @pytest.mark.parametrize(
