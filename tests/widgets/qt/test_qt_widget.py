@@ -102,7 +102,7 @@ class Seen:
             panel.isEnabled(), panel.status.sign.isVisible(), panel.history.fold.isChecked(),
             [box.isVisible() for box in panel.boxes.values()],
             [field for field in toolbar(self.editor) if field.name != "redo"],
-            all_sections(self.editor),
+            all_sections(self.editor), self.editor.keys.changes,
         )  # fmt: skip
 
     def view_hand(self):
