@@ -75,19 +75,17 @@ class Energy:
         return self._blocks.map(p).reshape(-1, 3, 3)
 
     @cached_property
-    def nonzero_rows(self) -> list[tuple[IntArray, list[slice], FloatArray]]:
+    def nonzero_rows(self) -> list[tuple[IntArray, IntArray, FloatArray]]:
         """K without its zeros: clusters that the same cages move, together.
 
-        As (clusters, columns, rows): the clusters (g,), the cages whose vertices move them, c
-        vertices in all, and the rows (g, 3, c).
+        As (clusters, columns, rows): the clusters (g,), the cage vertices (c,) that move them, and
+        the rows (g, 3, c).
         """
         blocks = []
         for ids in self._blocks.sets_by_cages():
             columns, rows = self._blocks.nonzeros(ids)
-            cages = [own for own in self.subspace.columns if own.start in columns]
-            if cages:
-                rows = rows.reshape(-1, 3, len(columns))
-                blocks.append((ids[::3] // 3, cages, rows))
+            if len(columns):
+                blocks.append((ids[::3] // 3, columns, rows.reshape(-1, 3, len(columns))))
         return blocks
 
     def vertex_rotations(self, p: FloatArray) -> FloatArray:

@@ -25,7 +25,6 @@ Trans. Graph. 38(1), 2019: the twist modes of the rotation's derivative.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -136,16 +135,13 @@ def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
     total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
     twists = _twists(energy.covariances(p))
     for clusters, columns, reduced in energy.nonzero_rows:
-        rows = (twists[clusters] @ reduced).reshape(-1, 3 * reduced.shape[2])  # T^T in M's own axes
+        rows = (twists[clusters] @ reduced).reshape(-1, 3 * len(columns))  # T^T in M's own axes
         part = blas.dsyrk(1.0, rows.T, lower=1).T
-        places = [slice(a * m + own.start, a * m + own.stop) for a in range(3) for own in columns]
-        ends = np.cumsum([place.stop - place.start for place in places])
-        both = [
-            (place, slice(end - place.stop + place.start, end))
-            for place, end in zip(places, ends, strict=True)
-        ]
-        for (i, from_i), (j, from_j) in itertools.combinations_with_replacement(both, 2):
-            total[i, j] += part[from_i, from_j]
+        places = (m * np.arange(3)[:, None] + columns).ravel()
+        if kernels := compiled_kernels(part.size // NUMBERS_PER_FACE):
+            kernels.add_upper(total, part, places)
+        else:
+            total[np.ix_(places, places)] += part
     return total.T
 
 

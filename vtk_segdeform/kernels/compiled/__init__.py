@@ -30,7 +30,7 @@ from .beams import faces_in_beam
 from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
-from .factor import solve_factored, solve_sparse
+from .factor import add_upper, solve_factored, solve_sparse
 from .half_edges import (
     border_half_edges,
     edge_lengths,
@@ -83,6 +83,7 @@ __all__ = [
     "add_interpolated_adjoint",
     "add_packed_adjoint",
     "add_product",
+    "add_upper",
     "border_half_edges",
     "cell_forces",
     "cell_sums",

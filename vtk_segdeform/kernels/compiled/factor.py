@@ -1,6 +1,6 @@
-"""Triangular solves for a few right-hand sides, for `hessian` and `finish.factor`.
+"""Sums of blocks for `hessian`, and triangular solves with few right-hand sides.
 
-LAPACK is optimised for many right-hand sides; for two it takes twice as long.
+The solves are for `hessian` and `finish.factor`.  LAPACK is optimised for many right-hand sides; for two it takes twice as long.
 """
 
 from __future__ import annotations
@@ -10,6 +10,15 @@ import numpy as np
 from .kernels import kernel
 
 _compile = kernel(fastmath={"reassoc", "contract"})
+
+
+@_compile("f8[:,:], f8[:,:], i8[:]")
+def add_upper(total, part, places):
+    """Add the upper half of *part* (c, c) to *total* (n, n) at *places* (c,), in ascending order."""
+    for i in range(len(places)):
+        row, own = total[places[i]], part[i]
+        for j in range(i, len(places)):
+            row[places[j]] += own[j]
 
 
 @_compile("f8[:,:], f8[:,:]")
