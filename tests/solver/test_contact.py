@@ -165,15 +165,18 @@ def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thi
 
 def test_no_two_samples_pass_through_each_other_in_a_step(fork):
     deformer, _ = fork
-    contact = deformer._constraints.contact
-    radii = contact.surface.radii
+    contact, p = deformer._constraints.contact, deformer._path.p
     rng = np.random.default_rng(1)
     for size in (1e-3, 10.0):
-        step = size * rng.standard_normal(deformer._path.p.shape)
-        far = np.linalg.norm(contact.surface.rows @ step, axis=1).max()
-        share = contact.share(step)
-        assert share * 2.0 * far <= 1.5 * 2.0 * np.median(radii) * (1.0 + 1e-12)
+        step = size * rng.standard_normal(p.shape)
+        share = contact.share(p, step)
         assert (share == 1.0) == (size < 1.0)
+        y, motion = contact.surface.rows @ p, contact.surface.rows @ (share * step)
+        a, b = contact._facing(y, 0.1).T
+        assert len(a) > 20
+        closing = np.linalg.norm(motion[a] - motion[b], axis=1)
+        reach = np.linalg.norm(y[a] - y[b], axis=1) + 1.5 * contact.surface.spacing
+        assert (closing <= reach * (1.0 + 1e-12)).all()
 
 
 def sheets(gap: float):
@@ -249,6 +252,18 @@ def test_the_clearance_is_the_least_distance_of_samples_that_face_each_other():
     assert contact.clearance(crossed, 0.4) == 0.4  # they have passed each other
     held = Contact(surface, np.ones(72, dtype=bool), 1.0)
     assert held.clearance(points, 2.0) == 2.0
+
+
+def test_a_step_toward_a_part_ends_before_it_has_passed_though_nothing_touches_yet():
+    surface, points, _ = sheets(0.05)
+    contact = Contact(surface, np.zeros(72, dtype=bool), 1.0)
+    assert not contact.is_active(points)
+    down = np.outer(np.arange(72) >= 36, [0.0, 0.0, -3.0])
+    room = 1.5 * surface.spacing
+    assert contact.share(points, down) == pytest.approx((0.05 + room) / 3.0)
+    assert contact.share(points, -down) < 1.0  # no direction is told apart
+    assert contact.share(points, np.ones((72, 3))) == 1.0  # both together
+    assert contact.share(points, 0.3 * room * down / 3.0) == 1.0
 
 
 def test_with_and_without_compiled_kernels_the_same_pairs_are_listed(fork, through, monkeypatch):

@@ -67,6 +67,42 @@ def test_a_steady_drag_starts_ahead_and_ends_in_the_same_poses():
     assert distance(*(each.solve(SCENE.turned(4.0)) for each in (ahead, behind))) < 1e-5
 
 
+class Limit:
+    """A term that is never active, and allows motions of a cage vertex up to a length."""
+
+    def __init__(self, longest):
+        self.longest = longest
+
+    def value_and_slope(self, p, x=None):
+        return 0.0, np.zeros_like(p)
+
+    def hessian(self, p, x=None):
+        return None
+
+    def share(self, p, step):
+        return min(1.0, self.longest / np.linalg.norm(step, axis=1).max())
+
+
+@pytest.mark.parametrize("longest", [0.003, 10.0])
+def test_no_start_and_no_step_is_farther_than_a_term_allows(longest, monkeypatch):
+    deformer, motions = SCENE.held(), []
+    deformer._path.solver.terms = (Limit(longest),)
+    for name in ("_ahead", "_step"):
+        made = getattr(GaussNewton, name)
+
+        def remembered(self, here, given, made=made):
+            found = made(self, here, given)
+            motions.append(found.h if isinstance(found, Step) else found.at - here.at)
+            return found
+
+        monkeypatch.setattr(GaussNewton, name, remembered)
+    for angle in (1.0, 2.0, 3.0, 4.0, 5.0):
+        deformer.solve(SCENE.turned(angle), max_steps=50)
+    lengths = [np.linalg.norm(each, axis=1).max() for each in motions]
+    assert max(lengths) <= 1.01 * longest
+    assert max(lengths) > (0.99 if longest < 1.0 else 0.001) * longest
+
+
 def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
     """A large mesh is moved along them, so its pose would depend on the way, too."""
     straight, roundabout = SCENE.held(), SCENE.held()

@@ -40,6 +40,7 @@ class Bowl:
     share: float = 1.0  # of every step
     constant: float = 1.0
     asked: int = 0
+    farthest: float = np.inf  # of an accelerated step
 
     def evaluated(self, x):
         away = x - self.goal
@@ -51,6 +52,9 @@ class Bowl:
 
     def step(self, here):
         return self.by(self.H, here)
+
+    def allows(self, here, at):
+        return np.abs(at - here.at).max() <= self.farthest
 
     def another(self, here):
         self.asked += 1
@@ -86,6 +90,12 @@ def test_acceleration_solves_a_linear_problem_in_as_many_steps_as_it_has_eigenva
     assert len(solved(bowl()).merits) - 1 <= 2 * N
     slow = bowl(share=0.999)  # limited steps are not accelerated
     assert len(solved(slow).merits) > 4 * N
+
+
+def test_an_accelerated_step_that_is_not_allowed_is_not_taken():
+    plain, limited = solved(bowl()), solved(bowl(farthest=0.0))
+    assert len(limited.merits) > 2 * len(plain.merits)
+    assert limited.status is Status.CONVERGED
 
 
 def test_a_step_that_is_too_long_is_halved():

@@ -35,7 +35,7 @@ class Wall:
         slope[:, 2] = -1.5 * self.weight * log**2 / gap * self.row
         return -self.weight * log**3, slope
 
-    def share(self, step):
+    def share(self, p, step):
         return 1.0
 
     def hessian(self, p, x=None):
@@ -61,7 +61,7 @@ class Slow:
     def hessian(self, p, x=None):
         return np.zeros((p.size, p.size))
 
-    def share(self, step):
+    def share(self, p, step):
         return min(1.0, self.limit / np.abs(step).max())
 
 
@@ -137,7 +137,7 @@ class Spring:
     def hessian(self, p, x=None):
         return self.weight * np.eye(p.size) if self.weight else None
 
-    def share(self, step):
+    def share(self, p, step):
         return self.most
 
 
@@ -148,10 +148,10 @@ def test_terms_are_added_and_the_smallest_share_counts():
     assert value == 1.0 + 5.0 * 55.0
     assert_allclose(steeper, slope + 5.0 * p)
     assert_allclose(hessian_of(springs, p, p), 5.0 * np.eye(6))
-    assert share_of_step(springs, p) == 0.5
+    assert share_of_step(springs, p, p) == 0.5
     assert hessian_of(springs[1:2], p, p) is None
     assert hessian_of([], p, p) is None
-    assert share_of_step([], p) == share_of_step(springs[2:], p) == 1.0
+    assert share_of_step([], p, p) == share_of_step(springs[2:], p, p) == 1.0
     same = with_terms(springs[1:2], p, p, value=1.0, slope=slope)
     assert same[0] == 1.0
     assert same[1] is slope

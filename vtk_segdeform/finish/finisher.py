@@ -228,6 +228,10 @@ class Finisher:
     def another(self, _: _Evaluated) -> None:
         """Return no other step: there is one Hessian."""
 
+    def allows(self, _: _Evaluated, __: FloatArray) -> bool:
+        """Return True: no motion is limited."""
+        return True
+
     def moved(self, x: FloatArray, directions: Sequence[FloatArray]) -> _Evaluated:
         """Return *x* moved along *directions* onto the volumes, and the objective there."""
         if np.isfinite(x).all():  # otherwise there is no volume to restore

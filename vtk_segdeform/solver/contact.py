@@ -57,7 +57,7 @@ _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of th
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _PARTS = 16  # of that distance, by which pairs are sorted
-_FARTHEST = 0.75  # median (h_a + h_b): motion in a step during contact; two meet from both sides
+_FARTHEST_SOUGHT = 0.1  # mesh sizes: distance of samples that are sought before a step
 _ROOM = 50  # pairs per sample for which a search makes room
 _STIFFNESS = 1.5e5  # k, times the scale of the shape energy
 _TINY = 1e-30
@@ -230,13 +230,22 @@ class Contact:
         flat *= np.sqrt(self.stiffness)
         return np.asarray(blas.dsyrk(1.0, flat.T, lower=0).T)
 
-    def share(self, step: FloatArray) -> float:
-        """Return the share of a *step* (m, 3), at most 1, that moves two samples by D_ab at most.
+    def share(self, p: FloatArray, step: FloatArray) -> float:
+        """Return the share of a *step* (m, 3) from *p*, at most 1, for which pairs stay in reach.
 
-        Parts that touch while the surface buckles would pass through each other in one step.
+        Two samples that face each other may approach by their distance and D_ab, in whatever
+        direction, so that no step takes parts through each other, however far it leads.
         """
-        far = _largest(self.surface.rows @ step)
-        return min(1.0, _FARTHEST * self.surface.spacing / max(far, _TINY))
+        surface = self.surface
+        motion, room = surface.rows @ step, _DEPTH * surface.spacing
+        far = 2.0 * _largest(motion - motion.mean(axis=0))
+        if far <= room:
+            return 1.0
+        y, reach = surface.rows @ p, min(far, _FARTHEST_SOUGHT)
+        a, b = self._facing(y, reach).T
+        closing = _lengths(motion[a] - motion[b]).clip(_TINY)
+        shares = (_lengths(y[a] - y[b]) + room) / closing
+        return float(shares.min(initial=min(1.0, (reach + room) / far)))
 
     def is_active(self, p: FloatArray) -> bool:
         """Return whether samples push each other apart at *p*."""
@@ -245,17 +254,18 @@ class Contact:
     def clearance(self, p: FloatArray, most: float) -> float:
         """Return the least distance of samples that may come into contact, at most *most*."""
         y = self.surface.rows @ p
-        a, b = self._pairs_near(y, most).T
-        n = self.surface.normals(y)
-        e = y[a] - y[b]
-        away = np.asarray(np.einsum("ij,ij->i", n[b], e) > 0.0)
-        away &= np.einsum("ij,ij->i", n[a], e) < 0.0
-        return float(np.linalg.norm(e[away], axis=1).min(initial=most))
+        a, b = self._facing(y, most).T
+        return float(_lengths(y[a] - y[b]).min(initial=most))
 
-    def _pairs_near(self, y: FloatArray, reach: float) -> IntArray:
-        """Return the pairs (k, 2) within *reach* at *y* that may come into contact."""
+    def _facing(self, y: FloatArray, reach: float) -> IntArray:
+        """Return the pairs (k, 2) within *reach* at *y* that are in front of each other."""
         pairs = self.surface.pairs_near(y, reach)
-        return pairs[~self.held[pairs].all(axis=1)]
+        pairs = pairs[~self.held[pairs].all(axis=1)]
+        a, b = pairs.T
+        n, e = self.surface.normals(y), y[a] - y[b]
+        in_front = np.asarray(np.einsum("ij,ij->i", n[b], e) > 0.0)
+        in_front &= np.einsum("ij,ij->i", n[a], e) < 0.0
+        return pairs[in_front]
 
     def _active(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""

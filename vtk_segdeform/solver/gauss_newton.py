@@ -41,7 +41,8 @@ What is added to the iteration of the paper (`deformer.as_printed`):
 4. *Line search* (`newton`).
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
-6. *Further terms* (`terms`), such as contact.  While one of them is active, its Hessian is in H.
+6. *Further terms* (`terms`), such as contact.  They limit every step, accelerated step and
+   extrapolation, also while they are inactive.  While one is active, its Hessian is in H.
 
 Long because the formulas of the iteration are explained here, and its objective is one class.
 
@@ -255,8 +256,7 @@ class GaussNewton:
         if state.is_slow(step):
             self._renew(here)
             step = self._step(here, state.factor)
-        share = share_of_step(self.terms, step.h) if here.is_active else 1.0
-        return step if share == 1.0 else step._replace(h=share * step.h, is_whole=False)
+        return step
 
     def another(self, here: _Iterate) -> Step | None:
         """Return the step with H of this pose, then with the H of the paper, then None."""
@@ -268,6 +268,10 @@ class GaussNewton:
         else:
             return None
         return self._step(here, state.factor)
+
+    def allows(self, here: _Iterate, at: FloatArray) -> bool:
+        """Return whether no term limits the motion from *here* to cages *at* (m, 3)."""
+        return share_of_step(self.terms, here.at, at - here.at) == 1.0
 
     def moved(self, p: FloatArray, directions: Sequence[FloatArray]) -> _Iterate:
         """Return *p* moved along *directions* onto the constraints, and the objective there."""
@@ -368,7 +372,8 @@ class GaussNewton:
         """Return the step (21) with the *factor* of H."""
         g = violations(self.volumes.constraints, here.x)
         h, _, directions = constrained_step(factor.solve_all, here.slope, here.rows, g)
-        return Step(h, directions, self._length(h))
+        length, share = self._length(h), share_of_step(self.terms, here.at, h)
+        return Step(share * h, directions, length, share == 1.0)
 
     def _renew(self, here: _Iterate) -> None:
         """Let H be that of this pose; the paper's if it is not convex."""
@@ -403,6 +408,8 @@ class GaussNewton:
         """Return the start for *targets*: *here*, or on along the way if it is better there."""
         found = self._way.ahead(targets)
         if found is None or len(found[1]) != len(self.volumes.constraints):
+            return here
+        if not self.allows(here, found[0]):
             return here
         ahead = self.moved(*found)
         return ahead if ahead.merit < here.merit else here

@@ -81,6 +81,9 @@ class Objective(Protocol[_Pose]):
     def another(self, here: _Pose, /) -> Step | None:
         """Return a step with another Hessian, after one that lowered nothing; None if none."""
 
+    def allows(self, here: _Pose, at: FloatArray, /) -> bool:
+        """Return whether the unknowns may become *at* in one motion from *here*."""
+
     def moved(self, at: FloatArray, directions: Sequence[FloatArray], /) -> _Pose:
         """Return the pose with unknowns *at*, moved along *directions* onto the volumes."""
 
@@ -143,7 +146,8 @@ def minimise(
         trial: Step | None = step
         if step.is_whole:
             guess = anderson.extrapolate(here.at + step.h, objective.residual(step.h))
-            ahead = _lower(objective.moved(guess, step.directions), here)
+            if objective.allows(here, guess):
+                ahead = _lower(objective.moved(guess, step.directions), here)
         while ahead is None and trial is not None:
             anderson.forget()
             ahead = _shortened(objective, here, trial)

@@ -36,8 +36,8 @@ class Term(Protocol):
         """
         ...
 
-    def share(self, step: FloatArray) -> float:
-        """Return the share of a *step* (m, 3), at most 1, to which the Hessian is valid."""
+    def share(self, p: FloatArray, step: FloatArray) -> float:
+        """Return the share of a *step* (m, 3) from *p*, at most 1, that the term allows."""
         ...
 
 
@@ -62,6 +62,6 @@ def hessian_of(terms: Sequence[Term], p: FloatArray, x: FloatArray) -> FloatArra
     return total
 
 
-def share_of_step(terms: Sequence[Term], step: FloatArray) -> float:
-    """Return the share of a *step* (m, 3), at most 1, to which all *terms* limit it."""
-    return min([1.0, *(term.share(step) for term in terms)])
+def share_of_step(terms: Sequence[Term], p: FloatArray, step: FloatArray) -> float:
+    """Return the share of a *step* (m, 3) from *p*, at most 1, that all *terms* allow."""
+    return min([1.0, *(term.share(p, step) for term in terms)])

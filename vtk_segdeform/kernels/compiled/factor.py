@@ -1,6 +1,7 @@
 """Sums of blocks for `hessian`, and triangular solves with few right-hand sides.
 
-The solves are for `hessian` and `finish.factor`.  LAPACK is optimised for many right-hand sides; for two it takes twice as long.
+The solves are for `hessian` and `finish.factor`.  LAPACK is optimised for many right-hand sides;
+for two it takes twice as long.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 
 @_compile("f8[:,:], f8[:,:], i8[:]")
 def add_upper(total, part, places):
-    """Add the upper half of *part* (c, c) to *total* (n, n) at *places* (c,), in ascending order."""
+    """Add the upper half of *part* (c, c) to *total* (n, n) at the ascending *places* (c,)."""
     for i in range(len(places)):
         row, own = total[places[i]], part[i]
         for j in range(i, len(places)):
