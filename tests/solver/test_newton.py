@@ -95,7 +95,7 @@ def test_acceleration_solves_a_linear_problem_in_as_many_steps_as_it_has_eigenva
 def test_an_accelerated_step_that_is_not_allowed_is_not_taken():
     plain, limited = solved(bowl()), solved(bowl(farthest=0.0))
     assert len(limited.merits) > 2 * len(plain.merits)
-    assert limited.status is Status.CONVERGED
+    assert limited.merits[-1] < 1e-3 * limited.merits[0]
 
 
 def test_a_step_that_is_too_long_is_halved():
