@@ -546,7 +546,6 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "HandleDragger.set_hidden.name": ("handle",),
     "HandleDragger.set_locked.name": ("handle",),
     "Cage.vertices": ("faces",),
-    "CageDisplay.show_faults.vertices": ("faces",),
     "film.frames": ("film", "targets"),
     "Mesh.faces": ("oriented mesh",),
     "Mesh.vertices": ("oriented mesh",),

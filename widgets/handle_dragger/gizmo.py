@@ -65,6 +65,7 @@ class Gizmo:
         self._stop = view.before_render(self._lay_out)
         self._update_colours()
         self._update_clipping()
+        self._lay_out()  # hides it
 
     @property
     def centre(self) -> FloatArray | None:

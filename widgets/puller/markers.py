@@ -19,7 +19,7 @@ from vtk_segdeform.pictures import COLOURS, PAPER, rgb
 from vtk_segdeform.session import Session, pulls
 
 from ..picking import Picker
-from ..scene import Phase, Pointer, SurfaceDisplay
+from ..scene import Pointer, SurfaceDisplay
 
 _BLACK, _HIGHLIGHT = "#101010", COLOURS[4]
 _PIN, _PULLED, _RIM = 11.0, 7.0, 4.0  # pixels: the dots, and both sides of the rim together
@@ -81,7 +81,8 @@ class Markers:
         for k in np.argsort(away):
             if not away[k] <= _REACH * self._scale:
                 break
-            if self._is_visible(places[k]):
+            place = places[k]
+            if self._picker.sees(place, within=_REACH * self._view.pixel_at(place)):
                 return names[int(k)]
         return None
 
@@ -104,12 +105,6 @@ class Markers:
     @property
     def _scale(self) -> float:
         return float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.8, 3.0))
-
-    def _is_visible(self, place: FloatArray) -> bool:
-        x, y, _ = self._view.to_display(place[None])[0]
-        hit = self._picker.hit(Pointer(Phase.HOVER, x, y))
-        pixel = self._view.pixel_at(place)
-        return hit is None or bool(np.linalg.norm(hit.point - place) <= _REACH * pixel)
 
     def _lay_out(self) -> None:
         """Place the dots in front of the surface, as seen from the camera."""

@@ -14,7 +14,6 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, rgb
 
-from ..picking import contour
 from ..scene import Draft, SurfaceDisplay
 
 _DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
@@ -32,7 +31,7 @@ class BrushRing:
     Parameters
     ----------
     surface : SurfaceDisplay
-        The mesh, n vertices.
+        The mesh.
     """
 
     def __init__(self, surface: SurfaceDisplay) -> None:
@@ -41,28 +40,20 @@ class BrushRing:
         self._draft = Draft.of(surface.view)
         self._actors = [self._actor(offset) for offset in _UNIT_OFFSETS]
 
-    def draw(self, distance: FloatArray, radius: float, colour: NDArray[np.uint8]) -> None:
+    def draw(
+        self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
+    ) -> None:
         """Draw the ring with a dark rim, visible on any background.
 
         Parameters
         ----------
-        distance : (n,) float
-            Of each vertex; finite at least within *radius* and at the neighbours.
-        radius : float
-            In the mesh's unit.
+        segments : (k, 2, 3) float
+            From `Picker.ring`.
         colour : (3,) uint8
             Red, green and blue, 0 to 255.
+        thickness : float
+            Of the line, relative to that of a brush.
         """
-        below = distance <= radius
-        a, b, c = (below[corner] for corner in self._surface.session.mesh.faces.T)
-        faces = self._surface.session.mesh.faces[(a != b) | (b != c)]
-        segments = contour(self._surface.points[faces], distance[faces], radius)
-        self.draw_segments(segments, colour)
-
-    def draw_segments(
-        self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
-    ) -> None:
-        """Draw a ring of *segments* (k, 2, 3), *thickness* times as thick as a brush's."""
         view = self._surface.view
         scale = float(np.clip(view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
         ends = view.lifted(segments.reshape(-1, 3), scale * _LIFT)

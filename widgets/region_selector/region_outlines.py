@@ -135,9 +135,7 @@ class RegionOutlines:
             return False
         if self._session.is_dragging:  # a search structure for each frame would be too slow
             return True
-        hit = self._picker.hit(pointer)
-        nearness = _HIDDEN * self._session.mesh.diagonal
-        return hit is None or bool(np.linalg.norm(hit.point - point) < nearness)
+        return self._picker.sees(point, within=_HIDDEN * self._session.mesh.diagonal)
 
 
 def _borders(labels: IntArray, faces: IntArray) -> tuple[IntArray, IntArray]:

@@ -32,7 +32,7 @@ from .brush_ring import BrushRing
 from .outline import Outline
 from .paint_target import Paint, PaintTarget, dominant_region
 from .region_colours import RegionColours
-from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole, hits_at
+from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
@@ -301,12 +301,12 @@ class RegionSelector(Widget):
         self._draw_ring(pointer, self._target, pointer.control)
 
     def _draw_ring(self, pointer: Pointer, target: PaintTarget, erase: bool) -> None:
-        hits = hits_at(self._picker, pointer, self.through) if self.view.contains(pointer) else []
-        if hits:
-            distance = self._picker.distances(hits, self.radius)
-            self._ring.draw(distance, self.radius, rgb(PAPER) if erase else target.colour)
-        else:
+        hit = self._picker.hit(pointer) if self.view.contains(pointer) else None
+        if hit is None:
             self._ring.hide()
+        else:
+            segments = self._picker.ring(hit, self.radius)
+            self._ring.draw(segments, rgb(PAPER) if erase else target.colour)
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
