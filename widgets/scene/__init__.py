@@ -12,7 +12,6 @@ The files, in reading order:
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     viewpoint          movements of the camera, named views, framing, the up axis
-    camera_checks      rotations of a camera, and checks of its vectors
     navigation         the camera by mouse
     orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
@@ -24,7 +23,6 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
-from .decimated_surface import decimated_triangles
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .glide import Glide
@@ -36,12 +34,11 @@ from .orientation_cube import OrientationCube
 from .projection import Projection
 from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
-from .viewpoint import TURN, VIEWS, Viewpoint
+from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
 from .wireframe import Wireframe
 
 __all__ = [
-    "TURN",
     "VIEWS",
     "Draft",
     "Gesture",
@@ -61,7 +58,6 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
-    "decimated_triangles",
     "drawn_triangles",
     "handle_colour",
     "set_background",

@@ -25,17 +25,6 @@ from vtk_segdeform.mesh import Mesh
 _PATIENCE = 0.01  # seconds until it is clear that the decimated mesh does not exist yet
 
 
-def decimated_triangles(mesh: Mesh, n_points: int) -> tuple[IntArray, IntArray]:
-    """Return some *n_points* vertices (k,) of a large *mesh*, and faces (f, 3) between them."""
-    coarse, kept, _ = decimated(mesh, n_points)
-    x, normals = mesh.vertices[kept], VertexNormals(mesh).subset(kept)(mesh.vertices)
-    # Clusters may fold a face over, which light would show as a black dot.
-    faces = coarse.faces
-    a, b, c = (x[corner] for corner in faces.T)
-    folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
-    return kept, np.where(folded[:, None], faces[:, ::-1], faces)
-
-
 @dataclass(frozen=True, eq=False)
 class _Shape:
     """The vertices (k,) of a mesh that are drawn, faces between them, and their normals."""
@@ -48,9 +37,14 @@ class _Shape:
     @classmethod
     def of(cls, mesh: Mesh) -> _Shape:
         """Return the shape of a large *mesh*."""
-        kept, faces = decimated_triangles(mesh, sizes.DECIMATED_POINTS)
+        coarse, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
         normals_of = VertexNormals(mesh).subset(kept)
-        return cls(kept, faces, normals_of(mesh.vertices), normals_of)
+        faces, x, normals = coarse.faces, mesh.vertices[kept], normals_of(mesh.vertices)
+        # Clusters may fold a face over, which light would show as a black dot.
+        a, b, c = (x[corner] for corner in faces.T)
+        folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
+        faces = np.where(folded[:, None], faces[:, ::-1], faces)
+        return cls(kept, faces, normals, normals_of)
 
 
 class DecimatedSurface:

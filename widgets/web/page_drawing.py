@@ -14,8 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..editor import DeformEditor
 from ..scene import Draft, SurfaceStyle
 from .drawing import Mark, SurfaceStream, label_actors, labels_of, look_of, marks_of
@@ -174,8 +172,6 @@ class PageDrawing:
 
     def _due(self) -> list[bytes]:
         editor, surface = self._editor, self._editor.widgets.surface
-        view, viewpoint = editor.view, editor.controller.camera.viewpoint
         marks = self._marks  # first, because this lays out
-        material, focus = surface.actor.GetProperty(), np.array(view.camera.GetFocalPoint())
-        look = look_of(view.renderer, material, viewpoint.turning_axis(), focus)
+        look = look_of(editor.view.renderer, surface.actor.GetProperty())
         return self._stream.due(look, colours=surface.colours, marks=marks)

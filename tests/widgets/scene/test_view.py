@@ -84,6 +84,20 @@ def test_to_display_and_to_world_are_inverses(parallel):
 
 
 @pytest.mark.parametrize("parallel", [False, True])
+def test_the_line_of_sight_does_not_depend_on_the_clipping_range_to_the_bit(parallel):
+    """Other hosts draw other frames of the same input, and each frame sets that range."""
+    view, found = plain_view((320, 240)), []
+    view.camera.SetParallelProjection(parallel)
+    view.camera.SetPosition(3.0, 2.0, 1.0)
+    for near, far in ((0.1, 10.0), (1.37, 5.3)):
+        view.camera.SetClippingRange(near, far)
+        found.append(np.concatenate(view.line_of_sight(Pointer(Phase.MOVE, 71.0, 133.0))))
+    assert np.array_equal(*found)
+    near, far = view.ray(Pointer(Phase.MOVE, 71.0, 133.0))
+    assert np.allclose(np.cross(far - near, found[0][3:]), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("parallel", [False, True])
 def test_the_length_of_a_pixel_agrees_with_the_projection(parallel):
     view = plain_view((300, 300))
     SurfaceDisplay(view, Session(models.sphere(200)))

@@ -129,39 +129,17 @@ def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
     loop, timers = started(view)
     ticks: list[float] = []
     view.every(40, lambda: ticks.append(loop.now))
-    for _ in range(60):  # input every 0.03 seconds
+    for _ in range(80):  # input every 0.03 seconds
         loop.run(0.03)
         timers.postpone()
-    assert ticks == pytest.approx([0.5, 1.0, 1.5])
+    assert ticks == pytest.approx([1.0, 2.0])
     loop.run(0.1)
-    assert ticks[3:] == pytest.approx([1.84, 1.88])
+    assert ticks[2:] == pytest.approx([2.44, 2.48])
     view.interactor.CreateOneShotTimer(30)
     for _ in range(3):
         loop.run(0.02)
         timers.postpone()
     assert len(loop.due) == 1  # a timer that fires once does not wait
-    timers.stop()
-
-
-def test_slow_ticks_take_a_twentieth_of_the_time_while_input_arrives(view: View) -> None:
-    loop, timers = started(view)
-    ticks = []
-
-    def tick() -> None:
-        ticks.append(loop.now)
-        loop.now += duration
-
-    view.every(40, tick)
-    duration = 0.06
-    while loop.now < 3.5:
-        loop.run(0.01)
-        timers.postpone()
-    assert ticks == pytest.approx([0.5, 1.7, 2.9], abs=0.02)
-    duration = 1.0
-    while len(ticks) < 5:
-        loop.run(0.01)
-        timers.postpone()
-    assert ticks[4] - ticks[3] == pytest.approx(2.0, abs=0.02)  # no longer than that
     timers.stop()
 
 

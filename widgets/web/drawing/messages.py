@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 2
+VERSION = 3
 _MAGIC = b"SDFM"
 _HEADER = struct.Struct("<4sHHII")
 
@@ -28,7 +28,7 @@ class Kind(enum.IntEnum):
     """What a message contains; arrays in this order."""
 
     SURFACE = 1
-    """Nine counts, and the arrays of `EncodedSurface`."""
+    """Seven counts, and the arrays of `EncodedSurface`."""
     CAGES = 2
     """The number of the pose, and the moves of the cage vertices (m, 3) float32."""
     OFFSETS = 3

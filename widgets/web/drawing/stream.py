@@ -77,10 +77,6 @@ class SurfaceStream:
         self._cages: tuple[FloatArray, ...] = ()
         self._offsets: FloatArray | None = None
 
-    def repeat_look(self) -> None:
-        """Send the look again: to a page that has turned the camera itself."""
-        self._look = b""
-
     def encode(self) -> None:
         """Encode the mesh and its cages, if `is_possible`; 0.1 s for 50,000 vertices.
 
