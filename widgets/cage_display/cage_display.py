@@ -25,7 +25,6 @@ from ..scene import Gesture, Pointer, Widget, Wireframe
 from .cage_drag import CageVertex, drag_vertex
 from .vertex_picking import points_at_pointer
 
-_DESIGN_HEIGHT = 600  # pixels; lines are thicker in a higher window
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
@@ -186,7 +185,7 @@ class CageDisplay(Widget):
 
     def _set_sizes(self) -> None:
         """Scale lines and spheres with the window."""
-        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
+        scale = self.view.scale
         for region, wireframe in enumerate(self._wireframes):
             colour = of_region(region)
             wireframe.set_style(colour, line_width=1.8 * scale, sphere_size=8.0 * scale)

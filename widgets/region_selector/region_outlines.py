@@ -20,7 +20,6 @@ from vtk_segdeform.session import Change
 from ..picking import Picker
 from ..scene import Phase, Pointer, Stop, SurfaceDisplay, Wireframe
 
-_DESIGN_HEIGHT = 600  # pixels; lines and numbers are larger in a higher window
 _LINE_WIDTH, _LETTERS = 1.6, 14  # pixels
 _PLACES = 24  # per region, where its number may be
 _SAMPLE = 300  # vertices of a region from which they are chosen
@@ -101,8 +100,7 @@ class RegionOutlines:
         """Scale lines and numbers with the window, and place the numbers where they are seen."""
         if not (self._outline or self._labels):
             return
-        height = self._view.renderer.GetSize()[1]
-        scale = float(np.clip(height / _DESIGN_HEIGHT, 0.8, 3.0))
+        scale = self._view.scale
         if self._outline is not None:
             self._outline.set_style(rgb(INK), line_width=scale * _LINE_WIDTH, sphere_size=1.0)
         dots = self._view.renderer.GetRenderWindow().GetDPI() or 72

@@ -36,7 +36,7 @@ from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
 from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
-from .wireframe import Wireframe
+from .wireframe import Wireframe, cells_of, points_of
 
 __all__ = [
     "VIEWS",
@@ -58,8 +58,10 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
+    "cells_of",
     "drawn_triangles",
     "handle_colour",
+    "points_of",
     "set_background",
     "set_font",
     "set_lights",
