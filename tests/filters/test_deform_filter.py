@@ -235,17 +235,6 @@ def test_it_reports_progress_and_can_be_aborted(surface):
     assert made.faults == []
 
 
-def test_pyvista_draws_its_output(surface):
-    made = filter_of(surface, Translation=tuple(SHIFT))
-    plotter = pv.Plotter(off_screen=True)
-    actor = plotter.add_mesh(made)
-    before = actor.bounds
-    made.SetTranslation(0.0, 0.0, 0.0)
-    actor.mapper.Update()
-    assert actor.bounds != before
-    plotter.close()
-
-
 def ours():
     """Return the modules of the package that are imported, by name."""
     return {name: m for name, m in sys.modules.items() if name.partition(".")[0] == sd.__name__}

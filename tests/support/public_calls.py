@@ -486,7 +486,6 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Film.save.path": lambda: Path("saved.gif"),
     "HandleDragger.handle.value": lambda: "handle 1",
     "HandleDragger.local.value": lambda: True,
-    "HandleDragger.refine_while_resting.value": lambda: False,
     "RegionSelector.radius.value": lambda: 0.1,
     "RegionSelector.tool.value": lambda: sd.widgets.Tool.LASSO,
     "Handles.add.vertices": lambda: [int(np.abs(mesh().vertices[:, 0]).argmin())],

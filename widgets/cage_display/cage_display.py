@@ -132,7 +132,7 @@ class CageDisplay(Widget):
         visible = [r for r, each in enumerate(self._wireframes) if each.actor.GetVisibility()]
         if not visible:
             return None
-        numbers = [(r, v) for r in visible for v in range(len(vertices[r]))]
+        numbers: list[CageVertex] = [(r, v) for r in visible for v in range(len(vertices[r]))]
         points = np.concatenate([vertices[r] for r in visible])
         for k in points_at_pointer(self.view, pointer, points):
             if self.through or is_seen(self.view, points[k], session.vertices, session.mesh.faces):

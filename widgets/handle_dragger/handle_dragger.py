@@ -14,7 +14,7 @@ plane.  A pin or pulled point is moved by a pull, so that the pose around it is 
                                 puts it back
     escape, right button        cancel
 
-Each move solves once, for about 20 ms, for the current position of the pointer.  While the pointer
+Each move solves once for the current position of the pointer.  While the pointer
 rests, and after the release, a timer refines the pose until it has converged; this is part of the
 same undo step.
 """
@@ -141,18 +141,8 @@ class HandleDragger(Widget):
         self._update_gizmo()
 
     @property
-    def refine_while_resting(self) -> bool:
-        """Whether a timer refines the pose while the pointer rests, and after the release."""
-        return self._live.is_enabled
-
-    @refine_while_resting.setter
-    def refine_while_resting(self, refines: bool) -> None:
-        self._live.is_enabled = as_flag(refines, "refine_while_resting")
-        self.resume_refining()
-
-    @property
     def is_refining(self) -> bool:
-        """Whether that timer is running."""
+        """Whether a timer refines the pose: while the pointer rests, and after the release."""
         return self._live.is_refining
 
     def stop_refining(self) -> None:
@@ -160,7 +150,7 @@ class HandleDragger(Widget):
         self._live.halt()
 
     def resume_refining(self) -> None:
-        """Refine the current pose if it has not converged, the widget is on and it may refine."""
+        """Refine the current pose if it has not converged and the widget is on."""
         if self.GetEnabled():
             self._live.resume()
 
@@ -184,7 +174,7 @@ class HandleDragger(Widget):
         """Remove the widget from the view permanently."""
         self.Off()
         self._stop_listening()
-        self._live.remove()
+        self._live.pause()
         self.gizmo.remove()
         self._marks.remove()
         if self._own_surface:

@@ -162,7 +162,6 @@ class Puller(Widget):
         """Remove the widget from the view permanently."""
         self.Off()
         self._stop_listening()
-        self._live.remove()
         self._gizmo.remove()
         self._markers.remove()
         self._ring.remove()

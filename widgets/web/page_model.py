@@ -64,21 +64,16 @@ class PageModel:
             self._loop.call_later(_PERIOD, self._flush)
 
     def _flush(self) -> None:
-        """Show the editor; while the hand drags only its status, and everything else after that.
-
-        All of it takes a tenth of the time of a frame.
-        """
         self._is_due = False
-        if any(widget.is_grabbing for widget in self._editor.widgets.interactive):
-            self._refresh_status()
-        else:
-            self.refresh()
+        self.refresh()
         self._state.flush()
 
     def refresh(self) -> None:
         """Show the editor as it is."""
         editor, keys, name = self._editor, self._editor.keys, self.name
-        self._refresh_status()
+        status = panel.status(editor)
+        self._show("status", status)
+        self._show("touch_words", for_fingers(status.words))
         self._show("toolbar", panel.toolbar(editor))
         self._show("sections", panel.sections(editor))
         self._show("history", panel.history(editor))
@@ -88,11 +83,6 @@ class PageModel:
         self._set("trame__title", f"{name} · segdeform")
         self._set("uses_tab", keys.binding_of("tab", editor.mode) is not None)
         self._set("help", {"keys": keys["help"].keys, "sections": [*keys.sections(), _OWN_KEYS]})
-
-    def _refresh_status(self) -> None:
-        status = panel.status(self._editor)
-        self._show("status", status)
-        self._show("touch_words", for_fingers(status.words))
 
     def press(self, name: object, value: object = None) -> None:
         """Use a control; see `panel.press`.  "hint" runs the action of a word of the hint."""

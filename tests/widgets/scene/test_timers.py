@@ -111,18 +111,6 @@ def test_views_of_one_interactor_share_it(view, host):
     stops[1]()
 
 
-def test_views_of_two_interactors_do_not(view, host):
-    other = plain_view((60, 60))
-    its_host, heard = OneTimerHost(other.interactor), []
-    stops = [each.every(20, lambda k=k: heard.append(k)) for k, each in enumerate((view, other))]
-    stops[0]()
-    its_host.tick()
-    host.tick()
-    assert heard == [1]
-    stops[1]()
-    assert not its_host.is_running
-
-
 @pytest.mark.parametrize("kind", ["CreateRepeatingTimer", "CreateOneShotTimer"])
 def test_it_keeps_running_when_a_foreign_timer_ends(view, host, kind):
     heard = []

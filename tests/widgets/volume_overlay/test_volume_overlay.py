@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from campaign import every
-from hands import Hand, draw_seldom, picture, plain_view
+from hands import draw_seldom, picture, plain_view
 from open_meshes import open_box, sheet
 from scenes import sausage
 from solids import rotation
@@ -20,7 +20,6 @@ from vtk_segdeform import Regions, Session
 from vtk_segdeform.geometry.local_volume import LocalVolume
 from vtk_segdeform.pictures.palette import of_region
 from vtk_segdeform.solver.volume_constraints import region_volumes
-from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.diverging import (
@@ -239,13 +238,13 @@ def test_a_bend_that_loses_volume_is_blue_inside(overlay):
 
 
 @several(3)
-def test_the_lines_show_totals_regions_and_steps(overlay):
+def test_the_lines_show_totals_and_regions(overlay):
     session = overlay.session
     overlay.show()
     regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
     assert lines_of(overlay) == ["Volume: 0 %", "Local: 0 to 0 %", *regions]
     session.change_options(preserve_volume=True)
-    solution = session.drag(sausage(3, is_coarse=True).turned(30.0), max_steps=4)
+    session.drag(sausage(3, is_coarse=True).turned(30.0), max_steps=4)
     lines = lines_of(overlay)
     assert lines[0] == "Volume: 0 %"
     s = LocalVolume(session.mesh).change(session.vertices)
@@ -254,13 +253,12 @@ def test_the_lines_show_totals_regions_and_steps(overlay):
         share = volume.violation(session.vertices) / volume.target
         assert float(lines[2 + r].split()[2]) == pytest.approx(100 * share, abs=0.051)
     assert any("region" in line and line.split()[2] != "0" for line in lines)
-    assert lines[-1] == f"{solution.steps} steps"
     overlay.hide()
     loaded = Session(session.mesh, state=session.state)  # has no solution,
     assert loaded.solution is None
     again = VolumeOverlay(overlay.view, loaded, overlay.surface)
     again.show()
-    assert lines_of(again) == lines[:-1]  # so the regions' volumes are measured
+    assert lines_of(again) == lines  # so the regions' volumes are measured
     again.remove()
 
 
@@ -278,28 +276,6 @@ def test_the_line_of_a_region_has_its_colour(overlay):
     assert len(lines_of(overlay)) == 4
     overlay.session.painting.merge([0, 1])
     assert len(lines_of(overlay)) == 2  # a single region has no line
-
-
-def test_the_time_per_frame_is_shown_from_the_second_frame_on(overlay):
-    del overlay.view.render  # drawn at every event
-    cages = CageDisplay(overlay.view, overlay.session)
-    cages.through = True
-    cages.On()
-    overlay.show()
-    hand = Hand(overlay.view)
-    cage = overlay.session.cage_vertices[0]
-    x, y = hand.at(cage[np.argmin(np.abs(cage).sum(axis=1))])
-    hand.press((x, y))
-    hand.move((x - 5, y))
-    assert not any("ms" in line for line in lines_of(overlay))
-    hand.move((x - 9, y))
-    assert lines_of(overlay)[-1].endswith(" ms per frame")
-    assert 1 <= int(lines_of(overlay)[-1].split()[0]) < 5000
-    hand.release()
-    overlay.session.undo()  # outside an event
-    assert not any("ms" in line for line in lines_of(overlay))
-    cages.remove()
-    assert not hand.failures
 
 
 @several(3)
@@ -350,17 +326,6 @@ def test_the_ticks_follow_the_range(overlay):
     assert table.GetAnnotation(0) == "-20 %"
     assert table.GetAnnotation(4) == "+20 %"
     assert overlay.half_range == 0.2
-
-
-def test_the_range_does_not_flicker_during_a_drag(overlay):
-    overlay.show()
-    seen = []
-    for factor in (1.102, 1.098, 1.102, 1.098):
-        overlay.session.move_cage(0, overlay.session.cages[0].vertices * [1.0, 1.0, factor])
-        seen.append(overlay.half_range)
-    assert seen == [0.2] * 4
-    overlay.session.revert()
-    assert overlay.half_range == 0.05
 
 
 def test_a_region_without_a_face_is_left_out():

@@ -154,28 +154,6 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     assert overlap(before, drawn.body()) > 0.99
 
 
-@pytest.mark.campaign
-def test_the_layer_of_a_drag_is_opaque_and_its_texts_take_little_room(drawn: Drawn) -> None:
-    end = drawn.drag((70.0, 20.0))
-    drawn.hold(end)
-    page = drawn.page
-    page.key("x")
-    page.wait(WORDS)
-    texts, backdrop = f"{BODY}.nextElementSibling", f"{BODY}.previousElementSibling"
-    width, height = page.evaluate(f"[{texts}.width, {texts}.height]")
-    whole = page.evaluate(f"[{BODY}.width, {BODY}.height]")
-    assert 1 < width < 0.5 * whole[0]
-    assert 1 < height < 0.2 * whole[1]
-    shown = page.evaluate(
-        f"(({{width, height}}) => [width, height])({texts}.getBoundingClientRect())"
-    )
-    assert shown == pytest.approx([width, height], abs=1.0)
-    assert page.evaluate(f"{backdrop}.getContext('2d').getContextAttributes().alpha") is False
-    page.key("Escape")
-    page.release(end)
-    drawn.rest()
-
-
 def test_messages_reach_the_page_as_array_buffers(drawn: Drawn) -> None:
     page = drawn.page
     page.evaluate("""(({ prototype }) => {
