@@ -19,8 +19,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from vtk_segdeform.arrays import as_points, is_whole
 from vtk_segdeform.checks import require_sequence, shown
@@ -104,11 +102,8 @@ class Film:
         write_film(path, _ReportingPictures(self, progress), fps)
 
     def _take(self) -> None:
-        window = self.view.window
-        width, height = window.GetSize()
-        pixels = vtkUnsignedCharArray()
-        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
-        picture = vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+        picture = self.view.pixels()[::-1]
+        height, width, _ = picture.shape
         if not self._pictures:  # the first picture sets the size; videos require even numbers
             self._shape = (height - height % 2, width - width % 2, 3)
         whole = np.full(self._shape, 255, dtype=np.uint8)

@@ -38,11 +38,6 @@ _DESIGN_HEIGHT = 600  # pixels; in a higher window the gizmo is slightly larger
 class Gizmo:
     """A gizmo at one point of a view; hidden until it is placed.
 
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-
     Attributes
     ----------
     size : float

@@ -27,15 +27,7 @@ _HEAD_LENGTH, _HEAD_RADIUS = 0.16, 0.065
 
 
 class Solid:
-    """The actors of one part.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    part : Part
-        The part to draw.
-    """
+    """The actors of one part."""
 
     def __init__(self, renderer: Any, part: Part) -> None:
         self._renderer = renderer

@@ -20,13 +20,6 @@ _DOT, _ALONE, _HIGHLIGHTED = 4.0, 9.0, 2.0  # pixels; pins and pulled points sta
 class HandleMarks:
     """Dots for every handle of a session; hidden until `show`.
 
-    Parameters
-    ----------
-    view : View
-        The view to draw in; the mesh hides dots behind it.
-    session : Session
-        The session whose handles are shown.
-
     Attributes
     ----------
     hidden : frozenset of str

@@ -82,19 +82,7 @@ class Grip:
 
 
 class Motion:
-    """The motion by one part of the gizmo since the press.
-
-    Parameters
-    ----------
-    projection : Projection
-        The camera may move during the drag.
-    part : Part
-        The dragged part.
-    grip : Grip
-        The grabbed point and the gizmo at the press.
-    press : Pointer
-        The position of the press.
-    """
+    """The motion by one part of the gizmo since the press."""
 
     def __init__(self, projection: Projection, part: Part, grip: Grip, press: Pointer) -> None:
         self.part = part

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import FloatArray, IntArray
-from vtk_segdeform.kernels import compiled_kernels, inputs
 
 
 def intersections(
@@ -41,7 +40,7 @@ def intersections(
     if not length > 0.0:
         return np.empty((0, 3)), np.empty(0, dtype=np.int64)
     way = (far - near) / length
-    met = faces_in_beam(points, faces, near, way, width=2.0 * tolerance)
+    met = _faces_in_beam(points, faces, near, way, width=2.0 * tolerance)
     a, b, c = (points[corner] - near for corner in faces[met].T)
     normal = np.cross(b - a, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -59,21 +58,14 @@ def intersections(
     return near + place[found], met[found]
 
 
-def faces_in_beam(
+def _faces_in_beam(
     points: FloatArray, faces: IntArray, origin: FloatArray, way: FloatArray, *, width: float
 ) -> IntArray:
     """Return faces (k,), among them all that a beam can meet.
 
     The beam goes through *origin* (3,) along *way* (3,); its sides are *width* away from that line.
     """
-    axes = perpendicular(way)
-    kernels = compiled_kernels(len(faces))
-    if kernels:
-        # In this thread: while others work, waiting for several takes longer than both passes.
-        met = np.empty(len(faces), dtype=np.int64)
-        count = kernels.faces_in_beam(met, *inputs(points, faces, origin, axes), width)
-        return met[:count].copy()
-    u, v = ((points - origin) @ axes.T).T
+    u, v = ((points - origin) @ perpendicular(way).T).T
     sides = (u > width) * np.uint8(1) | (u < -width) * np.uint8(2)
     sides |= (v > width) * np.uint8(4) | (v < -width) * np.uint8(8)
     first, second, third = (sides[corner] for corner in faces.T)

@@ -48,13 +48,7 @@ class _Visibility:
 
 
 class Picker:
-    """Queries on the mesh of a surface.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh as displayed in its view.
-    """
+    """Queries on the mesh of a surface."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface

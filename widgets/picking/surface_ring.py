@@ -27,13 +27,7 @@ _CORNERS = 48  # of a circle
 
 
 class SurfaceRing:
-    """Rings on the surface of one mesh, in any pose.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        n vertices.
-    """
+    """Rings on the surface of one mesh, in any pose."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh

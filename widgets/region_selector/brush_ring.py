@@ -23,13 +23,7 @@ _LIFT = 6.0  # pixels towards the camera, so that the line is whole at the silho
 
 
 class BrushRing:
-    """The line of constant distance along the surface; invisible until `draw`.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh.
-    """
+    """The line of constant distance along the surface; invisible until `draw`."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface

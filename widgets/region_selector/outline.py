@@ -15,13 +15,7 @@ _WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels
 
 
 class Outline:
-    """A closed line in the display; invisible until `draw`.
-
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-    """
+    """A closed line in the display; invisible until `draw`."""
 
     def __init__(self, view: View) -> None:
         self._view = view

@@ -29,13 +29,7 @@ _NO_POINTS = np.empty(0, dtype=np.int64)
 
 
 class RegionOutlines:
-    """Outlines and numbers of the regions of a session; hidden until `show`.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh, n vertices.
-    """
+    """Outlines and numbers of the regions of a session; hidden until `show`."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface, self._view = surface, surface.view

@@ -48,17 +48,7 @@ class _Shape:
 
 
 class DecimatedSurface:
-    """The decimated mesh as an actor; invisible at first.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        n vertices at rest.
-    shape : _Shape
-        What is drawn.
-    surface : vtkProperty
-        How it is drawn.
-    """
+    """The decimated mesh as an actor; invisible at first."""
 
     def __init__(self, mesh: Mesh, shape: _Shape, surface: Any) -> None:
         self._kept, self._normals_of = shape.kept, shape.normals_of
@@ -97,13 +87,7 @@ class DecimatedSurface:
 
 
 class Decimating:
-    """Makes the `DecimatedSurface` of *mesh*, without waiting for it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh at rest.
-    """
+    """Makes the `DecimatedSurface` of *mesh*, without waiting for it."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh

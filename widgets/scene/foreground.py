@@ -13,11 +13,6 @@ _SMALLEST = 8  # pixels; in a smaller window VTK warns about empty text textures
 class Foreground:
     """A layer above a renderer, until `remove`.
 
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer below, in a window; its camera is copied.
-
     Attributes
     ----------
     renderer : vtkRenderer

@@ -29,13 +29,7 @@ _ENDING = (
 
 
 class Glide:
-    """Draws a surface between two poses; any press, key or motion of the camera ends it.
-
-    Parameters
-    ----------
-    view : View
-        Provides the timer and the events.
-    """
+    """Draws a surface between two poses; any press, key or motion of the camera ends it."""
 
     def __init__(self, view: View) -> None:
         self._view = view

@@ -22,13 +22,7 @@ _THROUGH = 0.4  # opacity of marks that the body hides
 
 
 class Highlights:
-    """Loops and vertices of one mesh; hidden until `show`.
-
-    Parameters
-    ----------
-    view : View
-        Where they are drawn.
-    """
+    """Loops and vertices of one mesh; hidden until `show`."""
 
     def __init__(self, view: View) -> None:
         self.view = view

@@ -30,19 +30,7 @@ _DOTS_PER_INCH = 72.0  # the resolution at which font size 12 is 12 pixels
 
 
 class Panel:
-    """A rectangle of one colour.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    colour : str
-        "#RRGGBB".
-    opacity : float
-        0 to 1.
-    layer : int
-        Higher layers are drawn over lower ones.
-    """
+    """A rectangle of one colour, "#RRGGBB"; higher layers are drawn over lower ones."""
 
     def __init__(self, renderer: Any, colour: str, *, opacity: float = 1.0, layer: int = 0) -> None:
         self._renderer = renderer
@@ -79,21 +67,7 @@ class Panel:
 
 
 class Text:
-    """Text of one line or more.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    colour : str
-        "#RRGGBB".
-    bold : bool
-        Whether the font is bold.
-    monospace : bool
-        Whether all letters have the same width.
-    layer : int
-        Higher layers are drawn over lower ones, as in `Panel`.
-    """
+    """Text of one line or more; *monospace* has letters of one width, and layers as `Panel`."""
 
     def __init__(
         self,

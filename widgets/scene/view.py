@@ -25,9 +25,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 from weakref import WeakValueDictionary
 
+import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both register the rendering backends
-from vtkmodules.vtkCommonCore import vtkCommand
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkCommand, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
 from vtk_segdeform.arrays import is_number, is_whole
@@ -132,6 +135,13 @@ class View(Projection):
             self.window.Render()
             self._drawn = time.perf_counter()
             self._drawing_time = self._drawn - began
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """Return the last picture of the window, (h, w, 3), the lowest row first."""
+        (width, height), values = self.window.GetSize(), vtkUnsignedCharArray()
+        self.window.GetPixelData(0, 0, width - 1, height - 1, 0, values, 0)
+        pixels: NDArray[np.uint8] = vtk_to_numpy(values).reshape(height, width, 3)
+        return pixels
 
     def request_render(self) -> None:
         """Draw the window once, at the end of the current event; outside an event, draw it now.
@@ -368,11 +378,6 @@ class _SharedTimer:
 
     If the host stops it together with a timer of another owner, such as a hovering widget or a
     camera style, it is restarted.
-
-    Parameters
-    ----------
-    interactor : vtkRenderWindowInteractor
-        Owner of the timer; use `of` to share it.
     """
 
     _shared: WeakValueDictionary[int, _SharedTimer] = WeakValueDictionary()

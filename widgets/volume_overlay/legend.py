@@ -27,15 +27,7 @@ _BACKGROUND_OPACITY = 0.7  # of text that may lie over the mesh
 
 
 class Legend:
-    """A colour bar and lines of text; hidden until `show`.
-
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-    title : str
-        The title of the colour bar.
-    """
+    """A colour bar and lines of text; hidden until `show`."""
 
     def __init__(self, view: View, title: str) -> None:
         self.view = view

@@ -57,11 +57,6 @@ class Input:
 class Inputs:
     """Events that wait for the view.
 
-    Parameters
-    ----------
-    view : View
-        Receives them.
-
     Attributes
     ----------
     time : float

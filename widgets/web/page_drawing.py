@@ -47,13 +47,7 @@ class Update:
 
 
 class PageDrawing:
-    """What the page of *editor* draws itself.
-
-    Parameters
-    ----------
-    editor : DeformEditor
-        The editor in the view of the page.
-    """
+    """What the page of *editor* draws itself."""
 
     def __init__(self, editor: DeformEditor) -> None:
         self._editor = editor

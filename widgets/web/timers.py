@@ -19,13 +19,7 @@ _LONGEST = 1.0  # seconds between two ticks of a timer that waits for input, if 
 
 
 class Timers:
-    """Fires all timers that *interactor* creates from now on, between `start` and `stop`.
-
-    Parameters
-    ----------
-    interactor : vtkGenericRenderWindowInteractor
-        Their owner.
-    """
+    """Fires all timers that *interactor* creates from now on, between `start` and `stop`."""
 
     def __init__(self, interactor: Any) -> None:
         self._interactor = interactor

@@ -72,9 +72,7 @@ def test_a_hit_is_the_first_intersection_of_the_line_of_sight(parallel):
     assert met > 5
 
 
-@pytest.mark.parametrize("compiled", [0, 10**9])
-def test_a_line_through_a_vertex_or_an_edge_meets_the_surface(compiled, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", compiled)
+def test_a_line_through_a_vertex_or_an_edge_meets_the_surface():
     vertices, faces = icosphere(2)
     x = 1e3 + vertices  # away from the origin
     for k in range(20):

@@ -15,11 +15,10 @@ from scenes import sausage
 from sheets import moebius
 
 from vtk_segdeform import Regions, fit_cages
-from vtk_segdeform.errors import ArgumentError, CageError
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session, State
-from vtk_segdeform.widgets.web.drawing import encode_surface, encoding
+from vtk_segdeform.widgets.web.drawing import SurfaceStream, encode_surface, encoding
 
 ROUNDING = 1e-6  # diagonals, of single precision
 
@@ -142,15 +141,7 @@ def test_the_seam_of_a_surface_with_one_side_is_drawn_twice():
     assert received.faces.max() == mesh.n_vertices + 4
 
 
-def test_what_is_too_large_for_a_page_is_refused(session, monkeypatch):
+def test_what_is_too_large_for_a_page_is_not_drawable(session, monkeypatch):
+    assert SurfaceStream(session).is_possible
     monkeypatch.setattr(encoding, "MOST_WEIGHTS", 100)
-    with pytest.raises(ArgumentError, match="let the server draw this one"):
-        encoded(session)
-
-
-def test_cages_and_colours_of_another_mesh_are_refused(session):
-    surface = encoded(session)
-    with pytest.raises(CageError, match="the cages must have"):
-        surface.cage_message(1, 1, [cage.vertices for cage in session.cages[:1]])
-    with pytest.raises(ArgumentError, match="colours must be uint8"):
-        surface.colour_message(1, np.zeros((3, 3), np.uint8))
+    assert not SurfaceStream(session).is_possible

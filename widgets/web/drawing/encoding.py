@@ -24,7 +24,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from vtk_segdeform.arrays import FloatArray, IntArray, as_points, bounds_of
 from vtk_segdeform.cages import Cage
-from vtk_segdeform.errors import ArgumentError, CageError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.subspace import Subspace
 
@@ -94,8 +93,6 @@ class EncodedSurface:
     def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
         """Return the message of a pose, (m_r, 3) for each cage; *number* counts the poses."""
         p = np.concatenate([np.asarray(each, dtype=np.float64) for each in cage_vertices])
-        if p.shape != self.cages.shape:
-            raise CageError(f"the cages must have {len(self.cages)} vertices; got {len(p)}")
         moves = ((p - self.cages) / self.scale).astype(np.float32)
         return message(Kind.CAGES, serial, np.array([number], np.uint32), moves)
 
@@ -112,11 +109,6 @@ class EncodedSurface:
         """Return the message of vertex *colours* (n, 3) uint8, or of none."""
         if colours is None:
             return message(Kind.COLOURS, serial)
-        if colours.shape != self.rest.shape or colours.dtype != np.uint8:
-            expected = self.rest.shape
-            raise ArgumentError(
-                f"colours must be uint8 of shape {expected}; got {colours.dtype}, {colours.shape}"
-            )
         opaque = np.full((len(colours), 4), 255, dtype=np.uint8)
         opaque[:, :3] = colours[self.order]
         return message(Kind.COLOURS, serial, opaque)
@@ -131,7 +123,7 @@ def is_drawable(mesh: Mesh, subspace: Subspace) -> bool:
 def encode_surface(
     mesh: Mesh, subspace: Subspace, cages: Sequence[Cage], turned: IntArray
 ) -> EncodedSurface:
-    """Return *mesh* with its W~ as a page needs them.
+    """Return *mesh*, which `is_drawable`, with its W~ as a page needs them.
 
     Parameters
     ----------
@@ -143,17 +135,7 @@ def encode_surface(
         At rest, in the order of the columns of W~.
     turned : (k,) int
         The corners of faces that are drawn with opposite normals, `VertexNormals.turned`.
-
-    Raises
-    ------
-    ArgumentError
-        If the mesh or its W~ is too large; see `is_drawable`.
     """
-    if not is_drawable(mesh, subspace):
-        raise ArgumentError(
-            f"a page can draw meshes of up to {MOST_VERTICES} vertices whose vertices and cage "
-            f"vertices have up to {MOST_WEIGHTS} pairs; let the server draw this one"
-        )
     low, high = bounds_of(mesh.vertices)
     centre, scale = 0.5 * (low + high), float(mesh.diagonal)
     parts = subspace.sets_by_cages()  # vertices of each set

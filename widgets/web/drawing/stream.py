@@ -34,13 +34,7 @@ _VISIBLE = 1e-4  # diagonals
 
 
 class SurfaceStream:
-    """The messages for one page; after `reset`, for a page that knows nothing.
-
-    Parameters
-    ----------
-    session : Session
-        The session whose body is drawn.
-    """
+    """The messages for one page; after `reset`, for a page that knows nothing."""
 
     def __init__(self, session: Session) -> None:
         self.session = require(session, Session, "session")
