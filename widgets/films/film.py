@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from vtk_segdeform.arrays import as_points, is_whole
 from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.progress import Progress, tell
+from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..scene import Stop, View
@@ -99,7 +99,7 @@ class Film:
         MissingDependencyError
             If the library for the format is not installed.
         """
-        write_film(path, _ReportingPictures(self, progress), fps)
+        write_film(path, self, fps, progress)
 
     def _take(self) -> None:
         picture = self.view.pixels()[::-1]
@@ -110,21 +110,6 @@ class Film:
         h, w = min(height, self._shape[0]), min(width, self._shape[1])
         whole[:h, :w] = picture[:h, :w]
         self._pictures.append(zlib.compress(whole.tobytes(), 1))
-
-
-class _ReportingPictures:
-    """The pictures of a film; each access reports progress."""
-
-    def __init__(self, film: Film, progress: Progress | None) -> None:
-        self._film, self._progress, self._count = film, progress, 0
-
-    def __len__(self) -> int:
-        return len(self._film)
-
-    def __getitem__(self, number: int, /) -> Picture:
-        tell(self._progress, min(1.0, self._count / len(self)), f"picture {number + 1}")
-        self._count += 1
-        return self._film[number]
 
 
 def film(

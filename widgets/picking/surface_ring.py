@@ -10,15 +10,14 @@ camera.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from threading import Thread
 
 import numpy as np
 
 from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray, IntArray
-from vtk_segdeform.geometry import decimated
 from vtk_segdeform.mesh import Mesh
 
+from ..scene import decimated_soon
 from .line_of_sight import perpendicular
 from .surface_distance import SurfaceDistance
 
@@ -32,7 +31,6 @@ class SurfaceRing:
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
         self._sample: _Sample | None = None
-        self._thread: Thread | None = None
         if mesh.n_vertices <= sizes.DECIMATED_POINTS:
             every = np.arange(mesh.n_vertices)
             self._sample = _Sample.of(mesh.faces, every, every)
@@ -56,7 +54,10 @@ class SurfaceRing:
             The viewing direction, of length 1.
         """
         corner = self._mesh.faces[face]
-        sample = self._ready_sample()
+        if self._sample is None and (found := decimated_soon(self._mesh)) is not None:
+            coarse, kept, cluster = found
+            self._sample = _Sample.of(coarse.faces, kept, cluster)
+        sample = self._sample
         if sample is None:
             return np.empty((0, 2, 3))
         x = points[sample.kept]
@@ -76,19 +77,6 @@ class SurfaceRing:
         if not (length := np.linalg.norm(normal)) > 0.0:
             return np.empty((0, 2, 3))
         return _circle(perpendicular(normal / length), centre, radius)
-
-    def _ready_sample(self) -> _Sample | None:
-        """Return the sample; None if it is not finished yet."""
-        if self._sample is None:
-            if self._thread is None:
-                self._thread = Thread(target=self._make, daemon=True)
-                self._thread.start()
-            return None
-        return self._sample
-
-    def _make(self) -> None:
-        coarse, kept, cluster = decimated(self._mesh, sizes.DECIMATED_POINTS)
-        self._sample = _Sample.of(coarse.faces, kept, cluster)
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
+from .decimated_surface import decimated_soon
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .glide import Glide
@@ -59,6 +60,7 @@ __all__ = [
     "Widget",
     "Wireframe",
     "cells_of",
+    "decimated_soon",
     "drawn_triangles",
     "handle_colour",
     "points_of",

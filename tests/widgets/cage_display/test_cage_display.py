@@ -204,18 +204,6 @@ def test_a_dragged_vertex_follows_the_pointer_at_constant_depth(cages, hand):
     assert not hand.failures
 
 
-def test_the_volume_is_preserved_at_every_move_if_the_option_is_on(cages, hand):
-    session = cages.session
-    session.change_options(preserve_volume=True)
-    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
-    hand.press((x, y))
-    for step in range(1, 6):
-        hand.move((x, y + 10 * step))
-        assert abs(session.volume_change) < 1e-12
-    hand.release()
-    assert not hand.failures
-
-
 def test_escape_and_the_right_button_cancel_the_drag(cages, hand):
     session = cages.session
     before, step = picture(cages.view), session.history.undo_label
@@ -240,17 +228,6 @@ def test_a_click_makes_no_undo_step(cages, hand):
     hand.click(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     assert cages.session.history.undo_label == step
     assert cages.session.state.pose is None
-
-
-def test_cancelling_keeps_an_earlier_unfinished_drag(cages, hand):
-    session = cages.session
-    moved = session.cage_vertices[0] * 1.1
-    session.move_cage(0, moved)
-    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
-    hand.press((x, y))
-    hand.move((x, y + 30))
-    hand.key("Escape")
-    assert np.array_equal(session.cage_vertices[0], moved)
 
 
 def test_a_hidden_vertex_can_only_be_dragged_with_through(cages, hand):

@@ -278,46 +278,7 @@ def test_between_angles_half_a_turn_or_more_apart_there_are_stops(bench):
     assert (shift.turn, shift.way(0.0)) == (0.0, [])
 
 
-def test_when_the_pointer_returns_so_do_the_targets(bench):
-    bench.session.drag({TIP: bench.targets() + [0.1, 0.2, 0.0]})
-    bench.session.commit()
-    before, pose = bench.targets(), bench.session.vertices
-    for part in (FREE, Part(Kind.AXIS, 0), VIEW_RING):
-        place = bench.aim(part)
-        bench.hand.press(place)
-        for step in (25.0, 0.0):
-            bench.hand.move(place + [step, -0.5 * step])
-        assert np.abs(bench.targets() - before).max() < 1e-13
-        bench.hand.release(place)
-        bench.session.refine()
-        away = np.linalg.norm(bench.session.vertices - pose, axis=1).max()
-        assert away < 1e-4 * SCENE.mesh.diagonal
-        bench.session.undo()
-
-
 # Edge-on.
-
-
-@pytest.mark.parametrize(("axis", "parallel"), [(0, True), (1, False)])
-@about_targets
-def test_edge_on_parts_do_not_make_the_handle_jump(axis, parallel):
-    bench = Bench(12.0 * np.eye(3)[axis], parallel=parallel, up=np.eye(3)[axis - 2])
-    hand, centre = bench.hand, bench.gizmo.centre
-    window = 400.0 * bench.view.pixel_at(centre)
-    for first in (FREE, Part(Kind.ROTATION, (axis - 1) % 3)):
-        place = bench.aim(first)
-        hand.press(place)
-        hand.move(place + [2.0, 3.0])
-        for key in ("xyz"[axis], "xyz"[axis], "xyz"[axis - 1]):
-            hand.key(key)
-            for step in ([20.0, 30.0], [-30.0, 10.0])[: 1 + (key == "xyz"[axis])]:
-                hand.move(place + step)
-                assert np.isfinite(bench.targets()).all()
-                away = np.linalg.norm(bench.targets().mean(axis=0) - centre)
-                assert away < 0.5 * window
-        hand.key("Escape")
-    assert not hand.failures
-    assert bench.session.state.pose is None
 
 
 @pytest.mark.parametrize("parallel", [False, True], ids=["perspective", "parallel"])
@@ -779,19 +740,6 @@ def test_cancelling_keeps_an_earlier_unfinished_drag(bench):
     assert bench.session.history.undo_label == "drag handle 1"
 
 
-def test_a_pose_reached_by_undo_is_not_refined(bench):
-    place = bench.aim(FREE)
-    bench.hand.drag([place, place + [-40.0, 60.0]])
-    place = bench.aim(FREE)
-    bench.hand.drag([place, place + [-40.0, 0.0]])
-    assert bench.has_timer
-    bench.session.undo()
-    pose = bench.session.state.pose
-    bench.hand.tick()
-    assert bench.session.state.pose is pose
-    assert not bench.has_timer
-
-
 @pytest.mark.usefixtures("roughly")
 def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     place = bench.aim(FREE)
@@ -882,23 +830,6 @@ def test_targets_too_far_away_are_refused_and_the_drag_continues():
 
 
 # Display.
-
-
-def test_the_caption_shows_the_angle_during_a_rotation(bench):
-    before = picture(bench.view)
-    place = bench.aim(VIEW_RING)
-    bench.hand.press(place, control=True)
-    pressed = picture(bench.view)
-    bench.hand.move(place + [1.0, 0.0], control=True)
-    assert np.array_equal(picture(bench.view), pressed)  # less than half a step
-    middle = np.array(bench.hand.at(bench.gizmo.centre))
-    R = rotation([0.0, 0.0, 1.0], np.radians(31.0))[:2, :2]
-    bench.hand.move(middle + R @ (place - middle), control=True)
-    assert bench.captions == ["30.0°, step 5°"]
-    bench.hand.key("Escape")
-    bench.hand.hover((5, 5))
-    assert np.array_equal(picture(bench.view), before)
-    assert bench.captions == ["x", "y", "z"]
 
 
 # Poses that are shown.

@@ -114,17 +114,6 @@ def test_timers_fire_while_they_run_and_not_otherwise(view: View) -> None:
     assert loop.due == []
 
 
-def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
-    loop, timers = started(view)
-    ticks: list[float] = []
-    view.every(20, lambda: ticks.append(loop.now))
-    other = view.interactor.CreateRepeatingTimer(500)
-    view.interactor.DestroyTimer(other)
-    loop.run(0.1)
-    assert len(ticks) == 5
-    timers.stop()
-
-
 def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
     loop, timers = started(view)
     ticks: list[float] = []
