@@ -111,9 +111,8 @@ class CageDisplay(Widget):
 
     # Dragging.
 
-    def Off(self) -> None:  # noqa: N802 - VTK's word
-        """Stop handling events; finish an ongoing drag and remove the highlight."""
-        super().Off()
+    def leave(self) -> None:
+        """Remove the highlight."""
         self._highlight(None)
 
     def on_press(self, press: Pointer) -> Gesture | None:
@@ -132,11 +131,11 @@ class CageDisplay(Widget):
         visible = [r for r, each in enumerate(self._wireframes) if each.actor.GetVisibility()]
         if not visible:
             return None
-        numbers: list[CageVertex] = [(r, v) for r in visible for v in range(len(vertices[r]))]
+        numbers = [(r, v) for r in visible for v in range(len(vertices[r]))]
         points = np.concatenate([vertices[r] for r in visible])
         for k in points_at_pointer(self.view, pointer, points):
             if self.through or is_seen(self.view, points[k], session.vertices, session.mesh.faces):
-                return numbers[k]
+                return numbers[int(k)]
         return None
 
     # Drawing.

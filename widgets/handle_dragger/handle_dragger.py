@@ -188,6 +188,11 @@ class HandleDragger(Widget):
         self.gizmo.highlight(part)
         self._marks.highlight(None if found is None else found[0])
 
+    def leave(self) -> None:
+        """Highlight nothing."""
+        self.gizmo.highlight(None)
+        self._marks.highlight(None)
+
     def on_press(self, press: Pointer) -> Gesture | None:
         """Drag the part of the gizmo, or else the handle, under the pointer."""
         part = self.gizmo.part_at(press)

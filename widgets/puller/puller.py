@@ -144,7 +144,6 @@ class Puller(Widget):
         """Start handling events, show the pins, and refine a pose that has not converged."""
         if not self.GetEnabled():
             super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self.leave))
             self._markers.show(True)
             self._live.resume()
 
@@ -155,7 +154,6 @@ class Puller(Widget):
         finally:
             self.waiting.drop()
             self._live.pause()
-            self._ring.hide()
             self._markers.show(False)
 
     def remove(self) -> None:

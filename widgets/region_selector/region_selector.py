@@ -160,19 +160,6 @@ class RegionSelector(Widget):
             self._cleanup.pop()()
 
     # Events.
-    def On(self) -> None:  # noqa: N802 - VTK's word
-        """Start handling events."""
-        if not self.GetEnabled():
-            super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self.leave))
-
-    def Off(self) -> None:  # noqa: N802
-        """Stop handling events; finish an ongoing stroke."""
-        try:
-            super().Off()
-        finally:
-            self.leave()
-
     def on_press(self, press: Pointer) -> Gesture | None:
         """Start a stroke; pass the press to the camera beside the mesh."""
         stroke = self._stroke_from(press)

@@ -32,11 +32,6 @@ class Timers:
             interactor.AddObserver("DestroyTimerEvent", self._destroyed),
         ]
 
-    @property
-    def running(self) -> tuple[float, ...]:
-        """The periods of the timers that run, in seconds."""
-        return tuple(seconds for seconds, _ in self._periods.values())
-
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Fire timers in *loop* from now on."""
         self._loop = loop

@@ -491,7 +491,7 @@ def test_typed_degrees_rotate_about_a_moved_pivot_and_escape_restores(bench):
     assert np.allclose(bench.gizmo.centre, pivot, atol=1e-12)
     start = bench.targets()
     for keys, degrees, caption in (
-        (["6", "5", "BackSpace", "minus"], -6.0, "z -6_°"),
+        (["1", "2", "5", "BackSpace", "minus"], -12.0, "z -12_°"),
         (["minus", "2", "period", "5"], -2.5, "z -2.5_°"),
     ):
         hand.press(bench.aim(VIEW_RING))
