@@ -136,22 +136,16 @@ class PageDrawing:
         vertices, camera = self._drawn
         return vertices is self._editor.session.vertices and camera == self._camera
 
-    def first_update(self) -> Update:
-        """Return the update for the state that the page shows, as drawn by the server."""
-        self._labels = label_actors(self._editor.view)
-        return self._update(is_first=True)
-
-    def update(self) -> Update:
-        """Return the update for the current state."""
-        return self._update(is_first=False)
-
     @property
     def _camera(self) -> tuple[object, ...]:
         camera, size = self._editor.view.camera, self._editor.view.window.GetSize()
         places = camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()
         return *size, *places, camera.GetViewAngle(), camera.GetParallelScale()
 
-    def _update(self, *, is_first: bool) -> Update:
+    def update(self, *, is_first: bool = False) -> Update:
+        """Return the update for the current state; *is_first*: as drawn by the server already."""
+        if is_first:
+            self._labels = label_actors(self._editor.view)
         messages, view = self._due(), self._editor.view
         added = [actor for actor in label_actors(view) if actor not in self._labels]
         labels = tuple(labels_of(added, view))

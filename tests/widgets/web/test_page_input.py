@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,6 +24,9 @@ from vtk_segdeform.widgets.web.key_names import vtk_key
 from vtk_segdeform.widgets.web.stream import Stream
 from vtk_segdeform.widgets.web.timers import Timers
 
+IDLE: Any = SimpleNamespace(  # what a page draws that cannot
+    is_dragging=False, is_possible=False, announce=lambda: None, note_picture=lambda: None
+)
 _MIDDLE = {"x": 0.5, "y": 0.25}
 # What a browser calls the keys whose names in a table are words.
 _BROWSER = {
@@ -156,7 +160,7 @@ def test_a_move_is_replaced_by_one_that_takes_two_more_turns_to_be_read(view: Vi
     places: list[int] = []
 
     async def story() -> None:
-        stream = Stream(view, Timers(view.interactor), lambda *_: None, lambda: None)
+        stream = Stream(view, Timers(view.interactor), lambda *_: None, lambda: None, IDLE)
         stream.start(asyncio.get_running_loop())
         place = view.interactor.GetEventPosition
         view.interactor.AddObserver("MouseMoveEvent", lambda *_: places.append(place()[0]))
@@ -188,7 +192,7 @@ def test_what_arrives_during_a_drawing_comes_before_timers_and_after_its_picture
     async def story() -> None:
         loop = asyncio.get_running_loop()
         timers = Timers(view.interactor)
-        stream = Stream(view, timers, lambda _, number: seen.append(number), lambda: None)
+        stream = Stream(view, timers, lambda _, number: seen.append(number), lambda: None, IDLE)
         stream.start(loop)
         stream.open(200, 100)
         while seen != [1]:
@@ -219,7 +223,11 @@ def test_a_picture_names_the_last_event_that_it_shows(view: View) -> None:
 
     async def story() -> None:
         stream = Stream(
-            view, Timers(view.interactor), lambda picture, _: sent.append(picture), lambda: None
+            view,
+            Timers(view.interactor),
+            lambda picture, _: sent.append(picture),
+            lambda: None,
+            IDLE,
         )
         stream.start(asyncio.get_running_loop())
         stream.open(200, 100)
@@ -329,7 +337,7 @@ def test_many_requests_make_one_picture_and_none_is_drawn_ahead_of_the_page(view
 
     async def story() -> None:
         stream = Stream(
-            view, Timers(view.interactor), lambda _, number: sent.append(number), lambda: None
+            view, Timers(view.interactor), lambda _, number: sent.append(number), lambda: None, IDLE
         )
         stream.start(asyncio.get_running_loop())
 
