@@ -162,19 +162,3 @@ def test_an_observer_that_raises_does_not_suppress_the_others(bench):
     assert heard == ["end"]
     bench.session.undo()
     bench.require_works()
-
-
-@pytest.mark.parametrize("part", every(2, ["work", "report", "done"]))
-def test_a_background_job_that_raises_ends_and_the_next_drag_works(bench, part):
-    def work(progress):
-        if part == "work":
-            raise Fault("in another thread")
-        for k in range(10):
-            progress(Raiser()() if part == "report" and k == 5 else k / 10, "working")
-
-    bench.editor.controller.start("my work", work, Raiser())
-    with bench.view.guarded():
-        bench.editor.wait()
-    assert bench.has_reported()
-    assert "Fault" in bench.editor.status
-    bench.require_works()

@@ -126,18 +126,6 @@ def test_it_keeps_running_when_a_foreign_timer_ends(view, host, kind):
     assert not host.is_running
 
 
-def test_it_keeps_running_when_the_interactor_is_initialised_again(view, host):
-    heard = []
-    stop = view.every(20, lambda: heard.append("tick"))
-    view.interactor.Disable()
-    host.tick()
-    assert heard == []
-    view.interactor.ReInitialize()
-    host.tick(2)
-    assert heard == ["tick"] * 2
-    stop()
-
-
 def test_stopping_after_the_window_is_closed_is_harmless():
     plotter = pv.Plotter(off_screen=True)
     view = View.of(plotter)
