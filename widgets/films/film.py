@@ -30,7 +30,7 @@ from ..scene import Stop, View
 from .film_files import Picture, require_film, write_film
 from .off_screen import OffScreen
 
-_LARGEST = 16_384  # pixels, width or height
+_LARGEST_SIDE = 16_384  # pixels, width or height
 
 Targets = Mapping[str, ArrayLike] | ArrayLike
 Frame = Callable[[], object] | Targets | None
@@ -147,9 +147,9 @@ def film(
     """
     require_film(path, fps)
     require_sequence(size, "size")
-    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST) for n in size):
+    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST_SIDE) for n in size):
         raise ArgumentError(
-            f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
+            f"size must be (width, height), 2 to {_LARGEST_SIDE} pixels each; got {shown(size)}"
         )
     session = scene if isinstance(scene, Session) else None
     known: Sequence[Frame] = []  # an iterator's frames are not known in advance

@@ -242,15 +242,15 @@ class HandleDragger(Widget):
                     return  # a commit, undo or redo from elsewhere has ended the drag
                 reached = sent if self._live.has_reached() else reached
                 if motion.part != (self._constraint or part):
-                    motion.exact(0.0)  # back the way it came
-                    self._live.lead([move(stop) for stop in motion.way(reached)])
+                    motion.exact(0.0)  # back through the same stops
+                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
                     sent = reached = 0.0
                     motion = self._motion_of(self._constraint or part, grip, press)
                 matrix = entry.matrix(motion) if entry.text else motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
                 is_far = distance > tolerance or bool(entry.text)
                 if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
-                    self._live.lead([move(stop) for stop in motion.way(reached)])
+                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
                     self._live.solve(move(matrix))
                     sent = motion.turn
                     has_moved = has_moved or session.is_dragging  # not if it was refused

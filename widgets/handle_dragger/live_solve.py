@@ -65,7 +65,7 @@ class LiveSolve:
         self._draft.begin()  # again, as a slow solve is no rest
         self.resume()
 
-    def lead(self, moves: Sequence[Callable[..., Solution]]) -> None:
+    def solve_through(self, moves: Sequence[Callable[..., Solution]]) -> None:
         """Call each of *moves* as `solve` does."""
         with self._view.guarded(only_refusals=True):
             for move in moves:

@@ -21,7 +21,7 @@ from ..scene import decimated_soon
 from .line_of_sight import perpendicular
 from .surface_distance import SurfaceDistance
 
-_SMALLEST = 1.5  # sides of the triangles, at least, in the radius of a ring that follows them
+_SMALLEST_RADIUS = 1.5  # of a ring that follows the triangles, in their sides
 _CORNERS = 48  # of a circle
 
 
@@ -65,7 +65,7 @@ class SurfaceRing:
         start = np.unique(start[start >= 0])
         sides = x[sample.faces[start]]
         length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
-        if len(start) and radius >= _SMALLEST * length.mean():
+        if len(start) and radius >= _SMALLEST_RADIUS * length.mean():
             centres = np.broadcast_to(centre, (len(start), 3))
             away = sample.distance.within(x, centres, start, radius)
             near = (away[sample.faces] <= radius).any(axis=1)

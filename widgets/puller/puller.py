@@ -39,7 +39,7 @@ from .pull_motion import PullMotion
 from .waiting import Pull, Waiting
 
 _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
-_SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
+_SMALLEST_RADIUS, _LARGEST_RADIUS = 0.005, 1.0  # in diagonals
 _GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
@@ -104,7 +104,9 @@ class Puller(Widget):
         if not (is_number(radius) and radius > 0.0):
             raise ArgumentError(f"radius must be above 0; got {shown(radius)}")
         diagonal = self.session.mesh.diagonal
-        self._radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self._radius = float(
+            np.clip(radius, _SMALLEST_RADIUS * diagonal, _LARGEST_RADIUS * diagonal)
+        )
         self._invoke("ModifiedEvent")
 
     @property
@@ -299,7 +301,7 @@ class Puller(Widget):
 
     def _solve(self, pull: Callable[..., Solution]) -> None:
         if self.waiting.is_shown:
-            pull()  # to the end, because a pose on the way would look like a way back
+            pull()  # until it converges: a pose in between would look like a step back
         self._live.solve(pull)
         self.waiting.hide()
 

@@ -37,7 +37,7 @@ from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
 _RADIUS = 0.05  # the initial radius, in diagonals of the mesh
-_SMALLEST, _LARGEST = 1e-4, 2.0  # in diagonals
+_SMALLEST_RADIUS, _LARGEST_RADIUS = 1e-4, 2.0  # in diagonals
 _GROWTH = 1.2  # factor for one click of the wheel or one key press
 
 
@@ -284,7 +284,9 @@ class RegionSelector(Widget):
     def _resize(self, clicks: int, pointer: Pointer) -> None:
         diagonal = self.session.mesh.diagonal
         radius = self.radius * _GROWTH**clicks
-        self.radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self.radius = float(
+            np.clip(radius, _SMALLEST_RADIUS * diagonal, _LARGEST_RADIUS * diagonal)
+        )
         self._draw_ring(pointer, self._target, pointer.control)
 
     def _draw_ring(self, pointer: Pointer, target: PaintTarget, erase: bool) -> None:

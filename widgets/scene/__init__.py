@@ -7,7 +7,7 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
-    glide              the way from one pose to the next on the screen
+    glide              an animation from one pose to the next
     handle_colours     the colours of the handles of a session
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates

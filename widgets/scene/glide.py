@@ -17,7 +17,7 @@ from .view import Stop, View
 
 SECONDS = 0.3
 _PERIOD = 15  # milliseconds between two pictures
-_FIRST = 2.0  # priority: above all widgets, which pick the surface that is drawn
+_ABOVE_WIDGETS = 2.0  # priority: above all widgets, which pick the surface that is drawn
 _ENDING = (
     "LeftButtonPressEvent",
     "MiddleButtonPressEvent",
@@ -57,7 +57,7 @@ class Glide:
                 surface.draw(before + t * t * (3.0 - 2.0 * t) * change)
 
         self._restore = surface.update
-        observed = [self._view.observe(event, self.end, _FIRST) for event in _ENDING]
+        observed = [self._view.observe(event, self.end, _ABOVE_WIDGETS) for event in _ENDING]
         self._stops = [self._view.every(_PERIOD, draw), *observed]
         surface.draw(before)
 

@@ -45,7 +45,7 @@ from .projection import Projection
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-_LONGEST = 86_400_000  # milliseconds between ticks: a day
+_LONGEST_PERIOD = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 _SHARE_DRAWN = 0.1  # of the time, at most, while another thread is spared
 _LONGEST_PAUSE = 0.5  # seconds; the next picture may be a draft, and quick to draw
@@ -270,9 +270,10 @@ class View(Projection):
 
         During a camera drag the interactor style withholds timer events too; see `pulse`.
         """
-        if not is_whole(milliseconds, 1, _LONGEST):
+        if not is_whole(milliseconds, 1, _LONGEST_PERIOD):
             raise ArgumentError(
-                f"milliseconds must be a whole number, 1 to {_LONGEST}; got {shown(milliseconds)}"
+                f"milliseconds must be a whole number, 1 to {_LONGEST_PERIOD}; "
+                f"got {shown(milliseconds)}"
             )
         as_callable(callback, "callback")
 

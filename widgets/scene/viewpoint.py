@@ -25,10 +25,10 @@ from vtk_segdeform.errors import ArgumentError
 from .gestures import Pointer
 from .view import Stop, View
 
-_ENOUGH = 50_000  # points that are framed, about, with those farthest out along the axes
+_MOST_FRAMED = 50_000  # points that are framed, about, with those farthest out along the axes
 _NEAREST, _FARTHEST = 3e-3, 100.0  # distances of the camera, in diagonals of the model
 _MARGIN = 0.86  # share of the view that a framed model fills
-_SMALLEST = 1e-6  # the smallest framed radius, in diagonals
+_SMALLEST_RADIUS = 1e-6  # the smallest framed radius, in diagonals
 _TURN = math.pi  # radians, by a drag across the height of the view
 _LEVEL = 0.35  # sine of the roll above which the camera orbits about its own view-up
 _DURATION = 0.15  # seconds of an animation
@@ -303,7 +303,7 @@ class Viewpoint:
         low, high = bounds_of(local)
         middle = 0.5 * (low + high)
         local -= middle
-        smallest = _SMALLEST * self._diagonal()
+        smallest = _SMALLEST_RADIUS * self._diagonal()
         half = np.maximum(0.5 * (high - low)[:2], smallest)
         distance = float((np.abs(local[:, :2]) / slopes + local[:, 2:]).max())
         distance = max(distance, _NEAREST * self._diagonal())
@@ -371,7 +371,7 @@ class Viewpoint:
 
 def _outermost(points: FloatArray) -> FloatArray:
     """Return a subset of *points* (n, 3) that includes the extremes along each axis."""
-    step = len(points) // _ENOUGH
+    step = len(points) // _MOST_FRAMED
     if step < 2:
         return points
     ends = [end for axis in points.T for end in (axis.argmin(), axis.argmax())]

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any
 
 _ONE_SHOT = 1  # type of a timer, as vtkRenderWindowInteractor numbers them
-_LONGEST = 1.0  # seconds between two ticks of a timer that waits for input, if its period is less
+_LONGEST_WAIT = 1.0  # seconds that input may delay a timer, after its last tick
 
 
 class Timers:
@@ -41,12 +41,12 @@ class Timers:
     def postpone(self, pause: float = math.inf) -> None:
         """Let repeating timers wait for input: for their period, or *pause* seconds if less.
 
-        Repeated calls cannot hold a timer back forever; see `_LONGEST`.
+        Repeated calls cannot hold a timer back forever; see `_LONGEST_WAIT`.
         """
         for timer, handle in self._handles.items():
             seconds, is_repeating = self._periods[timer]
             if self._loop is not None and is_repeating:
-                latest = self._begun[timer] + max(seconds, _LONGEST)
+                latest = self._begun[timer] + max(seconds, _LONGEST_WAIT)
                 when = min(self._loop.time() + min(seconds, pause), latest)
                 if when > handle.when():
                     handle.cancel()

@@ -267,15 +267,15 @@ def test_between_angles_half_a_turn_or_more_apart_there_are_stops(bench):
     motion = Motion(bench.view, Part(Kind.ROTATION, 2), grip, press)
     motion.exact(720.0)
     assert np.degrees(motion.turn) == pytest.approx(720.0)
-    counts = [len(motion.way(np.radians(since))) for since in (900, 720, 541, 540, 360, 0)]
+    counts = [len(motion.stops(np.radians(since))) for since in (900, 720, 541, 540, 360, 0)]
     assert counts == [1, 0, 0, 1, 3, 7]
-    (half,) = motion.way(np.radians(540.0))
+    (half,) = motion.stops(np.radians(540.0))
     assert np.allclose(half, motion.exact(630.0))
     motion.exact(0.0)
-    assert len(motion.way(2.0 * np.pi)) == 3
+    assert len(motion.stops(2.0 * np.pi)) == 3
     shift = Motion(bench.view, Part(Kind.AXIS, 2), grip, press)
     shift.exact(1e3)
-    assert (shift.turn, shift.way(0.0)) == (0.0, [])
+    assert (shift.turn, shift.stops(0.0)) == (0.0, [])
 
 
 # Edge-on.

@@ -445,7 +445,7 @@ def test_the_foreground_follows_viewport_and_camera():
 
 
 def test_of_many_points_some_are_framed_with_the_outermost(monkeypatch):
-    monkeypatch.setattr(viewpoint, "_ENOUGH", 50)
+    monkeypatch.setattr(viewpoint, "_MOST_FRAMED", 50)
     points = np.random.default_rng(5).normal(size=(1000, 3))
     some = viewpoint._outermost(points)
     assert len(some) < 100

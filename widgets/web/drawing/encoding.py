@@ -34,7 +34,7 @@ MOST_VERTICES = 1 << 17
 MOST_WEIGHTS = 1 << 24
 """Entries of W~ that a page receives at most: 32 megabytes."""
 _GROUP = 4  # entries of a row are read four at a time; rows are padded to a multiple
-_LARGEST = 32767
+_LARGEST_INT16 = 32767
 _ROWS = 1 << 14  # encoded together
 
 
@@ -101,7 +101,7 @@ class EncodedSurface:
         if offsets is None:
             return message(Kind.OFFSETS, serial, np.zeros(1, np.float32))
         shift = as_points(offsets, "offsets", len(self.rest)) / self.scale
-        step = max(float(np.abs(shift).max()) / _LARGEST, float(np.finfo(np.float32).tiny))
+        step = max(float(np.abs(shift).max()) / _LARGEST_INT16, float(np.finfo(np.float32).tiny))
         rounded = np.rint(shift[self.order] / step).astype(np.int16)
         return message(Kind.OFFSETS, serial, np.array([step], np.float32), rounded)
 
@@ -147,7 +147,7 @@ def encode_surface(
     for k, members in enumerate(parts):
         for start in range(0, len(members), _ROWS):
             w = subspace.nonzeros(members[start : start + _ROWS])[1]
-            step = (np.abs(w).max(axis=1) / _LARGEST).astype(np.float32)
+            step = (np.abs(w).max(axis=1) / _LARGEST_INT16).astype(np.float32)
             steps.append(step.copy())
             step[step == 0.0] = 1.0
             q = np.rint(w / step[:, None]).astype(np.int16)
