@@ -196,6 +196,10 @@ def test_a_highlighted_part_is_yellow_and_show_only_hides_the_others(view):
     image = picture(view)
     assert is_painted(image, there, COLOURS[4])
     assert not any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
+    middle = view.to_display(CENTRE[None])[0, :2]
+    assert not is_painted(image, middle, INK)
+    gizmo.show_only(ring)
+    assert is_painted(picture(view), middle, INK)  # the centre of the rotation
     gizmo.show_only(None)
     gizmo.highlight(None)
     assert is_painted(picture(view), there, AXIS_COLOURS[0])

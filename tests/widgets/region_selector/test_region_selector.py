@@ -13,8 +13,6 @@ from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
 from vtk_segdeform.widgets.scene.view import View
 
-WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
-
 
 class Desk:
     """A sphere seen along y, z up, with a selector and a hand."""

@@ -124,7 +124,7 @@ PLACES = {
     "a callback of the press": lambda bench, call: bench.view.observe(
         "LeftButtonPressEvent", call, 2.0
     ),
-    "a callback of a timer": lambda bench, call: bench.view.pulse(call),
+    "a callback of a timer": lambda bench, call: bench.view.every(20, call),
     "a listener of what is said": lambda bench, call: bench.editor.controller.messages.on_change(
         call
     ),

@@ -8,10 +8,6 @@ import pyvista as pv
 from hands import Hand, picture, plain_view
 from scenes import sausage
 from solids import icosphere
-from vtkmodules.vtkInteractionStyle import (
-    vtkInteractorStyleSwitch,
-    vtkInteractorStyleTrackballCamera,
-)
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from vtk_segdeform import Mesh, Session, models
@@ -282,32 +278,6 @@ def test_only_keys_that_no_widget_handles_reach_the_camera(scribble):
     hand.key("s")
     assert heard == ["char"]
     assert scribble.keys == ["w", "s"]
-
-
-@pytest.mark.parametrize("style", [vtkInteractorStyleTrackballCamera, vtkInteractorStyleSwitch])
-def test_a_key_during_a_camera_drag_goes_to_the_widget_and_not_to_vtk(scribble, style):
-    interactor, camera = scribble.view.interactor, scribble.view.camera
-    interactor.SetInteractorStyle(style := style())
-    if isinstance(style, vtkInteractorStyleSwitch):
-        style.SetCurrentStyleToTrackballCamera()
-    hand = Hand(scribble.view)
-    heard = []
-    interactor.AddObserver("CharEvent", lambda *_: heard.append("char"), -1.0)
-    hand.press((300, 200))
-    hand.move((320, 210))
-    before = camera.GetPosition()
-    hand.key("Shift_L")  # has no effect
-    hand.move((340, 220))
-    turned = camera.GetPosition()
-    assert turned != before
-    hand.key("w")  # VTK would switch to wireframe
-    assert (scribble.keys, heard) == (["w"], [])
-    hand.move((360, 230))
-    assert camera.GetPosition() == turned
-    hand.release((360, 230))
-    hand.drag([(300, 200), (320, 220)])
-    assert camera.GetPosition() != turned
-    assert hand.failures == []
 
 
 def test_a_closed_window_is_none_and_drawing_in_it_does_nothing():
