@@ -575,6 +575,7 @@ def test_a_press_on_the_vertices_of_a_handle_grabs_it_at_that_point(bench):
     hand.release(place + [30.0, 20.0])
     assert bench.session.history.undo_label == "drag handle 2"
     assert np.array_equal(bench.targets(TIP), SCENE.mesh.vertices[SCENE.handle])
+    assert np.array_equal(bench.dragger._marks._dots[TOP]._points, bench.session.vertices[ids])
 
 
 def test_a_click_activates_a_handle_and_makes_no_undo_step(bench):

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,47 +49,21 @@ class EncodedSurface:
         A point u of a message is ``centre + scale * u`` in the scene.
     order : (n,) int
         The vertices of the mesh in the order of the message: set by set.
-    rest : (n, 3) float32
-        The vertices at rest, in units of the message.
-    steps : (n,) float32
-        s.
-    sets : (n,) uint16
-        The set of each vertex; vertices of a set are moved by the same cage vertices.
-    columns : sequence of (c,) uint16
-        For each set its cage vertices, c a multiple of four; padding has weight 0.
-    weights : (w,) int16
-        q, row after row.
-    faces : (f, 3) uint32
-        Triangles of the vertices, and from n on of *twice*.
-    twice : (t,) uint32
-        Vertices that are drawn a second time, with the opposite normal.
     cages : (m, 3) float
         The cage vertices at rest, in the scene.
+    arrays : sequence of array
+        Those of the message, `Kind.SURFACE`.
     """
 
     centre: FloatArray
     scale: float
     order: IntArray
-    rest: NDArray[np.float32]
-    steps: NDArray[np.float32]
-    sets: NDArray[np.uint16]
-    columns: Sequence[NDArray[np.uint16]]
-    weights: NDArray[np.int16]
-    faces: NDArray[np.uint32]
-    twice: NDArray[np.uint32]
     cages: FloatArray
+    arrays: Sequence[NDArray[Any]]
 
     def message(self, serial: int) -> bytes:
         """Return the message; *serial* tells this surface from earlier ones."""
-        n, t, f, m = len(self.rest), len(self.twice), len(self.faces), len(self.cages)
-        lengths = np.array([len(each) for each in self.columns], dtype=np.uint32)
-        columns = np.concatenate(self.columns)
-        rows = m, len(lengths), len(columns), len(self.weights)
-        counts = np.array([n, t, f, *rows], dtype=np.uint32)
-        return message(
-            Kind.SURFACE, serial, counts, self.rest, self.steps, self.sets, lengths, columns,
-            self.weights, self.faces, self.twice,
-        )  # fmt: skip
+        return message(Kind.SURFACE, serial, *self.arrays)
 
     def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
         """Return the message of a pose, (m_r, 3) for each cage; *number* counts the poses."""
@@ -100,7 +75,7 @@ class EncodedSurface:
         """Return the message of *offsets* (n, 3), in the scene, that are added to every pose."""
         if offsets is None:
             return message(Kind.OFFSETS, serial, np.zeros(1, np.float32))
-        shift = as_points(offsets, "offsets", len(self.rest)) / self.scale
+        shift = as_points(offsets, "offsets", len(self.order)) / self.scale
         step = max(float(np.abs(shift).max()) / _LARGEST_INT16, float(np.finfo(np.float32).tiny))
         rounded = np.rint(shift[self.order] / step).astype(np.int16)
         return message(Kind.OFFSETS, serial, np.array([step], np.float32), rounded)
@@ -150,24 +125,26 @@ def encode_surface(
             step = (np.abs(w).max(axis=1) / _LARGEST_INT16).astype(np.float32)
             steps.append(step.copy())
             step[step == 0.0] = 1.0
-            q = np.rint(w / step[:, None]).astype(np.int16)
-            weights.append(np.pad(q, ((0, 0), (0, len(columns[k]) - w.shape[1]))).ravel())
+            whole = np.rint(w / step[:, None]).astype(np.int16)
+            weights.append(np.pad(whole, ((0, 0), (0, len(columns[k]) - w.shape[1]))).ravel())
     drawn = np.concatenate(parts)
     place = np.empty(mesh.n_vertices, dtype=np.int64)
     place[drawn] = np.arange(mesh.n_vertices)
     twice, second = np.unique(place[mesh.faces.ravel()[turned]], return_inverse=True)
     faces = place[mesh.faces.ravel()]
     faces[turned] = mesh.n_vertices + second
-    return EncodedSurface(
-        centre,
-        scale,
-        drawn,
+    rest = np.concatenate([cage.vertices for cage in cages])
+    lengths, q = [len(own) for own in columns], np.concatenate(weights)
+    counts = [len(drawn), len(twice), mesh.n_faces, len(rest), len(parts), sum(lengths), len(q)]
+    arrays = (
+        np.array(counts, dtype=np.uint32),
         ((mesh.vertices[drawn] - centre) / scale).astype(np.float32),
         np.concatenate(steps),
         np.concatenate([np.full(len(ids), k, dtype=np.uint16) for k, ids in enumerate(parts)]),
-        columns,
-        np.concatenate(weights),
-        faces.reshape(-1, 3).astype(np.uint32),
+        np.array(lengths, dtype=np.uint32),
+        np.concatenate(columns),
+        q,
+        faces.astype(np.uint32),
         twice.astype(np.uint32),
-        np.concatenate([cage.vertices for cage in cages]),
     )
+    return EncodedSurface(centre, scale, drawn, rest, arrays)
