@@ -28,7 +28,7 @@ from vtk_segdeform.session import Session
 
 from ..scene import Stop, View
 from .film_files import Picture, require_film, write_film
-from .off_screen import OffScreen
+from .off_screen import off_screen
 
 _LARGEST_SIDE = 16_384  # pixels, width or height
 
@@ -160,8 +160,8 @@ def film(
         made = Film(scene)
         _shoot(made, None, frames)
     else:
-        with OffScreen(session, size, in_view=_targets(known)) as window:
-            made = Film(window.view)
+        with off_screen(session, size, in_view=_targets(known)) as view:
+            made = Film(view)
             try:
                 _shoot(made, session, frames)
             except BaseException:  # Ctrl+C as well: no half a drag may remain
