@@ -57,8 +57,6 @@ class Bench:
         draw_seldom(self.view)
         self.dragger.On()
         self.hand = Hand(self.view)
-        self.timers: set[int] = set()
-        self.watch_timers()
 
     def targets(self, name=TIP):
         return self.session.targets[name]
@@ -91,26 +89,6 @@ class Bench:
         View.render(self.view)
         texts = [p for p in self.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)]
         return [text.GetInput() for text in texts if text.GetVisibility()]
-
-    def watch_timers(self):
-        """Keep the numbers of the running timers in `timers`, as a window would."""
-        interactor = self.view.interactor
-
-        def create(*_):
-            self.timers.add(len(self.timers) + 1)
-            interactor.SetTimerEventPlatformId(max(self.timers))
-
-        interactor.AddObserver("CreateTimerEvent", create)
-        interactor.AddObserver(
-            "DestroyTimerEvent",
-            lambda *_: self.timers.remove(interactor.GetTimerEventPlatformId()),
-        )
-
-    @property
-    def has_timer(self):
-        self.dragger._live._draft.end()  # its timer would end by itself, after a rest
-        assert bool(self.timers) is self.dragger.is_refining
-        return bool(self.timers)
 
 
 @pytest.fixture
@@ -663,11 +641,11 @@ def test_without_cages_nothing_is_shown_or_grabbed():
 
 def test_refining_ends_when_the_pose_has_converged(bench):
     hand, place = bench.hand, bench.aim(FREE)
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     hand.press(place)
     hand.move(place + [-20.0, 30.0])
     assert bench.session.solution.status is Status.STEP_LIMIT
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     hand.tick(2)
     hand.release()
     assert bench.session.history.undo_label == "drag handle 1"
@@ -675,10 +653,10 @@ def test_refining_ends_when_the_pose_has_converged(bench):
     for _ in range(400):
         hand.tick()
         assert abs(bench.session.volume_change) <= 1e-12
-        if not bench.has_timer:
+        if not bench.dragger.is_refining:
             break
     assert bench.session.solution.status is Status.CONVERGED
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     assert bench.session.solution.handle_error < 1e-3
     assert np.allclose(bench.gizmo.centre, bench.targets().mean(axis=0), atol=0.02)
     assert bench.session.undo() == "drag handle 1"  # a single undo step
@@ -694,21 +672,21 @@ def test_no_timer_runs_after_undo_off_stop_refining_or_remove(bench):
     drag()
     bench.session.undo()
     hand.tick()
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     assert bench.session.state.pose is None
     drag()
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     bench.dragger.Off()
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     bench.dragger.On()
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     bench.dragger.stop_refining()
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     bench.session.undo()
     drag()
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     bench.dragger.remove()
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
 
 
 def test_escape_and_the_right_button_restore_the_pose_before_the_press(bench):
@@ -724,7 +702,7 @@ def test_escape_and_the_right_button_restore_the_pose_before_the_press(bench):
         cancel()
         assert bench.session.state.pose is pose
         assert bench.session.history.undo_label == "before"
-        assert not bench.has_timer
+        assert not bench.dragger.is_refining
         hand.move(place)
         hand.release(place)
         assert bench.session.state.pose is pose
@@ -750,12 +728,12 @@ def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
     bench.dragger.Off()
     assert bench.session.state.pose is pose is not None
     assert not bench.session.is_dragging
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     assert bench.gizmo.centre is None
     bench.dragger.On()
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     bench.hand.tick(60)
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     assert bench.session.solution.status is Status.CONVERGED
     assert bench.session.undo() == f"drag {TIP}"
     assert bench.session.state.pose is None
@@ -765,17 +743,17 @@ def test_off_in_mid_drag_keeps_one_step_and_on_continues_refining(bench):
 def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
     place = bench.aim(FREE)
     bench.hand.drag([place, place + [-40.0, 60.0]])
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     pose = bench.session.state.pose
     bench.session.change_options(stretch=3.0)
     bench.hand.tick()
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     assert not bench.session.is_bound
     assert bench.session.state.pose is pose
     bench.session.bind()
     bench.dragger.Off()
     bench.dragger.On()
-    assert bench.has_timer
+    assert bench.dragger.is_refining
     bench.hand.tick(60)
     assert bench.session.solution.status is Status.CONVERGED
     assert bench.session.state.pose is not pose
@@ -797,7 +775,7 @@ def test_a_solve_that_fails_is_reported_and_the_drag_cancelled(fails, monkeypatc
     assert [str(failure) for failure in hand.failures] == ["the cages do not fit"]
     assert bench.session.state.pose is None
     assert not bench.dragger.is_grabbing
-    assert not bench.has_timer
+    assert not bench.dragger.is_refining
     monkeypatch.undo()
     hand.release(place)
     hand.drag([place, place + [-20.0, 30.0]])
