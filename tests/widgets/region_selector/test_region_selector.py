@@ -156,6 +156,20 @@ def test_a_lasso_selects_the_vertices_inside(desk):
     assert (places[:, 1] < 0.0).all()
 
 
+def test_the_line_is_drawn_while_the_button_is_down(desk):
+    idle = picture(desk.view)
+    desk.selector.tool = Tool.RECTANGLE
+    desk.hand.press((20, 20))
+    desk.hand.move((380, 380))
+    changed = (picture(desk.view) != idle).any(axis=2)
+    assert changed[18:23, 30:370].any(axis=0).all()
+    assert changed[30:370, 378:383].any(axis=1).all()
+    assert not changed[30:60, 30:60].any()  # the inside is not filled
+    desk.hand.key("Escape")
+    desk.hand.release()
+    assert (picture(desk.view) == idle).all()
+
+
 def test_a_tiny_rectangle_selects_nothing(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     nearest = desk.points[desk.points[:, 1].argmin()]
