@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hands import Hand, draw_seldom, picture, plain_view
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
+from vtk_segdeform.widgets.region_selector.region_outlines import RegionOutlines
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
 from vtk_segdeform.widgets.scene.view import View
 
@@ -167,6 +169,29 @@ def test_the_line_is_drawn_while_the_button_is_down(desk):
     assert not changed[30:60, 30:60].any()  # the inside is not filled
     desk.hand.key("Escape")
     desk.hand.release()
+    assert (picture(desk.view) == idle).all()
+
+
+def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
+    outlines, idle = RegionOutlines(desk.selector.surface), picture(desk.view)
+    outlines.show(lines=True, numbers=False)
+    labels = desk.session.regions.labels
+    between = labels[desk.session.mesh.edges]
+    assert len(outlines._ends) == np.count_nonzero(between[:, 0] != between[:, 1])
+    changed = (picture(desk.view) != idle).any(axis=2)
+    (left, middle), (right, _) = desk.under(-0.6, 0.0), desk.under(0.6, 0.0)
+    assert changed[:, round(left) : round(right)].any(axis=0).mean() > 0.85  # a thin line
+    reach = desk.under(0.0, 0.2)[1] - middle
+    assert np.abs(399 - np.flatnonzero(changed.any(axis=1)) - middle).max() < reach
+    outlines.show(lines=False, numbers=True)
+    assert (picture(desk.view) != idle).any()
+    props = desk.view.renderer.GetViewProps()
+    first, second = [prop for prop in props if isinstance(prop, vtkTextActor)]
+    assert (first.GetInput(), second.GetInput()) == (" 1 ", " 2 ")
+    assert outlines.n_numbers == 2
+    assert first.GetPosition()[1] > middle + reach
+    assert second.GetPosition()[1] < middle - reach
+    outlines.remove()
     assert (picture(desk.view) == idle).all()
 
 
