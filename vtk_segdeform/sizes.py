@@ -91,12 +91,6 @@ DRAFT = 20_000
 In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
 of 1,200 at a million.  Drawing 50,000 vertices takes 45 ms instead of 75, in two threads."""
 
-PAGE_POINTS = 5_000
-"""Vertices of such a mesh, about, that a page without a graphics processor draws.
-
-With 5,000 of 50,000 vertices a picture takes 53 ms of processor time in software WebGL, with 12,000
-of them 60."""
-
 FINISHED = 100_000
 """Vertices up to which `deform` and `pull` finish a pose on the mesh by themselves.
 

@@ -127,7 +127,7 @@ def edit(
     MeshError
         If no mesh can be made of a PolyData: it has no faces, flat ones only, or NaN.
     MissingDependencyError
-        If there is no screen.
+        If there is no screen, or in a notebook no trame.
     """
     imported("vtk_segdeform.widgets.scene")
     from .scene import set_background, set_lights

@@ -154,19 +154,6 @@ def test_its_results_are_those_of_the_api(tmp_path):
     assert (got["again"] == got["turned"]).all()
 
 
-@needs_paraview
-def test_a_scipy_that_is_too_old_is_an_error(tmp_path):
-    (tmp_path / "scipy.py").write_text("__version__ = '1.10.1'")
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT)
-    path = f"{tmp_path}{os.pathsep}{os.environ['SEGDEFORM_PARAVIEW']}"
-    done = pvpython(script, PLUGIN, "unread.vtp", "unwritten.npz", PYTHONPATH=path)
-    assert done.returncode != 0
-    assert (
-        "scipy 1.15 or newer; ParaView's Python has 1.10.1: pip inst" in done.stdout + done.stderr
-    )
-
-
 @pytest.fixture
 def loaded(tmp_path):
     """Return a function that executes a plugin file in a fresh Python, without its site-packages.

@@ -55,7 +55,6 @@ from vtk_segdeform.mesh.shells import _boxes
 from vtk_segdeform.regions.blending import blend_weights, border_distance
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
-from vtk_segdeform.widgets.picking.line_of_sight import faces_in_beam
 
 MESH = models.torus(3000)
 RNG = np.random.default_rng(2)
@@ -445,20 +444,6 @@ def test_mean_value_coordinates_agree_at_any_point(twin):
     quick, plain = twin(lambda: mean_value_coordinates(points, p, cage.faces))
     assert_allclose(quick, plain, atol=1e-11)
     assert_allclose(quick @ p, points, atol=1e-11)
-
-
-@pytest.mark.parametrize("width", [0.0, 0.02, 0.4])
-def test_the_faces_in_a_beam_agree(twin, width):
-    for origin, way in RNG.normal(size=(6, 2, 3)):
-        way /= np.linalg.norm(way)
-        x = MESH.vertices + 0.02 * MOVE
-        find = partial(faces_in_beam, x, MESH.faces, origin, way, width=width)
-        quick, plain = twin(find)
-        assert_array_equal(quick, plain)
-        sides = (x - origin) - np.outer((x - origin) @ way, way)
-        near = (np.linalg.norm(sides, axis=1) < width)[MESH.faces].any(axis=1)
-        assert np.isin(np.flatnonzero(near), quick).all()
-        assert len(quick) < len(MESH.faces)
 
 
 @pytest.mark.parametrize("columns", [3, 6, 9])

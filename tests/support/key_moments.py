@@ -93,8 +93,7 @@ def slow_down(monkeypatch) -> None:
 
     What lasts a fixed time, drafts and turns of the camera, is shortened instead.
     """
-    for name in ("_MOST_STEPS", "_LEAST_STEPS", "_LEAST_REFINE_STEPS"):
-        monkeypatch.setattr(live_solve, name, 1)
+    monkeypatch.setattr(live_solve, "STEPS", 1)
     for waits in (draft, finishing):
         monkeypatch.setattr(waits, "_REST", 0.0)
     monkeypatch.setattr(viewpoint, "_DURATION", 0.001)

@@ -130,7 +130,6 @@ def test_cages(ready):
 def test_dragging(ready):
     scene = Scene(ready)
     dragger = HandleDragger(scene.view, scene.session, scene.surface)
-    dragger.refine_while_resting = False
     scene.session.bind()
     dragger.On()
     scene.looks("dragging-idle")
@@ -250,7 +249,6 @@ def test_the_editor_with_a_bent_body(ready):
     session.handles.set_pivot(name, [0.0, 0.0, 0.0])
     editor = DeformEditor(view, session)
     dragger = editor.widgets.dragger
-    dragger.refine_while_resting = False
     editor.On()
     editor.mode, dragger.local = Mode.DEFORM, True
     view.camera.SetPosition(0.0, -20.0, 4.0)

@@ -319,8 +319,7 @@ def closed_early(tmp_path, session, monkeypatch):
     """
     saved, out = tmp_path / "work.segdeform", tmp_path / "out.vtp"
     sd.save_session(saved, session)
-    for each in ("_EVENT_TIME", "_REFINE_TIME"):  # the fewest steps, however fast the machine is
-        monkeypatch.setattr(f"vtk_segdeform.widgets.handle_dragger.live_solve.{each}", 0.0)
+    monkeypatch.setattr("vtk_segdeform.widgets.handle_dragger.live_solve.STEPS", 3)
     monkeypatch.setattr("vtk_segdeform.cli.commands.require_screen", lambda: None)
     show = pv.Plotter.show
 

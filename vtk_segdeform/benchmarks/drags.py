@@ -21,7 +21,7 @@ from ..kernels import one_blas_thread
 from ..mesh import Mesh, SurfacePoint
 from ..session import Preparation, Session
 from ..solver import Solution
-from ..widgets.handle_dragger import Pace
+from ..widgets.handle_dragger import STEPS
 from .tasks import Hand
 
 _WORST = 10  # triangles
@@ -140,25 +140,22 @@ def frames(
     """Drag the handle of *session* along its targets, or the point *pulled*.
 
     After each frame the drag so far is given.  *limit* is the number of steps of a frame, at most;
-    None: that of the widgets, which depends on the time that the last ones took.
+    None: that of the widgets.
     """
     x = session.vertices
     move: Callable[..., Solution] = session.drag
     before = x[session.state.handle] if pulled is None else pulled.at(x)
     if pulled is not None:
         move = partial(session.pull, pulled)
-    drag, pace, diagonal, last = Drag(), Pace(), session.mesh.diagonal, x
+    drag, steps, diagonal, last = Drag(), limit or STEPS, session.mesh.diagonal, x
     for goal in goals:
         moved = float(np.linalg.norm(goal - before, axis=-1).max())
         if moved == 0.0 and not session.is_unsettled:
             continue
-        clock, began = time.perf_counter(), time.process_time()
-        if moved > 0.0:
-            solution = move(goal, max_steps=limit or pace.of_event)
-        else:
-            solution = session.refine(max_steps=limit or pace.of_rest)
+        began = time.process_time()
+        solve = partial(move, goal) if moved > 0.0 else session.refine
+        solution = solve(max_steps=steps)
         drag.seconds.append(time.process_time() - began)
-        pace.measure(time.perf_counter() - clock, solution.steps)
         x, before = session.vertices, goal
         jump = float(np.linalg.norm(x - last, axis=1).max()) / max(moved, 1e-300)
         drag.jumps.append(jump if moved > _LEAST_MOTION * diagonal else np.nan)

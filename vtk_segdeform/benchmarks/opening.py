@@ -25,7 +25,7 @@ from ..pictures import require_offscreen
 from ..progress import Progress, tell
 from ..session import Session
 from ..widgets import DeformEditor, Mode
-from ..widgets.films import OffScreen
+from ..widgets.films import off_screen
 from ..widgets.scene import Phase, Pointer
 from .measuring import in_own_process
 from .results import Scale, Section, Table
@@ -60,13 +60,13 @@ def opened(size: int) -> tuple[float, ...]:
     """Return the row of one mesh size, measured in this process."""
     require_offscreen()
     os.environ["SEGDEFORM_CACHE"] = "0"
-    with TemporaryDirectory() as folder, OffScreen(start := Session(sphere(300)), _SIZE) as window:
+    with TemporaryDirectory() as folder, off_screen(start := Session(sphere(300)), _SIZE) as view:
         path = Path(folder) / "cactus.ply"
         write_mesh(path, cactus(size))
-        window.surface.remove()
-        editor = DeformEditor(window.view, start)
+        view.renderer.RemoveAllViewProps()  # the editor draws the surface itself
+        editor = DeformEditor(view, start)
         editor.mode = Mode.PULL
-        window.view.render()
+        view.render()
         try:
             run = _Run(editor)
             run.open_and_pull(path)

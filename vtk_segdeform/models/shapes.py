@@ -22,7 +22,7 @@ from .implicit import Limb, standing_body
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))  # the golden angle, radians
 # Larger hulls or grids take minutes and gigabytes.
-_MOST, _FINEST = 10_000_000, 1000
+_MOST_VERTICES, _MOST_DIVISIONS = 10_000_000, 1000
 
 
 def cactus(n_vertices: int = 5430) -> Mesh:
@@ -114,9 +114,11 @@ def bar(
     """
     if not (_are_three(size) and all(is_number(each) and each > 0 for each in size)):
         raise ArgumentError(f"size must be three positive numbers; got {shown(size)}")
-    if not (_are_three(divisions) and all(is_whole(each, 1, _FINEST) for each in divisions)):
+    if not (
+        _are_three(divisions) and all(is_whole(each, 1, _MOST_DIVISIONS) for each in divisions)
+    ):
         raise ArgumentError(
-            f"divisions must be three whole numbers, 1 to {_FINEST}; got {shown(divisions)}"
+            f"divisions must be three whole numbers, 1 to {_MOST_DIVISIONS}; got {shown(divisions)}"
         )
     divisions = int(divisions[0]), int(divisions[1]), int(divisions[2])
     sides, faces, count = [], [], 0
@@ -189,9 +191,10 @@ def _made(vertices: FloatArray, faces: IntArray, what: str) -> Mesh:
 
 
 def _require(n_vertices: int, least: int) -> None:
-    if not is_whole(n_vertices, least, _MOST):
+    if not is_whole(n_vertices, least, _MOST_VERTICES):
         raise ArgumentError(
-            f"n_vertices must be a whole number, {least} to {_MOST}; got {shown(n_vertices)}"
+            f"n_vertices must be a whole number, {least} to {_MOST_VERTICES}; "
+            f"got {shown(n_vertices)}"
         )
 
 

@@ -5,7 +5,6 @@ The files, in reading order:
     cage_display      `CageDisplay`
     cage_drag         dragging a cage vertex
     vertex_picking    the cage vertex under the pointer
-    rejected_cage     display of a rejected cage and its faults
 """
 
 from .cage_display import CageDisplay

@@ -12,21 +12,19 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from vtk_segdeform.arrays import is_number, is_whole
-from vtk_segdeform.checks import as_flag, as_text, shown
-from vtk_segdeform.errors import ArgumentError, CageError
+from vtk_segdeform.checks import as_flag, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh import face_edges
 from vtk_segdeform.pictures import HANDLE, of_region, rgb
 from vtk_segdeform.session import Change, Session
 
+from ..picking import is_seen
 from ..scene import Gesture, Pointer, Widget, Wireframe
 from .cage_drag import CageVertex, drag_vertex
-from .rejected_cage import RejectedCage
-from .vertex_picking import vertex_at_pointer
+from .vertex_picking import points_at_pointer
 
-_DESIGN_HEIGHT = 600  # pixels; lines are thicker in a higher window
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 
 
@@ -52,8 +50,6 @@ class CageDisplay(Widget):
         self._opacity = 1.0
         self._hidden: set[int] = set()
         self._wireframes: list[Wireframe] = []
-        self._rejected: RejectedCage | None = None
-        self._replaced: int | None = None  # the region whose cage was rejected
         self._highlighted: CageVertex | None = None
         self._marker = Wireframe(np.zeros((1, 3)), _NO_EDGES, np.zeros(1, dtype=np.int64))
         self._foreground: Any = None  # the renderer of the marker
@@ -104,73 +100,19 @@ class CageDisplay(Widget):
         self._opacity = opacity
         self._refresh()
 
-    def show_faults(
-        self,
-        vertices: ArrayLike,
-        faces: ArrayLike,
-        region: int | None = None,
-        *,
-        message: str | None = None,
-    ) -> str:
-        """Show a surface that was rejected as a cage, with its faults marked.
-
-        It replaces the cage of *region* until `clear_faults` is called or the cages change.
-
-        Parameters
-        ----------
-        vertices : (m, 3) float
-            Of the rejected surface, at rest.
-        faces : (k, 3) int
-            Triangles.
-        region : int, optional
-            The region to enclose; its vertices outside the surface are marked.
-        message : str, optional
-            The text beside the marks, such as that of the `CageError`; by default a description of
-            the faults found.
-
-        Returns
-        -------
-        message : str
-            The text shown; "" if there is no fault.
-        """
-        mesh, regions = self.session.mesh, self.session.regions
-        enclosed = mesh.vertices[:0]
-        if region is not None:
-            if regions is None or not is_whole(region, 0, regions.n_regions - 1):
-                raise CageError(f"there is no region {shown(region)} to enclose with a cage")
-            enclosed = mesh.vertices[regions.members(region)]
-        if message is not None:
-            as_text(message, "message")
-        self.clear_faults()
-        self._rejected = RejectedCage(
-            self.view, vertices, faces, enclosed=enclosed, message=message
-        )
-        self._replaced = region
-        self._refresh()
-        return self._rejected.message
-
-    def clear_faults(self) -> None:
-        """Remove the surface shown by `show_faults`."""
-        if self._rejected is not None:
-            self._rejected.remove()
-            self._rejected = self._replaced = None
-            self._refresh()
-
     def remove(self) -> None:
         """Remove the widget from the view permanently."""
         self.Off()
         for stop in self._stops_showing:
             stop()
-        self.clear_faults()
         self.hide()
         if self._foreground is not None:
             self._foreground.RemoveActor(self._marker.actor)
 
     # Dragging.
 
-    def Off(self) -> None:  # noqa: N802 - VTK's word
-        """Stop handling events; finish an ongoing drag and remove the highlight."""
-        super().Off()
+    def leave(self) -> None:
+        """Remove the highlight."""
         self._highlight(None)
 
     def on_press(self, press: Pointer) -> Gesture | None:
@@ -189,13 +131,12 @@ class CageDisplay(Widget):
         visible = [r for r, each in enumerate(self._wireframes) if each.actor.GetVisibility()]
         if not visible:
             return None
-        occluder = None if self.through else (session.vertices, session.mesh.faces)
-        points = np.concatenate([vertices[r] for r in visible])
-        k = vertex_at_pointer(self.view, pointer, points, occluder=occluder)
-        if k is None:
-            return None
         numbers = [(r, v) for r in visible for v in range(len(vertices[r]))]
-        return numbers[k]
+        points = np.concatenate([vertices[r] for r in visible])
+        for k in points_at_pointer(self.view, pointer, points):
+            if self.through or is_seen(self.view, points[k], session.vertices, session.mesh.faces):
+                return numbers[int(k)]
+        return None
 
     # Drawing.
 
@@ -203,7 +144,6 @@ class CageDisplay(Widget):
         if change & (Change.CAGES | Change.REGIONS):
             self.cancel()
             self._highlighted = None
-            self.clear_faults()
             self._rebuild()
         elif change & Change.POSE:
             pairs = zip(self._wireframes, self.session.cage_vertices, strict=False)
@@ -231,7 +171,7 @@ class CageDisplay(Widget):
         """Update visibility, opacity and the highlight."""
         marker_visible = False
         for region, wireframe in enumerate(self._wireframes):
-            wireframe.actor.SetVisibility(self.is_visible(region) and region != self._replaced)
+            wireframe.actor.SetVisibility(self.is_visible(region))
             wireframe.actor.GetProperty().SetOpacity(self._opacity)
         if self._highlighted is not None:
             region, vertex = self._highlighted
@@ -244,13 +184,11 @@ class CageDisplay(Widget):
 
     def _set_sizes(self) -> None:
         """Scale lines and spheres with the window."""
-        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
+        scale = self.view.scale
         for region, wireframe in enumerate(self._wireframes):
             colour = of_region(region)
             wireframe.set_style(colour, line_width=1.8 * scale, sphere_size=8.0 * scale)
         self._marker.set_style(rgb(HANDLE), line_width=1.0, sphere_size=13.0 * scale)
-        if self._rejected is not None:
-            self._rejected.lay_out(scale)
 
 
 def _checked_region(region: int) -> int:

@@ -38,16 +38,17 @@ def view_timer(view: View) -> Timer:
     """Return the timer of a *view*; an error in a job reaches `View.on_failure`.
 
     A VTK event loop holds Python's lock while it waits for events, so each tick waits a moment
-    for the worker, and pictures leave it most of the time.  During a camera drag progress is
-    reported but nothing is delivered.
+    for the worker, and pictures leave it most of the time.
     """
 
     def start(job: Job[Any]) -> Stop:
-        stops = (
-            view.pulse(lambda: job.report(_SHARE)),
-            view.every(_PERIOD, job.deliver),
-            view.spare(),
-        )
+        def tick() -> None:
+            try:
+                job.report(_SHARE)
+            finally:
+                job.deliver()
+
+        stops = view.every(_PERIOD, tick), view.spare()
 
         def stop() -> None:
             for each in stops:

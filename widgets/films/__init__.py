@@ -9,6 +9,6 @@ The files, in reading order:
 
 from .film import Film, film
 from .film_files import require_film
-from .off_screen import OffScreen
+from .off_screen import off_screen
 
-__all__ = ["Film", "OffScreen", "film", "require_film"]
+__all__ = ["Film", "film", "off_screen", "require_film"]

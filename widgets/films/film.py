@@ -19,20 +19,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from vtk_segdeform.arrays import as_points, is_whole
 from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.progress import Progress, tell
+from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..scene import Stop, View
 from .film_files import Picture, require_film, write_film
-from .off_screen import OffScreen
+from .off_screen import off_screen
 
-_LARGEST = 16_384  # pixels, width or height
+_LARGEST_SIDE = 16_384  # pixels, width or height
 
 Targets = Mapping[str, ArrayLike] | ArrayLike
 Frame = Callable[[], object] | Targets | None
@@ -101,35 +99,17 @@ class Film:
         MissingDependencyError
             If the library for the format is not installed.
         """
-        write_film(path, _ReportingPictures(self, progress), fps)
+        write_film(path, self, fps, progress)
 
     def _take(self) -> None:
-        window = self.view.window
-        width, height = window.GetSize()
-        pixels = vtkUnsignedCharArray()
-        window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels, 0)
-        picture = vtk_to_numpy(pixels).reshape(height, width, 3)[::-1]
+        picture = self.view.pixels()[::-1]
+        height, width, _ = picture.shape
         if not self._pictures:  # the first picture sets the size; videos require even numbers
             self._shape = (height - height % 2, width - width % 2, 3)
         whole = np.full(self._shape, 255, dtype=np.uint8)
         h, w = min(height, self._shape[0]), min(width, self._shape[1])
         whole[:h, :w] = picture[:h, :w]
         self._pictures.append(zlib.compress(whole.tobytes(), 1))
-
-
-class _ReportingPictures:
-    """The pictures of a film; each access reports progress."""
-
-    def __init__(self, film: Film, progress: Progress | None) -> None:
-        self._film, self._progress, self._count = film, progress, 0
-
-    def __len__(self) -> int:
-        return len(self._film)
-
-    def __getitem__(self, number: int, /) -> Picture:
-        tell(self._progress, min(1.0, self._count / len(self)), f"picture {number + 1}")
-        self._count += 1
-        return self._film[number]
 
 
 def film(
@@ -167,9 +147,9 @@ def film(
     """
     require_film(path, fps)
     require_sequence(size, "size")
-    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST) for n in size):
+    if len(size) != 2 or not all(is_whole(n, 2, _LARGEST_SIDE) for n in size):
         raise ArgumentError(
-            f"size must be (width, height), 2 to {_LARGEST} pixels each; got {shown(size)}"
+            f"size must be (width, height), 2 to {_LARGEST_SIDE} pixels each; got {shown(size)}"
         )
     session = scene if isinstance(scene, Session) else None
     known: Sequence[Frame] = []  # an iterator's frames are not known in advance
@@ -180,8 +160,8 @@ def film(
         made = Film(scene)
         _shoot(made, None, frames)
     else:
-        with OffScreen(session, size, in_view=_targets(known)) as window:
-            made = Film(window.view)
+        with off_screen(session, size, in_view=_targets(known)) as view:
+            made = Film(view)
             try:
                 _shoot(made, session, frames)
             except BaseException:  # Ctrl+C as well: no half a drag may remain

@@ -7,6 +7,7 @@ dependency of pyvista.  MP4s require imageio[ffmpeg].
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,7 @@ from vtk_segdeform.errors import MissingDependencyError, SessionError
 from vtk_segdeform.files import replacing, require_place
 from vtk_segdeform.importing import imported
 from vtk_segdeform.pictures import png_of
+from vtk_segdeform.progress import Progress, tell
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
 
@@ -33,8 +35,12 @@ class Pictures(Protocol):
     def __getitem__(self, number: int, /) -> Picture: ...
 
 
-def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> None:
+def write_film(
+    path: str | os.PathLike[str], pictures: Pictures, fps: float, progress: Progress | None = None
+) -> None:
     """Write *pictures*, *fps* per second, in the format of the suffix of *path*.
+
+    *progress* is called before every picture.
 
     Raises
     ------
@@ -48,7 +54,7 @@ def write_film(path: str | os.PathLike[str], pictures: Pictures, fps: float) -> 
     write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
     try:
         with replacing(path, folder=not path.suffix) as draft:
-            write(draft, pictures, fps)
+            write(draft, pictures, _reported(pictures, progress), fps)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
@@ -71,7 +77,13 @@ def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
         _library(suffix)
 
 
-def _write_gif(path: Path, pictures: Pictures, fps: float) -> None:
+def _reported(pictures: Pictures, progress: Progress | None) -> Iterator[Picture]:
+    for k in range(len(pictures)):
+        tell(progress, k / len(pictures), f"picture {k + 1}")
+        yield pictures[k]
+
+
+def _write_gif(path: Path, pictures: Pictures, each: Iterator[Picture], fps: float) -> None:
     image = _library(".gif")
     some = np.unique(np.linspace(0, len(pictures) - 1, _SAMPLES).round().astype(int))
     sheet = image.fromarray(np.concatenate([pictures[int(k)] for k in some]))
@@ -79,27 +91,26 @@ def _write_gif(path: Path, pictures: Pictures, fps: float) -> None:
     colours = sheet.quantize(256, method=image.Quantize.MAXCOVERAGE)
     dither = image.Dither.FLOYDSTEINBERG
     first, *rest = (
-        image.fromarray(pictures[k]).quantize(palette=colours, dither=dither)
-        for k in range(len(pictures))
+        image.fromarray(picture).quantize(palette=colours, dither=dither) for picture in each
     )
     first.save(path, format="GIF", save_all=True, append_images=rest, duration=1000.0 / fps, loop=0)
 
 
-def _write_mp4(path: Path, pictures: Pictures, fps: float) -> None:
+def _write_mp4(path: Path, pictures: Pictures, each: Iterator[Picture], fps: float) -> None:
     height, width, _ = pictures[0].shape
     writer = _library(".mp4").write_frames(str(path), (width, height), fps=fps, macro_block_size=2)
     try:
         writer.send(None)  # starts the generator
-        for k in range(len(pictures)):
-            writer.send(pictures[k].tobytes())
+        for picture in each:
+            writer.send(picture.tobytes())
     finally:
         writer.close()
 
 
-def _write_folder(path: Path, pictures: Pictures, fps: float) -> None:
-    del fps
-    for k in range(len(pictures)):
-        (path / f"{k:04d}.png").write_bytes(png_of(pictures[k]))
+def _write_folder(path: Path, pictures: Pictures, each: Iterator[Picture], fps: float) -> None:
+    del pictures, fps
+    for k, picture in enumerate(each):
+        (path / f"{k:04d}.png").write_bytes(png_of(picture))
 
 
 def _library(suffix: str) -> Any:

@@ -6,8 +6,8 @@ and the camera looks along the shortest extent of the model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from types import TracebackType
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
-from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.arrays import FloatArray, bounds_of
 from vtk_segdeform.pictures import BODY, FIXED, HANDLE, PAPER, require_offscreen, rgb, view_of
 from vtk_segdeform.session import Session
 
@@ -25,71 +25,55 @@ _MARGIN = 1.15  # of the view, as a bent mesh may reach beyond its handles
 _SAMPLES = 8  # per pixel, for smooth edges
 
 
-class OffScreen:
-    """An off-screen view of a session, as a context manager.
+@contextmanager
+def off_screen(
+    session: Session, size: tuple[int, int], *, in_view: Sequence[FloatArray] = ()
+) -> Iterator[View]:
+    """Show the current pose of *session* in a view of *size* (width, height) pixels, until left.
 
-    Parameters
-    ----------
-    session : Session
-        The session whose current pose is shown.
-    size : (width, height)
-        In pixels.
-    in_view : sequence of (k, 3) float
-        Points besides the mesh that must be in view.
+    Besides the mesh, the points *in_view*, each (k, 3), are inside the view.
 
     Raises
     ------
     MissingDependencyError
         If off-screen rendering is unavailable.
     """
+    require_offscreen()
+    window, renderer = vtkRenderWindow(), vtkRenderer()
+    window.SetOffScreenRendering(True)
+    window.SetMultiSamples(_SAMPLES)
+    window.SetSize(*size)
+    renderer.SetBackground(*(rgb(PAPER) / 255.0))
+    window.AddRenderer(renderer)
+    interactor = vtkGenericRenderWindowInteractor()
+    interactor.SetRenderWindow(window)
+    interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
+    view = View(renderer, interactor)
+    surface = SurfaceDisplay(view, session)
+    surface.set_colours("film", _colours(session))
+    rest = session.mesh.vertices
+    points = np.concatenate([rest, session.vertices, *in_view])
+    _place_camera(view, view_of(rest, session.vertices), points)
+    try:
+        yield view
+    finally:
+        surface.remove()
+        window.Finalize()
 
-    def __init__(
-        self, session: Session, size: tuple[int, int], *, in_view: Sequence[FloatArray] = ()
-    ) -> None:
-        require_offscreen()
-        self._window = vtkRenderWindow()
-        self._window.SetOffScreenRendering(True)
-        self._window.SetMultiSamples(_SAMPLES)
-        self._window.SetSize(*size)
-        renderer = vtkRenderer()
-        renderer.SetBackground(*(rgb(PAPER) / 255.0))
-        self._window.AddRenderer(renderer)
-        interactor = vtkGenericRenderWindowInteractor()
-        interactor.SetRenderWindow(self._window)
-        interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
-        self.view = View(renderer, interactor)
-        self.surface = SurfaceDisplay(self.view, session)
-        self.surface.set_colours("film", _colours(session))
-        rest = session.mesh.vertices
-        points = np.concatenate([rest, session.vertices, *in_view])
-        self._place_camera(view_of(rest, session.vertices), points)
 
-    def __enter__(self) -> OffScreen:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.surface.remove()
-        self._window.Finalize()
-
-    def _place_camera(self, axes: FloatArray, points: FloatArray) -> None:
-        """Fit all *points* into the view; the rows of *axes* point right, up and to the camera."""
-        aligned = points @ axes.T
-        low, high = aligned.min(axis=0), aligned.max(axis=0)
-        width, height, _ = np.maximum(high - low, 1e-9 * np.ptp(aligned))
-        columns, rows = self._window.GetSize()
-        centre = 0.5 * (low + high) @ axes
-        camera = self.view.camera
-        camera.SetFocalPoint(*centre)
-        camera.SetPosition(*(centre + 3.0 * np.linalg.norm(high - low) * axes[2]))
-        camera.SetViewUp(*axes[1])
-        camera.ParallelProjectionOn()
-        camera.SetParallelScale(0.5 * _MARGIN * max(height, width * rows / columns))
-        self.view.before_render(self.view.renderer.ResetCameraClippingRange)
+def _place_camera(view: View, axes: FloatArray, points: FloatArray) -> None:
+    """Fit all *points* into the view; the rows of *axes* point right, up and to the camera."""
+    low, high = bounds_of(points @ axes.T)
+    width, height, _ = np.maximum(high - low, 1e-9 * (high - low).max())
+    columns, rows = view.window.GetSize()
+    centre = 0.5 * (low + high) @ axes
+    camera = view.camera
+    camera.SetFocalPoint(*centre)
+    camera.SetPosition(*(centre + 3.0 * np.linalg.norm(high - low) * axes[2]))
+    camera.SetViewUp(*axes[1])
+    camera.ParallelProjectionOn()
+    camera.SetParallelScale(0.5 * _MARGIN * max(height, width * rows / columns))
+    view.before_render(view.renderer.ResetCameraClippingRange)
 
 
 def _colours(session: Session) -> NDArray[np.uint8]:

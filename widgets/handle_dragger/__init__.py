@@ -17,12 +17,13 @@ from .gizmo import AXIS_COLOURS, Gizmo
 from .gizmo_shapes import FREE, Kind, Part
 from .handle_dragger import HandleDragger
 from .handle_motion import Grip, Motion, next_constraint, step_of
-from .live_solve import LiveSolve, Pace
+from .live_solve import STEPS, LiveSolve
 from .number_entry import NumberEntry
 
 __all__ = [
     "AXIS_COLOURS",
     "FREE",
+    "STEPS",
     "Gizmo",
     "Grip",
     "HandleDragger",
@@ -30,7 +31,6 @@ __all__ = [
     "LiveSolve",
     "Motion",
     "NumberEntry",
-    "Pace",
     "Part",
     "next_constraint",
     "step_of",

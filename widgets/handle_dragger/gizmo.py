@@ -38,11 +38,6 @@ _DESIGN_HEIGHT = 600  # pixels; in a higher window the gizmo is slightly larger
 class Gizmo:
     """A gizmo at one point of a view; hidden until it is placed.
 
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-
     Attributes
     ----------
     size : float
@@ -65,6 +60,7 @@ class Gizmo:
         self._stop = view.before_render(self._lay_out)
         self._update_colours()
         self._update_clipping()
+        self._lay_out()  # hides it
 
     @property
     def centre(self) -> FloatArray | None:

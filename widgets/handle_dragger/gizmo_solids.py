@@ -9,9 +9,7 @@ import functools
 from typing import Any
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersCore import vtkAppendPolyData, vtkTubeFilter
 from vtkmodules.vtkFiltersSources import vtkConeSource, vtkSphereSource
@@ -20,6 +18,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import rgb
 
+from ..scene import cells_of, points_of
 from .gizmo_shapes import BALL, Kind, Part, line_of
 
 _OUTLINE = 0.018  # thickness
@@ -28,15 +27,7 @@ _HEAD_LENGTH, _HEAD_RADIUS = 0.16, 0.065
 
 
 class Solid:
-    """The actors of one part.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    part : Part
-        The part to draw.
-    """
+    """The actors of one part."""
 
     def __init__(self, renderer: Any, part: Part) -> None:
         self._renderer = renderer
@@ -120,11 +111,9 @@ def _tube(line: FloatArray, radius: float) -> Any:
 
 
 def _cell(points: FloatArray, *, closed_area: bool) -> Any:
-    places, cells, data = vtkPoints(), vtkCellArray(), vtkPolyData()
-    places.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    cells.InsertNextCell(len(points), list(range(len(points))))
-    data.SetPoints(places)
-    (data.SetPolys if closed_area else data.SetLines)(cells)
+    data, cell = vtkPolyData(), cells_of(np.arange(len(points))[None])
+    data.SetPoints(points_of(points))
+    (data.SetPolys if closed_area else data.SetLines)(cell)
     return data
 
 

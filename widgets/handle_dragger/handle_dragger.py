@@ -14,7 +14,7 @@ plane.  A pin or pulled point is moved by a pull, so that the pose around it is 
                                 puts it back
     escape, right button        cancel
 
-Each move solves once, for about 20 ms, for the current position of the pointer.  While the pointer
+Each move solves once for the current position of the pointer.  While the pointer
 rests, and after the release, a timer refines the pose until it has converged; this is part of the
 same undo step.
 """
@@ -141,18 +141,8 @@ class HandleDragger(Widget):
         self._update_gizmo()
 
     @property
-    def refine_while_resting(self) -> bool:
-        """Whether a timer refines the pose while the pointer rests, and after the release."""
-        return self._live.is_enabled
-
-    @refine_while_resting.setter
-    def refine_while_resting(self, refines: bool) -> None:
-        self._live.is_enabled = as_flag(refines, "refine_while_resting")
-        self.resume_refining()
-
-    @property
     def is_refining(self) -> bool:
-        """Whether that timer is running."""
+        """Whether a timer refines the pose: while the pointer rests, and after the release."""
         return self._live.is_refining
 
     def stop_refining(self) -> None:
@@ -160,7 +150,7 @@ class HandleDragger(Widget):
         self._live.halt()
 
     def resume_refining(self) -> None:
-        """Refine the current pose if it has not converged, the widget is on and it may refine."""
+        """Refine the current pose if it has not converged and the widget is on."""
         if self.GetEnabled():
             self._live.resume()
 
@@ -184,7 +174,7 @@ class HandleDragger(Widget):
         """Remove the widget from the view permanently."""
         self.Off()
         self._stop_listening()
-        self._live.remove()
+        self._live.pause()
         self.gizmo.remove()
         self._marks.remove()
         if self._own_surface:
@@ -197,6 +187,11 @@ class HandleDragger(Widget):
         found = None if part is not None else self._handle_at(pointer)
         self.gizmo.highlight(part)
         self._marks.highlight(None if found is None else found[0])
+
+    def leave(self) -> None:
+        """Highlight nothing."""
+        self.gizmo.highlight(None)
+        self._marks.highlight(None)
 
     def on_press(self, press: Pointer) -> Gesture | None:
         """Drag the part of the gizmo, or else the handle, under the pointer."""
@@ -247,15 +242,15 @@ class HandleDragger(Widget):
                     return  # a commit, undo or redo from elsewhere has ended the drag
                 reached = sent if self._live.has_reached() else reached
                 if motion.part != (self._constraint or part):
-                    motion.exact(0.0)  # back the way it came
-                    self._live.lead([move(stop) for stop in motion.way(reached)])
+                    motion.exact(0.0)  # back through the same stops
+                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
                     sent = reached = 0.0
                     motion = self._motion_of(self._constraint or part, grip, press)
                 matrix = entry.matrix(motion) if entry.text else motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
                 is_far = distance > tolerance or bool(entry.text)
                 if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
-                    self._live.lead([move(stop) for stop in motion.way(reached)])
+                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
                     self._live.solve(move(matrix))
                     sent = motion.turn
                     has_moved = has_moved or session.is_dragging  # not if it was refused

@@ -15,18 +15,10 @@ from ..scene import View, Wireframe, handle_colour
 _HIGHLIGHT = COLOURS[4]
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
 _DOT, _ALONE, _HIGHLIGHTED = 4.0, 9.0, 2.0  # pixels; pins and pulled points stand alone
-_DESIGN_HEIGHT = 600  # pixels; dots are larger in a higher window
 
 
 class HandleMarks:
     """Dots for every handle of a session; hidden until `show`.
-
-    Parameters
-    ----------
-    view : View
-        The view to draw in; the mesh hides dots behind it.
-    session : Session
-        The session whose handles are shown.
 
     Attributes
     ----------
@@ -78,7 +70,6 @@ class HandleMarks:
         self.show(False)
 
     def _set_sizes(self) -> None:
-        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
         for name in self.session.handles:
             if name not in self._dots:
                 continue
@@ -86,4 +77,4 @@ class HandleMarks:
             colour = rgb(_HIGHLIGHT) if highlighted else handle_colour(self.session, name)
             size = _ALONE if len(self.session.handles[name]) == 1 else _DOT
             size += _HIGHLIGHTED if highlighted else 0.0
-            dots.set_style(colour, line_width=1.0, sphere_size=scale * size)
+            dots.set_style(colour, line_width=1.0, sphere_size=self.view.scale * size)

@@ -31,7 +31,7 @@ _EDGE_ON = 0.2  # sine of the angle of a plane to the line of sight below which 
 _FACE_ON = 0.9  # the same sine, above which a ring grabbed at its centre is turned by its top
 _LEAST_SLOPE = 0.1  # sine of the angle to which a line of sight is tilted during the drag
 _SLOW_FACTOR = 0.2  # with Shift, also of the steps
-_LEG = 0.5 * np.pi  # between stops on the way of a far rotation, at most
+_LARGEST_TURN = 0.5 * np.pi  # radians, between two stops of a far rotation
 _TURN_STEP = 5.0  # degrees, with Control
 _MOVE_STEP = 0.01  # of the diagonal, with Control, rounded to 1, 2 or 5 times a power of ten
 _ROUND = np.array([1.0, 2.0, 5.0, 10.0])
@@ -82,19 +82,7 @@ class Grip:
 
 
 class Motion:
-    """The motion by one part of the gizmo since the press.
-
-    Parameters
-    ----------
-    projection : Projection
-        The camera may move during the drag.
-    part : Part
-        The dragged part.
-    grip : Grip
-        The grabbed point and the gizmo at the press.
-    press : Pointer
-        The position of the press.
-    """
+    """The motion by one part of the gizmo since the press."""
 
     def __init__(self, projection: Projection, part: Part, grip: Grip, press: Pointer) -> None:
         self.part = part
@@ -142,14 +130,16 @@ class Motion:
         """The angle of a rotation in radians, whole turns included; 0 of a translation."""
         return float(self._applied[0]) if self.part.kind is Kind.ROTATION else 0.0
 
-    def way(self, since: float) -> list[FloatArray]:
-        """Return the rotations (4, 4) on the way from the angle *since* to the current one.
+    def stops(self, since: float) -> list[FloatArray]:
+        """Return rotations (4, 4) between the angle *since* and the current one.
 
         A matrix has no turns, and the solver turns a handle the shorter way.  So where the angles
         are half a turn or more apart, the handle stops in between.
         """
         ahead = self.turn - since
-        count = math.ceil(abs(ahead) / _LEG) if abs(ahead) > 2.0 * _LEG - 1e-6 else 1
+        count = (
+            math.ceil(abs(ahead) / _LARGEST_TURN) if abs(ahead) > 2.0 * _LARGEST_TURN - 1e-6 else 1
+        )
         return [self._matrix(np.array([since + k / count * ahead])) for k in range(1, count)]
 
     def exact(self, amount: float) -> FloatArray:

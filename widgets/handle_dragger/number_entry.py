@@ -11,7 +11,7 @@ from vtk_segdeform.arrays import FloatArray
 from .gizmo_shapes import Kind
 from .handle_motion import Motion
 
-_LONGEST = 12  # characters
+_MOST_CHARACTERS = 12  # characters
 _POINT = {".", "period", "comma", "Decimal", "Separator"}
 _MINUS = {"-", "minus", "Subtract"}
 _ENTER = {"Return", "Enter"}
@@ -42,7 +42,7 @@ class NumberEntry:
         """Handle a *key* by VTK's name; return False if it is not part of a number."""
         name = key.removeprefix("KP_")
         if len(name) == 1 and name in "0123456789":
-            self.text = (self.text + name)[:_LONGEST]
+            self.text = (self.text + name)[:_MOST_CHARACTERS]
         elif name in _POINT:
             self.text += "" if "." in self.text else "."
         elif name in _MINUS:

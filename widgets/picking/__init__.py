@@ -9,13 +9,10 @@ The files, in reading order:
     surface_ring        the ring around a point
 """
 
-from .picking import Hit, Picker
-from .surface_ring import contour
-from .visibility import may_overlap
+from .picking import Hit, Picker, is_seen
 
 __all__ = [
     "Hit",
     "Picker",
-    "contour",
-    "may_overlap",
+    "is_seen",
 ]

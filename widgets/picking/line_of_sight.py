@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vtk_segdeform.arrays import FloatArray, IntArray
-from vtk_segdeform.kernels import compiled_kernels, inputs
 
 
 def intersections(
@@ -40,14 +39,14 @@ def intersections(
     length = float(np.linalg.norm(far - near))
     if not length > 0.0:
         return np.empty((0, 3)), np.empty(0, dtype=np.int64)
-    way = (far - near) / length
-    met = faces_in_beam(points, faces, near, way, width=2.0 * tolerance)
+    direction = (far - near) / length
+    met = _faces_in_beam(points, faces, near, direction, width=2.0 * tolerance)
     a, b, c = (points[corner] - near for corner in faces[met].T)
     normal = np.cross(b - a, c - a)
     with np.errstate(divide="ignore", invalid="ignore"):
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        depth = (a * normal).sum(axis=1) / (normal @ way)
-        place = depth[:, None] * way
+        depth = (a * normal).sum(axis=1) / (normal @ direction)
+        place = depth[:, None] * direction
         inside = np.abs(depth - 0.5 * length) <= 0.5 * length
         for start, stop in ((a, b), (b, c), (c, a)):
             edge = stop - start
@@ -59,29 +58,22 @@ def intersections(
     return near + place[found], met[found]
 
 
-def faces_in_beam(
-    points: FloatArray, faces: IntArray, origin: FloatArray, way: FloatArray, *, width: float
+def _faces_in_beam(
+    points: FloatArray, faces: IntArray, origin: FloatArray, direction: FloatArray, *, width: float
 ) -> IntArray:
     """Return faces (k,), among them all that a beam can meet.
 
-    The beam goes through *origin* (3,) along *way* (3,); its sides are *width* away from that line.
+    The beam goes through *origin* (3,) along *direction* (3,), *width* to each side.
     """
-    axes = perpendicular(way)
-    kernels = compiled_kernels(len(faces))
-    if kernels:
-        # In this thread: while others work, waiting for several takes longer than both passes.
-        met = np.empty(len(faces), dtype=np.int64)
-        count = kernels.faces_in_beam(met, *inputs(points, faces, origin, axes), width)
-        return met[:count].copy()
-    u, v = ((points - origin) @ axes.T).T
+    u, v = ((points - origin) @ perpendicular(direction).T).T
     sides = (u > width) * np.uint8(1) | (u < -width) * np.uint8(2)
     sides |= (v > width) * np.uint8(4) | (v < -width) * np.uint8(8)
     first, second, third = (sides[corner] for corner in faces.T)
     return np.flatnonzero((first & second & third) == 0)
 
 
-def perpendicular(way: FloatArray) -> NDArray[np.float64]:
-    """Return two unit vectors (2, 3), perpendicular to *way* and to each other."""
-    first = np.cross(way, np.eye(3)[np.abs(way).argmin()])
+def perpendicular(direction: FloatArray) -> NDArray[np.float64]:
+    """Return two unit vectors (2, 3), perpendicular to *direction* and to each other."""
+    first = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
     first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(way, first)])
+    return np.stack([first, np.cross(direction, first)])

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vtk_segdeform.arrays import BoolArray, FloatArray
+from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray
 from vtk_segdeform.mesh import SurfacePoint
 
-from ..scene import Pointer, SurfaceDisplay
+from ..scene import Pointer, Projection, SurfaceDisplay
 from .line_of_sight import intersections
 from .surface_distance import SurfaceDistance
 from .surface_ring import SurfaceRing
@@ -48,13 +48,7 @@ class _Visibility:
 
 
 class Picker:
-    """Queries on the mesh of a surface.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh as displayed in its view.
-    """
+    """Queries on the mesh of a surface."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
@@ -81,6 +75,11 @@ class Picker:
     def hit(self, pointer: Pointer) -> Hit | None:
         """Return the visible point of the surface at *pointer*, or None beside the mesh."""
         return next(iter(self.hits(pointer)), None)
+
+    def sees(self, point: FloatArray, *, within: float) -> bool:
+        """Return whether the surface does not hide *point* (3,); see `is_seen`."""
+        faces = self._mesh.faces
+        return is_seen(self._view, point, self._surface.points, faces, within=within)
 
     def distances(self, hits: Sequence[Hit], radius: float) -> FloatArray:
         """Return the distance along the surface of each vertex to the nearest of *hits*.
@@ -153,3 +152,32 @@ class Picker:
         distances = np.linalg.norm(self._surface.points[corners] - point, axis=1)
         place = SurfacePoint.in_face(self._surface.points, corners, point)
         return Hit(point, face, int(corners[distances.argmin()]), place)
+
+
+def is_seen(
+    projection: Projection,
+    point: FloatArray,
+    vertices: FloatArray,
+    faces: IntArray,
+    *,
+    within: float = 0.0,
+) -> bool:
+    """Return whether a surface does not hide a point from the camera.
+
+    Parameters
+    ----------
+    projection : Projection
+        The projection of the view.
+    point : (3,) float
+        In world coordinates.
+    vertices, faces : (n, 3) float, (m, 3) int
+        The surface.
+    within : float
+        Depth of the point behind the surface at which it still counts as seen, in the mesh's unit.
+    """
+    display = projection.to_display(point[None])
+    eye = projection.to_world(display * [1.0, 1.0, 0.0])[0]
+    if not (np.isfinite(eye).all() and np.isfinite(point).all()):
+        return False
+    nearest = intersections(vertices, faces, eye, point, tolerance=0.0)[0][:1]
+    return not ((point - nearest) @ projection.view_direction > within).any()

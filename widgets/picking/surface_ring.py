@@ -10,35 +10,27 @@ camera.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from threading import Thread
 
 import numpy as np
 
 from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray, IntArray
-from vtk_segdeform.geometry import decimated
 from vtk_segdeform.mesh import Mesh
 
+from ..scene import decimated_soon
 from .line_of_sight import perpendicular
 from .surface_distance import SurfaceDistance
 
-_SMALLEST = 1.5  # sides of the triangles, at least, in the radius of a ring that follows them
+_SMALLEST_RADIUS = 1.5  # of a ring that follows the triangles, in their sides
 _CORNERS = 48  # of a circle
 
 
 class SurfaceRing:
-    """Rings on the surface of one mesh, in any pose.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        n vertices.
-    """
+    """Rings on the surface of one mesh, in any pose."""
 
     def __init__(self, mesh: Mesh) -> None:
         self._mesh = mesh
         self._sample: _Sample | None = None
-        self._thread: Thread | None = None
         if mesh.n_vertices <= sizes.DECIMATED_POINTS:
             every = np.arange(mesh.n_vertices)
             self._sample = _Sample.of(mesh.faces, every, every)
@@ -62,7 +54,10 @@ class SurfaceRing:
             The viewing direction, of length 1.
         """
         corner = self._mesh.faces[face]
-        sample = self._ready_sample()
+        if self._sample is None and (found := decimated_soon(self._mesh)) is not None:
+            coarse, kept, cluster = found
+            self._sample = _Sample.of(coarse.faces, kept, cluster)
+        sample = self._sample
         if sample is None:
             return np.empty((0, 2, 3))
         x = points[sample.kept]
@@ -70,7 +65,7 @@ class SurfaceRing:
         start = np.unique(start[start >= 0])
         sides = x[sample.faces[start]]
         length = np.linalg.norm(sides - np.roll(sides, 1, axis=1), axis=2)
-        if len(start) and radius >= _SMALLEST * length.mean():
+        if len(start) and radius >= _SMALLEST_RADIUS * length.mean():
             centres = np.broadcast_to(centre, (len(start), 3))
             away = sample.distance.within(x, centres, start, radius)
             near = (away[sample.faces] <= radius).any(axis=1)
@@ -82,19 +77,6 @@ class SurfaceRing:
         if not (length := np.linalg.norm(normal)) > 0.0:
             return np.empty((0, 2, 3))
         return _circle(perpendicular(normal / length), centre, radius)
-
-    def _ready_sample(self) -> _Sample | None:
-        """Return the sample; None if it is not finished yet."""
-        if self._sample is None:
-            if self._thread is None:
-                self._thread = Thread(target=self._make, daemon=True)
-                self._thread.start()
-            return None
-        return self._sample
-
-    def _make(self) -> None:
-        coarse, kept, cluster = decimated(self._mesh, sizes.DECIMATED_POINTS)
-        self._sample = _Sample.of(coarse.faces, kept, cluster)
 
 
 @dataclass(frozen=True, eq=False)

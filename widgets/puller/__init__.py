@@ -6,8 +6,6 @@ The files, in reading order:
     waiting        a pull that waits for its session, and the stand-in that follows
     pull_motion    from pointer positions to the motion of the grabbed point
     markers        pins and pulled points as dots
-    guide          the line of an axis
-    caption        the amount of the pull
 """
 
 from .puller import LOCKED, Puller

@@ -9,9 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.arrays import FloatArray
@@ -19,13 +17,12 @@ from vtk_segdeform.pictures import COLOURS, PAPER, rgb
 from vtk_segdeform.session import Session, pulls
 
 from ..picking import Picker
-from ..scene import Phase, Pointer, SurfaceDisplay
+from ..scene import Pointer, SurfaceDisplay, cells_of, points_of
 
 _BLACK, _HIGHLIGHT = "#101010", COLOURS[4]
 _PIN, _PULLED, _RIM = 11.0, 7.0, 4.0  # pixels: the dots, and both sides of the rim together
 _THROUGH = 0.25  # opacity of dots that the body hides
 _REACH = 10.0  # pixels from the pointer
-_DESIGN_HEIGHT = 600  # pixels; dots are larger in a higher window
 
 
 class Markers:
@@ -79,9 +76,10 @@ class Markers:
         away = np.linalg.norm(self._view.to_display(places)[:, :2] - pointer.position, axis=1)
         names = list(shown)
         for k in np.argsort(away):
-            if not away[k] <= _REACH * self._scale:
+            if not away[k] <= _REACH * self._view.scale:
                 break
-            if self._is_visible(places[k]):
+            place = places[k]
+            if self._picker.sees(place, within=_REACH * self._view.pixel_at(place)):
                 return names[int(k)]
         return None
 
@@ -101,19 +99,9 @@ class Markers:
     def _shown(self) -> dict[str, int]:
         return {name: v for name, v in self._vertices.items() if not self._is_hidden(name)}
 
-    @property
-    def _scale(self) -> float:
-        return float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.8, 3.0))
-
-    def _is_visible(self, place: FloatArray) -> bool:
-        x, y, _ = self._view.to_display(place[None])[0]
-        hit = self._picker.hit(Pointer(Phase.HOVER, x, y))
-        pixel = self._view.pixel_at(place)
-        return hit is None or bool(np.linalg.norm(hit.point - place) <= _REACH * pixel)
-
     def _lay_out(self) -> None:
         """Place the dots in front of the surface, as seen from the camera."""
-        scale, pulls, shown = self._scale, self._surface.session.state.pulls, self._shown
+        scale, pulls, shown = self._view.scale, self._surface.session.state.pulls, self._shown
         for is_pin, size in ((True, _PIN), (False, _PULLED)):
             ids = [v for name, v in shown.items() if (name in pulls) is not is_pin]
             places = self._surface.points[np.array(ids, dtype=np.int64)]
@@ -163,16 +151,9 @@ class _Dots:
         self._actor.SetVisibility(len(places) > 0)
         if not len(places):
             return
-        points = vtkPoints()
-        points.SetData(numpy_to_vtk(np.ascontiguousarray(places), deep=True))
         if len(places) != self._data.GetNumberOfPoints():
-            cells, ids = vtkCellArray(), np.arange(len(places) + 1, dtype=np.int64)
-            cells.SetData(
-                numpy_to_vtkIdTypeArray(ids, deep=True),
-                numpy_to_vtkIdTypeArray(ids[:-1], deep=True),
-            )
-            self._data.SetVerts(cells)
-        self._data.SetPoints(points)
+            self._data.SetVerts(cells_of(np.arange(len(places))[:, None]))
+        self._data.SetPoints(points_of(places))
         style = self._actor.GetProperty()
         style.SetColor(*(rgb(colour) / 255.0))
         style.SetPointSize(size)

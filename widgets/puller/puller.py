@@ -16,7 +16,6 @@ shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -35,15 +34,13 @@ from ..handle_dragger import Gizmo, LiveSolve, step_of
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
-from .caption import Caption
-from .guide import Guide
 from .markers import Markers, marked_vertices
 from .pull_motion import PullMotion
 from .waiting import Pull, Waiting
 
 _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
-_SMALLEST, _LARGEST = 0.005, 1.0  # in diagonals
-GROWTH = 1.1  # factor for one click of the wheel or one key press
+_SMALLEST_RADIUS, _LARGEST_RADIUS = 0.005, 1.0  # in diagonals
+_GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _TOO_COARSE = "No vertex near this point. Enlarge the radius, or subdivide the mesh"
@@ -91,8 +88,6 @@ class Puller(Widget):
         self._ring = BrushRing(self._surface)
         self._markers = Markers(self._surface, self._picker, lambda name: self.is_hidden(name))
         self._gizmo = Gizmo(self.view)
-        self._guide = Guide(self.view)
-        self._caption = Caption(self.view, lambda: self._surface.points)
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
@@ -109,20 +104,10 @@ class Puller(Widget):
         if not (is_number(radius) and radius > 0.0):
             raise ArgumentError(f"radius must be above 0; got {shown(radius)}")
         diagonal = self.session.mesh.diagonal
-        self._radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self._radius = float(
+            np.clip(radius, _SMALLEST_RADIUS * diagonal, _LARGEST_RADIUS * diagonal)
+        )
         self._invoke("ModifiedEvent")
-
-    @property
-    def steps_of_radius(self) -> int:
-        """By how many steps of the keys the radius differs from the initial one, rounded."""
-        share = self._radius / (_RADIUS * self.session.mesh.diagonal)
-        return round(math.log(share) / math.log(GROWTH))
-
-    def reset_radius(self, steps: int = 0) -> None:
-        """Set the radius to the initial one after *steps* steps of the keys, exactly."""
-        self.radius = _RADIUS * self.session.mesh.diagonal
-        for _ in range(abs(steps)):
-            self.radius = self.radius * GROWTH ** (1 if steps > 0 else -1)
 
     @property
     def locality(self) -> float | None:
@@ -161,7 +146,6 @@ class Puller(Widget):
         """Start handling events, show the pins, and refine a pose that has not converged."""
         if not self.GetEnabled():
             super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self.leave))
             self._markers.show(True)
             self._live.resume()
 
@@ -172,16 +156,12 @@ class Puller(Widget):
         finally:
             self.waiting.drop()
             self._live.pause()
-            self._ring.hide()
             self._markers.show(False)
 
     def remove(self) -> None:
         """Remove the widget from the view permanently."""
         self.Off()
         self._stop_listening()
-        self._live.remove()
-        self._caption.remove()
-        self._guide.remove()
         self._gizmo.remove()
         self._markers.remove()
         self._ring.remove()
@@ -321,7 +301,7 @@ class Puller(Widget):
 
     def _solve(self, pull: Callable[..., Solution]) -> None:
         if self.waiting.is_shown:
-            pull()  # to the end, because a pose on the way would look like a way back
+            pull()  # until it converges: a pose in between would look like a step back
         self._live.solve(pull)
         self.waiting.hide()
 
@@ -363,7 +343,7 @@ class Puller(Widget):
 
     # Display.
     def _resize(self, clicks: int, pointer: Pointer) -> None:
-        self.radius = self.radius * GROWTH**clicks
+        self.radius = self.radius * _GROWTH**clicks
         self.on_hover(pointer)
 
     def _draw_ring(self, hit: Hit | None) -> None:
@@ -371,18 +351,15 @@ class Puller(Widget):
             self._ring.hide()
         else:
             segments = self._picker.ring(hit, self.radius)
-            self._ring.draw_segments(segments, rgb(PAPER), thickness=_RING_THICKNESS)
+            self._ring.draw(segments, rgb(PAPER), thickness=_RING_THICKNESS)
 
     def _show(self, motion: PullMotion | None) -> None:
-        """Show the gizmo part, the guide and the amount of *motion*, or none of them."""
-        part = None if motion is None else motion.part
+        """Show the part of the gizmo and the amount of *motion*, or neither."""
         self._markers.highlight(None)
         self._ring.hide()
-        self._gizmo.show_only(part)
-        place = None if motion is None else motion.place
-        self._gizmo.place(place)
-        lines = self._guide.show(part, place)
-        self._caption.show("" if motion is None else motion.caption, place, lines)
+        self._gizmo.show_only(None if motion is None else motion.part)
+        self._gizmo.place(None if motion is None else motion.place)
+        self._gizmo.set_caption("" if motion is None else motion.caption)
 
     def leave(self) -> None:
         """Show nothing at the pointer until it moves again."""

@@ -6,18 +6,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, rgb
 
-from ..picking import contour
-from ..scene import Draft, SurfaceDisplay
+from ..scene import Draft, SurfaceDisplay, cells_of, points_of
 
-_DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
 _RIM_WIDTH, _LINE_WIDTH = 5.5, 2.5  # pixels
 # Polygon offsets towards the camera.  By slope: half the width of the line must stay in front of a
 # steep surface.  In units of depth: the rim is drawn over the surface, the line over the rim.
@@ -27,13 +23,7 @@ _LIFT = 6.0  # pixels towards the camera, so that the line is whole at the silho
 
 
 class BrushRing:
-    """The line of constant distance along the surface; invisible until `draw`.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh, n vertices.
-    """
+    """The line of constant distance along the surface; invisible until `draw`."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
@@ -41,43 +31,28 @@ class BrushRing:
         self._draft = Draft.of(surface.view)
         self._actors = [self._actor(offset) for offset in _UNIT_OFFSETS]
 
-    def draw(self, distance: FloatArray, radius: float, colour: NDArray[np.uint8]) -> None:
+    def draw(
+        self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
+    ) -> None:
         """Draw the ring with a dark rim, visible on any background.
 
         Parameters
         ----------
-        distance : (n,) float
-            Of each vertex; finite at least within *radius* and at the neighbours.
-        radius : float
-            In the mesh's unit.
+        segments : (k, 2, 3) float
+            From `Picker.ring`.
         colour : (3,) uint8
             Red, green and blue, 0 to 255.
+        thickness : float
+            Of the line, relative to that of a brush.
         """
-        below = distance <= radius
-        a, b, c = (below[corner] for corner in self._surface.session.mesh.faces.T)
-        faces = self._surface.session.mesh.faces[(a != b) | (b != c)]
-        segments = contour(self._surface.points[faces], distance[faces], radius)
-        self.draw_segments(segments, colour)
-
-    def draw_segments(
-        self, segments: FloatArray, colour: NDArray[np.uint8], *, thickness: float = 1.0
-    ) -> None:
-        """Draw a ring of *segments* (k, 2, 3), *thickness* times as thick as a brush's."""
         view = self._surface.view
-        scale = float(np.clip(view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
-        ends = view.lifted(segments.reshape(-1, 3), scale * _LIFT)
-        points, lines = vtkPoints(), vtkCellArray()
-        points.SetData(numpy_to_vtk(ends, deep=True))
-        lines.SetData(
-            numpy_to_vtkIdTypeArray(np.arange(0, len(ends) + 1, 2, dtype=np.int64), deep=True),
-            numpy_to_vtkIdTypeArray(np.arange(len(ends), dtype=np.int64), deep=True),
-        )
-        self._ring.SetPoints(points)
-        self._ring.SetLines(lines)
+        ends = view.lifted(segments.reshape(-1, 3), view.scale * _LIFT)
+        self._ring.SetPoints(points_of(ends))
+        self._ring.SetLines(cells_of(np.arange(len(ends)).reshape(-1, 2)))
         shades, widths = (rgb(INK), colour), (_RIM_WIDTH, _LINE_WIDTH)
         for actor, shade, width in zip(self._actors, shades, widths, strict=True):
             actor.GetProperty().SetColor(*(shade / 255.0))
-            actor.GetProperty().SetLineWidth(scale * thickness * width)
+            actor.GetProperty().SetLineWidth(view.scale * thickness * width)
         self._show(True)
 
     def hide(self) -> None:

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.pictures import INK, PAPER, rgb
 
-from ..scene import View
+from ..scene import View, cells_of, points_of
 
-_DESIGN_HEIGHT = 600  # pixels; lines are wider in a higher window
 _WIDTHS = ((PAPER, 4.0), (INK, 1.5))  # pixels
 
 
 class Outline:
-    """A closed line in the display; invisible until `draw`.
-
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-    """
+    """A closed line in the display; invisible until `draw`."""
 
     def __init__(self, view: View) -> None:
         self._view = view
@@ -44,17 +35,10 @@ class Outline:
         """Draw the closed line through *corners* (k, 2), pixels of the window."""
         origin = np.array(self._view.renderer.GetOrigin(), dtype=float)
         positions = np.column_stack([corners - origin, np.zeros(len(corners))])
-        points = vtkPoints()
-        points.SetData(numpy_to_vtk(positions, deep=True))
-        cells = vtkCellArray()
-        cells.InsertNextCell(len(corners) + 1)
-        for k in [*range(len(corners)), 0]:
-            cells.InsertCellPoint(k)
-        scale = float(np.clip(self._view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.7, 3.0))
         for actor, (_, width) in zip(self._actors, _WIDTHS, strict=True):
-            actor.GetProperty().SetLineWidth(scale * width)
-        self._line.SetPoints(points)
-        self._line.SetLines(cells)
+            actor.GetProperty().SetLineWidth(self._view.scale * width)
+        self._line.SetPoints(points_of(positions))
+        self._line.SetLines(cells_of(np.append(np.arange(len(corners)), 0)[None]))
         self._show(True)
 
     def hide(self) -> None:

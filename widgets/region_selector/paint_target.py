@@ -105,11 +105,8 @@ class PaintTarget:
             return self.handle
         if self.paint is Paint.REGION:
             self.session.painting.paint(self.region, new)
-        elif self.paint is Paint.FIXED:
-            self.session.set_fixed(self.members() | new)
-        else:
-            return self.session.handles.add(self.members() | new, self.handle)
-        return self.handle
+            return self.handle
+        return self._assign(self.members() | new)
 
     def erase(self, vertices: BoolArray) -> str | None:
         """Remove *vertices*, a mask (n,); return the name of the handle, None once it is empty.
@@ -131,18 +128,11 @@ class PaintTarget:
         if not old.any():
             return self.handle
         free = self.changed(vertices, erase=True)
-        after = self.members() & ~old
         if self.paint is Paint.REGION:
             # With *old*, the session raises an error that gives the reason.
             self.session.painting.paint(self.region, free if free.any() else old, subtract=True)
-        elif self.paint is Paint.FIXED:
-            self.session.set_fixed(after)
-        elif after.any():
-            return self.session.handles.add(after, self.handle)
-        else:
-            self.session.handles.remove(str(self.handle))
-            return None
-        return self.handle
+            return self.handle
+        return self._assign(self.members() & ~old)
 
     def select_all(self) -> str | None:
         """Add all vertices that are free; return the name of the handle, if the target is one.
@@ -196,10 +186,17 @@ class PaintTarget:
                 if not members.all()
                 else f"Cannot invert {self._name}: it contains all vertices"
             )
+        return self._assign(others)
+
+    def _assign(self, members: BoolArray) -> str | None:
+        """Make *members* the fixed vertices or the handle; return its name, None if it is empty."""
         if self.paint is Paint.FIXED:
-            self.session.set_fixed(others)
+            self.session.set_fixed(members)
             return self.handle
-        return self.session.handles.add(others, self.handle)
+        if members.any():
+            return self.session.handles.add(members, self.handle)
+        self.session.handles.remove(str(self.handle))
+        return None
 
     @property
     def _name(self) -> str:

@@ -22,13 +22,7 @@ _PREVIEW_OPACITY = 0.9
 
 
 class RegionColours:
-    """A colour layer of a surface, visible at once.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh, n vertices.
-    """
+    """A colour layer of a surface, visible at once."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface

@@ -20,7 +20,6 @@ from vtk_segdeform.session import Change
 from ..picking import Picker
 from ..scene import Phase, Pointer, Stop, SurfaceDisplay, Wireframe
 
-_DESIGN_HEIGHT = 600  # pixels; lines and numbers are larger in a higher window
 _LINE_WIDTH, _LETTERS = 1.6, 14  # pixels
 _PLACES = 24  # per region, where its number may be
 _SAMPLE = 300  # vertices of a region from which they are chosen
@@ -30,13 +29,7 @@ _NO_POINTS = np.empty(0, dtype=np.int64)
 
 
 class RegionOutlines:
-    """Outlines and numbers of the regions of a session; hidden until `show`.
-
-    Parameters
-    ----------
-    surface : SurfaceDisplay
-        The mesh, n vertices.
-    """
+    """Outlines and numbers of the regions of a session; hidden until `show`."""
 
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface, self._view = surface, surface.view
@@ -101,8 +94,7 @@ class RegionOutlines:
         """Scale lines and numbers with the window, and place the numbers where they are seen."""
         if not (self._outline or self._labels):
             return
-        height = self._view.renderer.GetSize()[1]
-        scale = float(np.clip(height / _DESIGN_HEIGHT, 0.8, 3.0))
+        scale = self._view.scale
         if self._outline is not None:
             self._outline.set_style(rgb(INK), line_width=scale * _LINE_WIDTH, sphere_size=1.0)
         dots = self._view.renderer.GetRenderWindow().GetDPI() or 72
@@ -135,9 +127,7 @@ class RegionOutlines:
             return False
         if self._session.is_dragging:  # a search structure for each frame would be too slow
             return True
-        hit = self._picker.hit(pointer)
-        nearness = _HIDDEN * self._session.mesh.diagonal
-        return hit is None or bool(np.linalg.norm(hit.point - point) < nearness)
+        return self._picker.sees(point, within=_HIDDEN * self._session.mesh.diagonal)
 
 
 def _borders(labels: IntArray, faces: IntArray) -> tuple[IntArray, IntArray]:

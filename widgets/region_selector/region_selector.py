@@ -32,12 +32,12 @@ from .brush_ring import BrushRing
 from .outline import Outline
 from .paint_target import Paint, PaintTarget, dominant_region
 from .region_colours import RegionColours
-from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole, hits_at
+from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
 _RADIUS = 0.05  # the initial radius, in diagonals of the mesh
-_SMALLEST, _LARGEST = 1e-4, 2.0  # in diagonals
+_SMALLEST_RADIUS, _LARGEST_RADIUS = 1e-4, 2.0  # in diagonals
 _GROWTH = 1.2  # factor for one click of the wheel or one key press
 
 
@@ -160,19 +160,6 @@ class RegionSelector(Widget):
             self._cleanup.pop()()
 
     # Events.
-    def On(self) -> None:  # noqa: N802 - VTK's word
-        """Start handling events."""
-        if not self.GetEnabled():
-            super().On()
-            self._stops.append(self.view.observe("LeaveEvent", self.leave))
-
-    def Off(self) -> None:  # noqa: N802
-        """Stop handling events; finish an ongoing stroke."""
-        try:
-            super().Off()
-        finally:
-            self.leave()
-
     def on_press(self, press: Pointer) -> Gesture | None:
         """Start a stroke; pass the press to the camera beside the mesh."""
         stroke = self._stroke_from(press)
@@ -297,16 +284,18 @@ class RegionSelector(Widget):
     def _resize(self, clicks: int, pointer: Pointer) -> None:
         diagonal = self.session.mesh.diagonal
         radius = self.radius * _GROWTH**clicks
-        self.radius = float(np.clip(radius, _SMALLEST * diagonal, _LARGEST * diagonal))
+        self.radius = float(
+            np.clip(radius, _SMALLEST_RADIUS * diagonal, _LARGEST_RADIUS * diagonal)
+        )
         self._draw_ring(pointer, self._target, pointer.control)
 
     def _draw_ring(self, pointer: Pointer, target: PaintTarget, erase: bool) -> None:
-        hits = hits_at(self._picker, pointer, self.through) if self.view.contains(pointer) else []
-        if hits:
-            distance = self._picker.distances(hits, self.radius)
-            self._ring.draw(distance, self.radius, rgb(PAPER) if erase else target.colour)
-        else:
+        hit = self._picker.hit(pointer) if self.view.contains(pointer) else None
+        if hit is None:
             self._ring.hide()
+        else:
+            segments = self._picker.ring(hit, self.radius)
+            self._ring.draw(segments, rgb(PAPER) if erase else target.colour)
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:

@@ -7,12 +7,11 @@ The files, in reading order:
     widget             the base class of the widgets
     gestures           press, move and release as one generator
     surface_display    the mesh of a session as an actor
-    glide              the way from one pose to the next on the screen
+    glide              an animation from one pose to the next
     handle_colours     the colours of the handles of a session
     backdrop           background and light of a window that belongs to the editor
     projection         projection between world and display coordinates
     viewpoint          movements of the camera, named views, framing, the up axis
-    camera_checks      rotations of a camera, and checks of its vectors
     navigation         the camera by mouse
     orientation_cube   a cube that shows the directions of the model
     foreground         a renderer that draws over another one
@@ -24,7 +23,7 @@ The files, in reading order:
 """
 
 from .backdrop import set_background, set_lights
-from .decimated_surface import decimated_triangles
+from .decimated_surface import decimated_soon
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
 from .glide import Glide
@@ -36,12 +35,11 @@ from .orientation_cube import OrientationCube
 from .projection import Projection
 from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
 from .view import Stop, View
-from .viewpoint import TURN, VIEWS, Viewpoint
+from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
-from .wireframe import Wireframe
+from .wireframe import Wireframe, cells_of, points_of
 
 __all__ = [
-    "TURN",
     "VIEWS",
     "Draft",
     "Gesture",
@@ -61,9 +59,11 @@ __all__ = [
     "Viewpoint",
     "Widget",
     "Wireframe",
-    "decimated_triangles",
+    "cells_of",
+    "decimated_soon",
     "drawn_triangles",
     "handle_colour",
+    "points_of",
     "set_background",
     "set_font",
     "set_lights",

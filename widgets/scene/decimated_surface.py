@@ -6,10 +6,9 @@ another thread computes it, and until then there is none.  Its normals are those
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from threading import Thread
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,56 +21,36 @@ from vtk_segdeform.geometry import VertexNormals, decimated
 from vtk_segdeform.io import polydata_of
 from vtk_segdeform.mesh import Mesh
 
+Decimated = tuple[Mesh, IntArray, IntArray]
+"""As `decimated` returns it."""
 _PATIENCE = 0.01  # seconds until it is clear that the decimated mesh does not exist yet
+_pool = ThreadPoolExecutor(1)
+_made: WeakKeyDictionary[Mesh, Future[Decimated]] = WeakKeyDictionary()
 
 
-def decimated_triangles(mesh: Mesh, n_points: int) -> tuple[IntArray, IntArray]:
-    """Return some *n_points* vertices (k,) of a large *mesh*, and faces (f, 3) between them."""
-    coarse, kept, _ = decimated(mesh, n_points)
-    x, normals = mesh.vertices[kept], VertexNormals(mesh).subset(kept)(mesh.vertices)
-    # Clusters may fold a face over, which light would show as a black dot.
-    faces = coarse.faces
-    a, b, c = (x[corner] for corner in faces.T)
-    folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
-    return kept, np.where(folded[:, None], faces[:, ::-1], faces)
-
-
-@dataclass(frozen=True, eq=False)
-class _Shape:
-    """The vertices (k,) of a mesh that are drawn, faces between them, and their normals."""
-
-    kept: IntArray
-    faces: IntArray
-    normals: FloatArray  # (k, 3), at rest
-    normals_of: Callable[[FloatArray], FloatArray]  # in a pose (n, 3)
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> _Shape:
-        """Return the shape of a large *mesh*."""
-        kept, faces = decimated_triangles(mesh, sizes.DECIMATED_POINTS)
-        normals_of = VertexNormals(mesh).subset(kept)
-        return cls(kept, faces, normals_of(mesh.vertices), normals_of)
+def decimated_soon(mesh: Mesh) -> Decimated | None:
+    """Return the decimated *mesh*, which another thread makes; None if it is not finished yet."""
+    future = _made.get(mesh)
+    if future is None:
+        future = _made[mesh] = _pool.submit(decimated, mesh, sizes.DECIMATED_POINTS)
+        wait([future], _PATIENCE)
+    return future.result() if future.done() else None
 
 
 class DecimatedSurface:
-    """The decimated mesh as an actor; invisible at first.
+    """The decimated mesh as an actor; invisible at first."""
 
-    Parameters
-    ----------
-    mesh : Mesh
-        n vertices at rest.
-    shape : _Shape
-        What is drawn.
-    surface : vtkProperty
-        How it is drawn.
-    """
-
-    def __init__(self, mesh: Mesh, shape: _Shape, surface: Any) -> None:
-        self._kept, self._normals_of = shape.kept, shape.normals_of
-        corners = np.full(len(shape.faces), 3), shape.faces.ravel()
-        self._polydata = polydata_of(mesh.vertices[self._kept], *corners)
+    def __init__(self, mesh: Mesh, found: Decimated, surface: Any) -> None:
+        coarse, self._kept, _ = found
+        self._normals_of = VertexNormals(mesh).subset(self._kept)
+        faces, x, normals = coarse.faces, mesh.vertices[self._kept], self._normals_of(mesh.vertices)
+        # Clusters may fold a face over, which light would show as a black dot.
+        a, b, c = (x[corner] for corner in faces.T)
+        folded = (np.cross(b - a, c - a) * normals[faces].sum(axis=1)).sum(axis=1) < 0.0
+        faces = np.where(folded[:, None], faces[:, ::-1], faces)
+        self._polydata = polydata_of(x, np.full(len(faces), 3), faces.ravel())
         self._points: NDArray[np.float64] = vtk_to_numpy(self._polydata.GetPoints().GetData())
-        self._normals = np.array(shape.normals, dtype=np.float32)
+        self._normals = np.array(normals, dtype=np.float32)
         self._normal_array = numpy_to_vtk(self._normals)
         self._normal_array.SetName("Normals")
         self._polydata.GetPointData().SetNormals(self._normal_array)
@@ -100,33 +79,3 @@ class DecimatedSurface:
             array = numpy_to_vtk(colours[self._kept], deep=True)
             array.SetName("colours")
             self._polydata.GetPointData().SetScalars(array)
-
-
-class Decimating:
-    """Makes the `DecimatedSurface` of *mesh*, without waiting for it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The mesh at rest.
-    """
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._thread: Thread | None = None
-        self._shapes: list[_Shape] = []  # one, once the thread has made it
-
-    def result(self, surface: Any) -> DecimatedSurface | None:
-        """Return the surface; None if it is not finished yet."""
-        if self._thread is None:
-            self._thread = Thread(target=self._work, daemon=True)
-            self._thread.start()
-            self._thread.join(_PATIENCE)
-        if self._thread.is_alive():
-            return None
-        if not self._shapes:
-            self._work()  # and raise what it raised
-        return DecimatedSurface(self._mesh, self._shapes[0], surface)
-
-    def _work(self) -> None:
-        self._shapes.append(_Shape.of(self._mesh))

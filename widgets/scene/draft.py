@@ -42,11 +42,6 @@ def observe_drafts(interactor: Any, callback: Callable[[bool], None]) -> Stop:
 class Draft:
     """Switches a view to drafts and back.
 
-    Parameters
-    ----------
-    view : View
-        Its window is changed only between `begin` and `end`.
-
     Attributes
     ----------
     seconds : float

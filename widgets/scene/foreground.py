@@ -7,16 +7,11 @@ from typing import Any
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
-_SMALLEST = 8  # pixels; in a smaller window VTK warns about empty text textures
+_SMALLEST_WINDOW = 8  # pixels; in a smaller window VTK warns about empty text textures
 
 
 class Foreground:
     """A layer above a renderer, until `remove`.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer below, in a window; its camera is copied.
 
     Attributes
     ----------
@@ -35,9 +30,9 @@ class Foreground:
         """Copy camera and viewport, with a clipping range that covers the actors of both."""
         front, behind = self.renderer, self._behind
         front.SetViewport(*behind.GetViewport())
-        front.SetDraw(min(behind.GetSize()) >= _SMALLEST)
-        both = [r.ComputeVisiblePropBounds() for r in (behind, front)]
-        bounds = np.array([b for b in both if b[0] <= b[1]])
+        front.SetDraw(min(behind.GetSize()) >= _SMALLEST_WINDOW)
+        visible = [r.ComputeVisiblePropBounds() for r in (behind, front)]
+        bounds = np.array([b for b in visible if b[0] <= b[1]])
         if len(bounds):
             low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
             behind.ResetCameraClippingRange(*np.stack([low, high], axis=1).ravel())

@@ -1,29 +1,23 @@
 """A glide from one pose to the next: the surface is drawn between them for a moment.
 
-    x(t) = a + s(t) (b - a) + r |b - a| n,    s(t) = 3 t^2 - 2 t^3,    t from 0 to 1
+    x(t) = a + s(t) (b - a),    s(t) = 3 t^2 - 2 t^3,    t from 0 to 1
 
-n are the vertex normals of b, and r restores the volume: vertices that stay do not move.  Only the
-drawing is between them: the session is in the pose b from the start.
+Only the drawing is between them: the session is in the pose b from the start.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
-
-import numpy as np
 
 from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.session import Session
-from vtk_segdeform.solver import moved_along, steps_to_volume, total_volume
 
 from .surface_display import SurfaceDisplay
 from .view import Stop, View
 
 SECONDS = 0.3
 _PERIOD = 15  # milliseconds between two pictures
-_FIRST = 2.0  # priority: above all widgets, which pick the surface that is drawn
+_ABOVE_WIDGETS = 2.0  # priority: above all widgets, which pick the surface that is drawn
 _ENDING = (
     "LeftButtonPressEvent",
     "MiddleButtonPressEvent",
@@ -35,13 +29,7 @@ _ENDING = (
 
 
 class Glide:
-    """Draws a surface between two poses; any press, key or motion of the camera ends it.
-
-    Parameters
-    ----------
-    view : View
-        Provides the timer and the events.
-    """
+    """Draws a surface between two poses; any press, key or motion of the camera ends it."""
 
     def __init__(self, view: View) -> None:
         self._view = view
@@ -58,8 +46,7 @@ class Glide:
         self.end()
         if surface.instead is not None:
             return
-        after = surface.session.vertices
-        between = _between(surface.session, before, after)
+        change = surface.session.vertices - before
         began, camera = time.monotonic(), self._camera()
 
         def draw() -> None:
@@ -67,10 +54,10 @@ class Glide:
             if t >= 1.0 or self._camera() != camera or surface.instead is not None:
                 self.end()
             else:
-                surface.draw(between(t * t * (3.0 - 2.0 * t)))
+                surface.draw(before + t * t * (3.0 - 2.0 * t) * change)
 
         self._restore = surface.update
-        observed = [self._view.observe(event, self.end, _FIRST) for event in _ENDING]
+        observed = [self._view.observe(event, self.end, _ABOVE_WIDGETS) for event in _ENDING]
         self._stops = [self._view.every(_PERIOD, draw), *observed]
         surface.draw(before)
 
@@ -88,24 +75,3 @@ class Glide:
         restore, self._restore = self._restore, None
         if restore is not None:
             restore()
-
-
-def _between(
-    session: Session, before: FloatArray, after: FloatArray
-) -> Callable[[float], FloatArray]:
-    """Return the function of s in 0..1 between two poses (n, 3), with the volume between theirs."""
-    volume = total_volume(session.mesh, session.lids)
-    start, change = volume.violation(before), after - before
-    total = volume.violation(after) - start
-    normals = volume.gradient(after)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(lengths > 0.0, lengths, 1.0)
-    normals *= np.linalg.norm(change, axis=1, keepdims=True)
-
-    def at(share: float) -> FloatArray:
-        path = np.hstack([before + share * change, normals])
-        wanted = replace(volume, target=volume.target + start + share * total)
-        x = moved_along(path, steps_to_volume((wanted,), path))
-        return x if np.isfinite(x).all() else path[:, :3]
-
-    return at

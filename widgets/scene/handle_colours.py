@@ -31,18 +31,18 @@ _known: WeakKeyDictionary[Session, _Known] = WeakKeyDictionary()
 def handle_colour(session: Session, name: str | None) -> NDArray[np.uint8]:
     """Return the colour (3,) of handle *name*; of the next new one if there is no such handle."""
     known, handles = _known.setdefault(session, _Known()), session.handles
-    taken = {known.numbers[each] for each in known.present & handles.keys()}
+    used = {known.numbers[each] for each in known.present & handles.keys()}
     for each in [each for each in handles if each not in known.present]:  # new or back
         renamed = (
             old for old in known.present - handles.keys() if known.vertices[old] is handles[each]
         )
         number = known.numbers.get(next(renamed, each), -1)
-        known.numbers[each] = _free(taken) if number < 0 or number in taken else number
-        taken.add(known.numbers[each])
+        known.numbers[each] = _free(used) if number < 0 or number in used else number
+        used.add(known.numbers[each])
     known.vertices.update(handles)
     known.present = set(handles)
-    return of_handle(known.numbers[name] if name in known.present else _free(taken))
+    return of_handle(known.numbers[name] if name in known.present else _free(used))
 
 
-def _free(taken: set[int]) -> int:
-    return next(number for number in range(len(taken) + 1) if number not in taken)
+def _free(used: set[int]) -> int:
+    return next(number for number in range(len(used) + 1) if number not in used)

@@ -17,19 +17,12 @@ from .view import View
 from .wireframe import Wireframe
 
 LOOP, DOT = COLOURS[6], COLOURS[5]  # vermilion and blue: distinct for colour-blind people
-_DESIGN_HEIGHT = 600  # pixels; marks are larger in a higher window
 _WIDE, _RIM, _DOT = 4.0, 2.5, 8.0  # pixels: a line, its dark rim on both sides together, a dot
 _THROUGH = 0.4  # opacity of marks that the body hides
 
 
 class Highlights:
-    """Loops and vertices of one mesh; hidden until `show`.
-
-    Parameters
-    ----------
-    view : View
-        Where they are drawn.
-    """
+    """Loops and vertices of one mesh; hidden until `show`."""
 
     def __init__(self, view: View) -> None:
         self.view = view
@@ -45,7 +38,7 @@ class Highlights:
         self.hide()
         tails = np.concatenate([np.empty(0, dtype=np.int64), *loops])
         heads = np.concatenate([np.empty(0, dtype=np.int64), *(np.roll(a, -1) for a in loops)])
-        scale = float(np.clip(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT, 0.8, 3.0))
+        scale = self.view.scale
         none = np.empty(0, dtype=np.int64)
         if len(tails):
             edges = np.stack([tails, heads], axis=1)

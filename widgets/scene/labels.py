@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both are required to draw in 2D
-from vtkmodules.util.numpy_support import numpy_to_vtk
-from vtkmodules.vtkCommonCore import VTK_FONT_FILE, vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonCore import VTK_FONT_FILE
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import (
     vtkActor2D,
     vtkPolyDataMapper2D,
@@ -25,33 +24,19 @@ from vtkmodules.vtkRenderingCore import (
 
 from vtk_segdeform.pictures import rgb
 
+from .wireframe import cells_of, points_of
+
 _DOTS_PER_INCH = 72.0  # the resolution at which font size 12 is 12 pixels
 
 
 class Panel:
-    """A rectangle of one colour.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    colour : str
-        "#RRGGBB".
-    opacity : float
-        0 to 1.
-    layer : int
-        Higher layers are drawn over lower ones.
-    """
+    """A rectangle of one colour, "#RRGGBB"; higher layers are drawn over lower ones."""
 
     def __init__(self, renderer: Any, colour: str, *, opacity: float = 1.0, layer: int = 0) -> None:
         self._renderer = renderer
-        self._corners = vtkPoints()
-        self._corners.SetNumberOfPoints(4)
-        square = vtkCellArray()
-        square.InsertNextCell(4, [0, 1, 2, 3])
         self._shape = vtkPolyData()
-        self._shape.SetPoints(self._corners)
-        self._shape.SetPolys(square)
+        self._shape.SetPoints(points_of(np.zeros((4, 3))))
+        self._shape.SetPolys(cells_of(np.arange(4)[None]))
         mapper = vtkPolyDataMapper2D()
         mapper.SetInputData(self._shape)
         self._actor = vtkActor2D()
@@ -70,8 +55,7 @@ class Panel:
         """Set the lower left corner (x, y), the width and the height."""
         right, top = x + width, y + height
         corners = np.array([[x, y, 0], [right, y, 0], [right, top, 0], [x, top, 0]], dtype=float)
-        self._corners.SetData(numpy_to_vtk(corners, deep=True))
-        self._shape.Modified()
+        self._shape.SetPoints(points_of(corners))
 
     def show(self, shown: bool) -> None:
         """Show or hide the rectangle."""
@@ -83,21 +67,7 @@ class Panel:
 
 
 class Text:
-    """Text of one line or more.
-
-    Parameters
-    ----------
-    renderer : vtkRenderer
-        The renderer to draw in.
-    colour : str
-        "#RRGGBB".
-    bold : bool
-        Whether the font is bold.
-    monospace : bool
-        Whether all letters have the same width.
-    layer : int
-        Higher layers are drawn over lower ones, as in `Panel`.
-    """
+    """Text of one line or more; *monospace* has letters of one width, and layers as `Panel`."""
 
     def __init__(
         self,

@@ -107,6 +107,11 @@ class Projection:
         return np.asarray(points + (pixels * step / away)[:, None] * to_eye)
 
     @property
+    def scale(self) -> float:
+        """The size of marks, relative to a view 600 pixels high."""
+        return float(np.clip(self.renderer.GetSize()[1] / 600.0, 0.8, 3.0))
+
+    @property
     def view_direction(self) -> FloatArray:
         """(3,) float: the viewing direction of the camera, of length 1."""
         return np.array(self.camera.GetDirectionOfProjection())

@@ -23,13 +23,7 @@ _KEYPAD |= {getattr(_KEYS, f"Key_{digit}"): f"KP_{digit}" for digit in range(10)
 
 
 class EventFilter(QtCore.QObject):
-    """Completes the events of a view until `remove`.
-
-    Parameters
-    ----------
-    plotter : pyvistaqt.QtInteractor
-        The widget with the view.
-    """
+    """Completes the events of a view until `remove`."""
 
     def __init__(self, plotter: Any) -> None:
         super().__init__(plotter)

@@ -34,7 +34,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.pictures import BODY, INK, rgb
 from vtk_segdeform.session import Change, Session
 
-from .decimated_surface import DecimatedSurface, Decimating
+from .decimated_surface import DecimatedSurface, decimated_soon
 from .draft import SLOW, Draft, observe_drafts
 from .view import View
 
@@ -114,7 +114,6 @@ class SurfaceDisplay:
         surface.SetEdgeColor(*(rgb(INK) / 255.0))
         surface.SetEdgeOpacity(0.4)
         self.view.renderer.AddActor(self.actor)
-        self._decimating = Decimating(mesh)
         self._decimated: DecimatedSurface | None = None
         self._drafts, self._is_draft = Draft.of(self.view), False
         self._stops = [
@@ -239,10 +238,10 @@ class SurfaceDisplay:
         if self.session.mesh.n_vertices <= sizes.DRAFT or not (is_slow and is_plain):
             return
         if self._decimated is None:
-            surface = self.actor.GetProperty()
-            self._decimated = self._decimating.result(surface)
-            if self._decimated is None:
+            mesh = self.session.mesh
+            if (found := decimated_soon(mesh)) is None:
                 return
+            self._decimated = DecimatedSurface(mesh, found, self.actor.GetProperty())
             self.view.renderer.AddActor(self._decimated.actor)
             self._decimated.set_colours(self.colours)
         self._is_draft = True

@@ -3,10 +3,8 @@
 Exceptions in callbacks are caught: VTK would only print them, and pyvista would turn them into
 warnings.  Here they reach the listeners of `on_failure`, such as a status line or a test.
 
-During a camera drag VTK's interactor style withholds all mouse events from other observers.
-Anything that follows the camera therefore uses `before_render`.  The style would also withhold
-keys and run VTK's own commands for them, such as stereo for "3".  Pressing any key other than a
-modifier therefore ends the camera drag first.
+During a camera drag VTK's interactor style withholds all events from other observers, unless the
+camera is moved by `Navigation`.  Anything that follows the camera therefore uses `before_render`.
 
 `View.every` shares a single repeating timer among all views of an interactor, and nothing else in
 this package creates or destroys timers.  Some hosts, pyvistaqt among them, drive all VTK timers by
@@ -25,9 +23,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 from weakref import WeakValueDictionary
 
+import numpy as np
 import vtkmodules.vtkRenderingFreeType
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - both register the rendering backends
-from vtkmodules.vtkCommonCore import vtkCommand
+from numpy.typing import NDArray
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkCommand, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindowInteractor
 
 from vtk_segdeform.arrays import is_number, is_whole
@@ -42,11 +43,10 @@ from .projection import Projection
 _log = logging.getLogger(__name__)
 
 Stop = Callable[[], None]
-_LONGEST = 86_400_000  # milliseconds between ticks: a day
+_LONGEST_PERIOD = 86_400_000  # milliseconds between ticks: a day
 ABOVE_CAMERA = 1.0  # priority: VTK's own widgets have 0.5, camera styles 0
 _SHARE_DRAWN = 0.1  # of the time, at most, while another thread is spared
 _LONGEST_PAUSE = 0.5  # seconds; the next picture may be a draft, and quick to draw
-_MODIFIERS = ("Shift", "Control", "Alt", "Super", "Meta", "Caps_Lock", "ISO_Level")
 _KEY_MARK = vtkCommand.UserEvent + 411  # never invoked: marks renderers whose views observe keys
 
 
@@ -132,6 +132,13 @@ class View(Projection):
             self.window.Render()
             self._drawn = time.perf_counter()
             self._drawing_time = self._drawn - began
+
+    def pixels(self) -> NDArray[np.uint8]:
+        """Return the last picture of the window, (h, w, 3), the lowest row first."""
+        (width, height), values = self.window.GetSize(), vtkUnsignedCharArray()
+        self.window.GetPixelData(0, 0, width - 1, height - 1, 0, values, 0)
+        pixels: NDArray[np.uint8] = vtk_to_numpy(values).reshape(height, width, 3)
+        return pixels
 
     def request_render(self) -> None:
         """Draw the window once, at the end of the current event; outside an event, draw it now.
@@ -222,11 +229,8 @@ class View(Projection):
         if event != "KeyPressEvent":
             return _once(lambda: self.interactor.RemoveObserver(tag))
         mark = self.renderer.AddObserver(_KEY_MARK, lambda *_: None)
-        first = self.interactor.AddObserver(event, self._end_camera_drag)
-        self.interactor.GetCommand(first).SetPassiveObserver(1)  # called despite any event focus
 
         def stop() -> None:
-            self.interactor.RemoveObserver(first)
             self.interactor.RemoveObserver(tag)
             self.renderer.RemoveObserver(mark)
 
@@ -257,12 +261,11 @@ class View(Projection):
         All subscribers of an interactor share one timer with the shortest of their periods, and
         each is called at every tick, so at least once in *milliseconds*.  A callback may stop
         itself and others; if one raises, the others are still called.
-
-        During a camera drag the interactor style withholds timer events too; see `pulse`.
         """
-        if not is_whole(milliseconds, 1, _LONGEST):
+        if not is_whole(milliseconds, 1, _LONGEST_PERIOD):
             raise ArgumentError(
-                f"milliseconds must be a whole number, 1 to {_LONGEST}; got {shown(milliseconds)}"
+                f"milliseconds must be a whole number, 1 to {_LONGEST_PERIOD}; "
+                f"got {shown(milliseconds)}"
             )
         as_callable(callback, "callback")
 
@@ -279,21 +282,6 @@ class View(Projection):
 
         return _once(stop)
 
-    def pulse(self, callback: Callable[[], None]) -> Stop:
-        """Call *callback* at every tick of any timer, even during a camera drag.
-
-        The callback may draw, but must not add or remove observers of the interactor.
-        """
-        as_callable(callback, "callback")
-
-        def ticked(*_: object) -> None:
-            with self.guarded(), self.drawing_once():
-                callback()
-
-        tag = self.interactor.AddObserver("TimerEvent", ticked)
-        self.interactor.GetCommand(tag).SetPassiveObserver(1)
-        return _once(lambda: self.interactor.RemoveObserver(tag))
-
     @property
     def is_addressed(self) -> bool:
         """Whether key presses go to this view: the pointer is not over another view with keys."""
@@ -308,18 +296,6 @@ class View(Projection):
         shift, control = self.interactor.GetShiftKey(), self.interactor.GetControlKey()
         alt = bool(self.interactor.GetAltKey())
         return Pointer(phase, float(x), float(y), bool(shift), bool(control), alt)
-
-    def _end_camera_drag(self, *_: object) -> None:
-        """End an ongoing camera drag, as if the button had been released."""
-        if (self.interactor.GetKeySym() or "").startswith(_MODIFIERS):
-            return
-        style = self.interactor.GetInteractorStyle()
-        if hasattr(style, "GetCurrentStyle"):  # VTK's default switches between several
-            style = style.GetCurrentStyle()
-        if style is not None and getattr(style, "GetState", int)():
-            style.OnLeftButtonUp()
-            style.OnMiddleButtonUp()
-            style.OnRightButtonUp()
 
     # Failures.
     def on_failure(self, listener: Callable[[Exception], None]) -> Stop:
@@ -368,11 +344,6 @@ class _SharedTimer:
 
     If the host stops it together with a timer of another owner, such as a hovering widget or a
     camera style, it is restarted.
-
-    Parameters
-    ----------
-    interactor : vtkRenderWindowInteractor
-        Owner of the timer; use `of` to share it.
     """
 
     _shared: WeakValueDictionary[int, _SharedTimer] = WeakValueDictionary()

@@ -16,21 +16,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.arrays import FloatArray, bounds_of
+from vtk_segdeform.arrays import FloatArray, bounds_of, is_number
 from vtk_segdeform.checks import shown
 from vtk_segdeform.errors import ArgumentError
 
-from .camera_checks import axis_angle, is_sound, numbers, rotation
 from .gestures import Pointer
 from .view import Stop, View
 
-_ENOUGH = 50_000  # points that are framed, about, with those farthest out along the axes
+_MOST_FRAMED = 50_000  # points that are framed, about, with those farthest out along the axes
 _NEAREST, _FARTHEST = 3e-3, 100.0  # distances of the camera, in diagonals of the model
 _MARGIN = 0.86  # share of the view that a framed model fills
-_SMALLEST = 1e-6  # the smallest framed radius, in diagonals
-TURN = math.pi
-"""Rotation, in radians, of a drag across the height of the view."""
+_SMALLEST_RADIUS = 1e-6  # the smallest framed radius, in diagonals
+_TURN = math.pi  # radians, by a drag across the height of the view
 _LEVEL = 0.35  # sine of the roll above which the camera orbits about its own view-up
 _DURATION = 0.15  # seconds of an animation
 _FRAME = 10  # milliseconds
@@ -142,7 +141,7 @@ class Viewpoint:
         camera = self.view.camera
         away = np.subtract(camera.GetPosition(), camera.GetFocalPoint())
         up = np.array(camera.GetViewUp())
-        if not is_sound(away, up):
+        if _axes_of(away, up) is None:
             away, up = self.axes[1:]
         points = self._points() if points is None else points
         self._aim(away, up, points, animate=animate)
@@ -177,33 +176,30 @@ class Viewpoint:
     def orbit(self, dx: float, dy: float, pivot: FloatArray, axis: FloatArray) -> None:
         """Turn about *axis* through *pivot* by *dx*, and tilt by *dy* up to the poles."""
         camera = self.view.camera
-        step = TURN / max(1, self.view.renderer.GetSize()[1])
-        away, up = -self.view.view_direction, np.array(camera.GetViewUp())
-        right = np.cross(up, away)
-        if not (is_sound(away, up) and np.linalg.norm(right) > 0.0):
+        step = _TURN / max(1, self.view.renderer.GetSize()[1])
+        axes = self._camera_axes
+        if axes is None:
             self.home()
             return
-        right /= np.linalg.norm(right)
+        right, upwards, away = axes
         height = math.asin(float(np.clip(away @ axis, -1.0, 1.0)))
         tilted = float(np.clip(height - dy * step, -0.5 * math.pi, 0.5 * math.pi))
-        turn = rotation(axis, -dx * step) @ rotation(right, height - tilted)
+        turn = _rotation(-dx * step * axis) @ _rotation((height - tilted) * right)
         position, focus = np.array(camera.GetPosition()), np.array(camera.GetFocalPoint())
         self._place(
             pivot + turn @ (position - pivot),
             pivot + turn @ (focus - pivot),
-            turn @ np.cross(away, right),
+            turn @ upwards,
         )
 
     def pan(self, dx: float, dy: float, pivot: FloatArray) -> None:
         """Move so that *pivot* (3,) follows the pointer."""
-        camera = self.view.camera
-        up = np.array(camera.GetViewUp())
-        right = np.cross(self.view.view_direction, up)
-        right /= np.linalg.norm(right)
-        pixel = self.view.pixel_at(pivot)
-        shift = -pixel * (dx * right + dy * np.cross(right, self.view.view_direction))
-        position, focus = np.array(camera.GetPosition()), np.array(camera.GetFocalPoint())
-        self._place(position + shift, focus + shift, up)
+        camera, axes = self.view.camera, self._camera_axes
+        if axes is not None:
+            shift = -self.view.pixel_at(pivot) * (dx * axes[0] + dy * axes[1])
+            self._place(
+                camera.GetPosition() + shift, camera.GetFocalPoint() + shift, camera.GetViewUp()
+            )
 
     def zoom(self, factor: float, pivot: FloatArray) -> None:
         """Enlarge by *factor*; *pivot* (3,) stays at its place on the screen."""
@@ -256,15 +252,8 @@ class Viewpoint:
 
     def restore(self, settings: Mapping[str, Any]) -> bool:
         """Restore `settings`; return False, and change nothing, if they are damaged."""
-        names = (
-            ("up", 3),
-            ("position", 3),
-            ("focus", 3),
-            ("view_up", 3),
-            ("angle", 1),
-            ("scale", 1),
-        )
-        found = [numbers(settings.get(name), count) for name, count in names]
+        names = ("up", 3), ("position", 3), ("focus", 3), ("view_up", 3), ("angle", 1), ("scale", 1)
+        found = [_numbers(settings.get(name), count) for name, count in names]
         given = [each for each in found if each is not None]
         if len(given) < len(names):
             return False
@@ -279,7 +268,7 @@ class Viewpoint:
             and 0.0 < scale <= farthest
             and np.linalg.norm(away) <= farthest
             and np.linalg.norm(focus - middle) <= farthest
-            and is_sound(away, view_up)
+            and _axes_of(away, view_up) is not None
             and up.any()
         ):
             return False
@@ -302,10 +291,8 @@ class Viewpoint:
 
     def _aim(self, away: FloatArray, up: FloatArray, points: FloatArray, *, animate: bool) -> None:
         """Look at *points* from the direction *away*."""
-        away = away / np.linalg.norm(away)
-        right = np.cross(up, away)
-        right /= np.linalg.norm(right)
-        axes = np.stack([right, np.cross(away, right), away])
+        axes = _axes_of(away, up)
+        assert axes is not None
         camera, (width, height) = self.view.camera, self.view.renderer.GetSize()
         slope = _MARGIN * math.tan(0.5 * math.radians(camera.GetViewAngle()))
         slopes = slope * np.array([max(width, 1) / max(height, 1), 1.0])
@@ -316,7 +303,7 @@ class Viewpoint:
         low, high = bounds_of(local)
         middle = 0.5 * (low + high)
         local -= middle
-        smallest = _SMALLEST * self._diagonal()
+        smallest = _SMALLEST_RADIUS * self._diagonal()
         half = np.maximum(0.5 * (high - low)[:2], smallest)
         distance = float((np.abs(local[:, :2]) / slopes + local[:, 2:]).max())
         distance = max(distance, _NEAREST * self._diagonal())
@@ -333,17 +320,13 @@ class Viewpoint:
         if not (animate and is_seen) or window.GetOffScreenRendering():
             self._set(focus, axes, distance, scale)
             return
-        camera = self.view.camera
-        away, up = -self.view.view_direction, np.array(camera.GetViewUp())
-        right = np.cross(up, away)
-        if not (is_sound(away, up) and np.linalg.norm(right) > 0.0):
+        camera, start = self.view.camera, self._camera_axes
+        if start is None:
             self._set(focus, axes, distance, scale)
             return
-        right /= np.linalg.norm(right)
-        start = np.stack([right, np.cross(away, right), away])
         first_focus, first = np.array(camera.GetFocalPoint()), camera.GetDistance()
         first_scale, began = camera.GetParallelScale(), time.monotonic()
-        axis, angle = axis_angle(axes.T @ start)
+        turn = Rotation.from_matrix(axes.T @ start).as_rotvec()
 
         def advance() -> None:
             t = min(1.0, (time.monotonic() - began) / _DURATION)
@@ -354,7 +337,7 @@ class Viewpoint:
             s = t * t * (3.0 - 2.0 * t)
             self._set(
                 first_focus + s * (focus - first_focus),
-                start @ rotation(axis, s * angle).T,
+                start @ _rotation(s * turn).T,
                 first ** (1.0 - s) * distance**s,
                 first_scale ** (1.0 - s) * scale**s,
             )
@@ -368,13 +351,18 @@ class Viewpoint:
     def _place(self, position: FloatArray, focus: FloatArray, up: ArrayLike) -> None:
         """Set the camera, unless that would be invalid."""
         up = np.asarray(up, dtype=float)
-        if not is_sound(position - focus, up):
+        if _axes_of(position - focus, up) is None:
             return
         camera = self.view.camera
         camera.SetPosition(*position)
         camera.SetFocalPoint(*focus)
         camera.SetViewUp(*up)
         self._drawn()
+
+    @property
+    def _camera_axes(self) -> FloatArray | None:
+        """(3, 3) float: right, up and away of the camera as rows."""
+        return _axes_of(-self.view.view_direction, np.array(self.view.camera.GetViewUp()))
 
     def _drawn(self) -> None:
         self.view.renderer.ResetCameraClippingRange()
@@ -383,8 +371,30 @@ class Viewpoint:
 
 def _outermost(points: FloatArray) -> FloatArray:
     """Return a subset of *points* (n, 3) that includes the extremes along each axis."""
-    step = len(points) // _ENOUGH
+    step = len(points) // _MOST_FRAMED
     if step < 2:
         return points
     ends = [end for axis in points.T for end in (axis.argmin(), axis.argmax())]
     return np.concatenate([points[::step], points[ends]])
+
+
+def _numbers(value: object, count: int) -> FloatArray | None:
+    """Return *count* numbers of a file, (count,) float; None if *value* is anything else."""
+    values = value if isinstance(value, list) else [value]
+    is_sound = len(values) == count and all(map(is_number, values))
+    return np.array(values, dtype=float) if is_sound else None
+
+
+def _axes_of(away: FloatArray, up: FloatArray) -> FloatArray | None:
+    """Return right, up and away (3, 3) as orthonormal rows; None if a camera cannot look so."""
+    right = np.cross(up, away)
+    length, least = np.linalg.norm(right), 1e-9 * np.linalg.norm(away) * np.linalg.norm(up)
+    if not np.isfinite(length) or not length > least:
+        return None
+    right, away = right / length, away / np.linalg.norm(away)
+    return np.stack([right, np.cross(away, right), away])
+
+
+def _rotation(vector: FloatArray) -> FloatArray:
+    """Return the rotation (3, 3) about a *vector* (3,) by its length in radians."""
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())

@@ -66,6 +66,9 @@ class Widget(abc.ABC):
         """Highlight the target of a press at *pointer*; called on moves with no button down."""
         del pointer
 
+    def leave(self) -> None:  # noqa: B027 - most widgets show something
+        """Show nothing at the pointer until it moves again; called when it leaves the view."""
+
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
         """Handle +1 or -1 *clicks* of the wheel; return False to pass them to the camera.
 
@@ -98,6 +101,7 @@ class Widget(abc.ABC):
             observe("MouseWheelBackwardEvent", lambda: self._wheel(-1)),
             observe("KeyPressEvent", self._key),
             observe("CharEvent", lambda: self._consumed_key),  # follows each KeyPressEvent
+            observe("LeaveEvent", self.leave),
         ]
 
     def Off(self) -> None:  # noqa: N802
@@ -108,6 +112,7 @@ class Widget(abc.ABC):
             for stop in self._stops:
                 stop()
             self._stops = []
+            self.leave()
 
     def SetEnabled(self, enabled: bool) -> None:  # noqa: N802
         """Switch the widget on or off."""

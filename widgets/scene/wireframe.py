@@ -27,12 +27,11 @@ class Wireframe:
     """
 
     def __init__(self, vertices: FloatArray, edges: IntArray, spheres: IntArray) -> None:
-        points = vtkPoints()
-        points.SetData(numpy_to_vtk(np.array(vertices, dtype=np.float64), deep=True))
+        points = points_of(vertices)
         self._data = vtkPolyData()
         self._data.SetPoints(points)
-        self._data.SetLines(_cells(edges))
-        self._data.SetVerts(_cells(spheres[:, None]))
+        self._data.SetLines(cells_of(edges))
+        self._data.SetVerts(cells_of(spheres[:, None]))
         self._points = vtk_to_numpy(points.GetData())
         mapper = vtkPolyDataMapper()
         mapper.SetInputData(self._data)
@@ -60,7 +59,15 @@ class Wireframe:
         self._data.GetPoints().Modified()
 
 
-def _cells(corners: IntArray) -> Any:
+def points_of(points: FloatArray) -> Any:
+    """Return vtkPoints, a copy of *points* (n, 3)."""
+    made = vtkPoints()
+    made.SetData(numpy_to_vtk(np.array(points, dtype=np.float64), deep=True))
+    return made
+
+
+def cells_of(corners: IntArray) -> Any:
+    """Return a vtkCellArray of cells of one length, with *corners* (c, length)."""
     count, length = corners.shape
     cells = vtkCellArray()
     offsets = numpy_to_vtkIdTypeArray(np.arange(count + 1, dtype=np.int64) * length, deep=True)

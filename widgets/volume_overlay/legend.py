@@ -27,21 +27,12 @@ _BACKGROUND_OPACITY = 0.7  # of text that may lie over the mesh
 
 
 class Legend:
-    """A colour bar and lines of text; hidden until `show`.
-
-    Parameters
-    ----------
-    view : View
-        The view to draw in.
-    title : str
-        The title of the colour bar.
-    """
+    """A colour bar and lines of text; hidden until `show`."""
 
     def __init__(self, view: View, title: str) -> None:
         self.view = view
         self._bar = _scalar_bar(title)
         self._lines: list[Any] = []
-        self._laid_out: tuple[Any, ...] = ()
         self._stop: Stop | None = None
 
     def show(self, half_range: float | None, lines: Sequence[tuple[str, int | None]]) -> None:
@@ -77,7 +68,6 @@ class Legend:
             if region is not None:
                 style.SetBackgroundColor(*(of_region(region) / 255.0))
                 style.SetFrameColor(*style.GetBackgroundColor())
-        self._laid_out = ()
 
     def hide(self) -> None:
         """Hide the colour bar and the lines."""
@@ -91,10 +81,7 @@ class Legend:
     def _lay_out(self) -> None:
         renderer = self.view.renderer
         width, height = renderer.GetSize()
-        now = width, height, renderer.GetBackground()
-        if now == self._laid_out:
-            return
-        self._laid_out = now
+        background = renderer.GetBackground()
         size = int(np.clip(height / 42, 11, 30))  # pixels; font sizes are pixels at 72 dpi
         points = max(6, round(size * 72 / (renderer.GetRenderWindow().GetDPI() or 72)))
         for k, actor in enumerate(self._lines):
@@ -102,7 +89,7 @@ class Legend:
             style.SetFontSize(points)
             style.SetFrameWidth(size // 6)
             if not style.GetFrame():
-                style.SetBackgroundColor(*now[2])
+                style.SetBackgroundColor(*background)
             style.SetColor(*_ink_on(style.GetBackgroundColor()))
             actor.SetPosition(0.6 * size, height - 1.7 * size * (k + 1.2))
         wide = min(max(0.12, 7.0 * size / width), 0.5)
@@ -110,9 +97,9 @@ class Legend:
         self._bar.SetWidth(wide)
         for style in (self._bar.GetTitleTextProperty(), self._bar.GetAnnotationTextProperty()):
             style.SetFontSize(points)
-            style.SetBackgroundColor(*now[2])
+            style.SetBackgroundColor(*background)
             style.SetBackgroundOpacity(_BACKGROUND_OPACITY)
-            style.SetColor(*_ink_on(now[2]))
+            style.SetColor(*_ink_on(background))
 
 
 def signed(number: float, digits: int) -> str:

@@ -13,13 +13,7 @@ from vtk_segdeform.solver import VolumeConstraint, region_volumes
 
 
 class RegionVolumes:
-    """The volume changes of the current regions in the current pose of a session.
-
-    Parameters
-    ----------
-    session : Session
-        Only read.
-    """
+    """The volume changes of the current regions in the current pose of a session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session

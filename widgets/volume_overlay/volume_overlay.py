@@ -16,8 +16,7 @@ first line says so.
 
 The lines of text are, from the top: for an open mesh, what encloses a volume; (V - V0) / V0 of the
 whole mesh; the smallest and the largest s; (V - V0) / V0 of each region, closed at its border as in
-`vtk_segdeform.solver.volume_constraints`; the number of steps of the last solve, and the time from
-the event that changed the pose to the end of rendering.
+`vtk_segdeform.solver.volume_constraints`.
 
 Source
 ------
@@ -27,7 +26,6 @@ neighbors and the normal field", The Visual Computer 28, 2012.
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from vtk_segdeform.arrays import FloatArray, is_number
@@ -44,7 +42,6 @@ from .region_volumes import RegionVolumes
 
 _LAYER = "volume"
 _IN_LINES = Change.REGIONS | Change.NAMES | Change.OPTIONS
-_FIRST = 100.0  # priority: called before the widgets that change the pose
 _RANGE = 0.5  # at the ends of the scale, unless another one is wanted
 _MOST_REGIONS = 8  # more lines would cover the mesh
 # Ambient, diffuse and specular light: strong shading would be confused with the colour scale.
@@ -77,7 +74,6 @@ class VolumeOverlay:
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._legend = Legend(self.view, "Local volume\nchange")
-        self._clock = _FrameClock(self.view)
         self._local: LocalVolume | None = None
         self.region_volumes = RegionVolumes(session)
         self._change: FloatArray | None = None
@@ -139,7 +135,6 @@ class VolumeOverlay:
         """Show the overlay and update it whenever the pose changes."""
         if not self.is_shown:
             self._stop = self.session.on_change(self._changed)
-            self._clock.start()
             self._swap_light()
             self._update()
 
@@ -149,7 +144,6 @@ class VolumeOverlay:
             return
         self._stop()
         self._stop = self._change = self._half_range = None
-        self._clock.stop()
         self._legend.hide()
         self._swap_light()
         self._surface.set_colours(_LAYER, None)
@@ -166,7 +160,6 @@ class VolumeOverlay:
 
     def _changed(self, change: Change) -> None:
         if change & Change.POSE:
-            self._clock.note()
             self._update()
         elif change & _IN_LINES and self._change is not None:
             self._legend.show(self._half_range, self._lines(self._change))
@@ -209,51 +202,7 @@ class VolumeOverlay:
         if len(regions) > _MOST_REGIONS:
             more = len(regions) - _MOST_REGIONS
             lines.append((f"{more} more region{'s' * (more != 1)}", None))
-        solution, seconds = self.session.solution, self._clock.seconds
-        speed = [f"{solution.steps} step{'s' * (solution.steps != 1)}"] if solution else []
-        speed += [f"{1000.0 * seconds:.0f} ms per frame"] if seconds is not None else []
-        return lines + [(", ".join(speed), None)] if speed else lines
+        return lines
 
     def _name(self, region: int) -> str:
         return brief(self.session.region_name(region), region_name((), region))
-
-
-class _FrameClock:
-    """Measures the time from the event that changed the pose to the end of rendering."""
-
-    def __init__(self, view: View) -> None:
-        self.seconds: float | None = None
-        self._posed = False
-        self._view = view
-        self._began: float | None = None
-        self._stops: list[Stop] = []
-
-    def start(self) -> None:
-        """Start observing events."""
-        window = self._view.window
-        events = ("MouseMoveEvent", "TimerEvent")
-        self._stops = [self._view.observe(event, self._begin, _FIRST) for event in events]
-        if window is not None:
-            tag = window.AddObserver("EndEvent", self._end)
-            self._stops.append(lambda: window.RemoveObserver(tag))
-
-    def note(self) -> None:
-        """Note a change of the pose; outside an event, by a script, it is not timed."""
-        self._posed = True
-        if self._began is None:
-            self.seconds = None
-
-    def stop(self) -> None:
-        """Stop observing events and discard the measurement."""
-        for stop in self._stops:
-            stop()
-        self._stops, self.seconds, self._began = [], None, None
-
-    def _begin(self) -> bool:
-        self._began, self._posed = time.perf_counter(), False
-        return False
-
-    def _end(self, *_: object) -> None:
-        if self._posed and self._began is not None:
-            self.seconds = time.perf_counter() - self._began
-        self._began, self._posed = None, False

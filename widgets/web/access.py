@@ -22,7 +22,7 @@ _HEADERS = {
     "Referrer-Policy": "no-referrer",  # no other page may learn the address
     "X-Content-Type-Options": "nosniff",
 }
-_LONGEST = 255  # bytes of a path, as of a name in most file systems
+_LONGEST_PATH = 255  # bytes of a path, as of a name in most file systems
 _WRONG = "Open the whole address that segdeform has printed: it contains a secret.\n"
 
 
@@ -46,7 +46,7 @@ def below(secret: str, application: web.Application, *, once: str = "") -> web.A
             return web.Response(status=303, headers={hdrs.LOCATION: f"{secret}/", **_HEADERS})
         if len(rest) < 2 or not _same(given, secret):
             return web.Response(status=403, text=_WRONG)
-        if len(rest[0]) > _LONGEST:
+        if len(rest[0]) > _LONGEST_PATH:
             return web.Response(status=404, text="There is no such file.\n")
         place = request.rel_url.with_path(f"/{rest[0]}", encoded=True, keep_query=True)
         # Static files may have been added to this application, after it replaced the other one.

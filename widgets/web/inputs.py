@@ -26,9 +26,9 @@ _MOUSE = frozenset(
 )
 _KEYS = frozenset({"KeyPress", "KeyRelease"})
 _MODIFIERS = ("shift", "control", "alt")
-_FARTHEST = 4.0  # views, from the corner of this one
-_LONGEST = 40  # letters of the name of a key
-_MOST = 500  # events that wait: nobody types or clicks as fast
+_FARTHEST_FRACTION = 4.0  # views, from the corner of this one
+_LONGEST_KEY_NAME = 40  # letters of the name of a key
+_MOST_WAITING = 500  # events that wait: nobody types or clicks as fast
 
 
 @dataclass(frozen=True)
@@ -56,11 +56,6 @@ class Input:
 
 class Inputs:
     """Events that wait for the view.
-
-    Parameters
-    ----------
-    view : View
-        Receives them.
 
     Attributes
     ----------
@@ -100,10 +95,12 @@ class Inputs:
         last = self._waiting[-1][0] if self._waiting else None
         if last is not None and event.name == _MOVE and replace(event, x=last.x, y=last.y) == last:
             self._waiting[-1] = event, float(time)
-        elif len(self._waiting) < _MOST:
+        elif len(self._waiting) < _MOST_WAITING:
             self._waiting.append((event, float(time)))
         else:
-            raise ArgumentError(f"More than {_MOST} events wait for the editor; send them slower")
+            raise ArgumentError(
+                f"More than {_MOST_WAITING} events wait for the editor; send them slower"
+            )
 
     def send_next(self) -> None:
         """Send the oldest event that waits."""
@@ -132,7 +129,7 @@ class Inputs:
             return Input(name, x, y, **held)
         key, place = message.get("key"), message.get("code", "")
         for word in (key, place):
-            if not isinstance(word, str) or len(word) > _LONGEST:
+            if not isinstance(word, str) or len(word) > _LONGEST_KEY_NAME:
                 raise ArgumentError(f"there is no key {shown(word)}")
         named = vtk_key(str(key), str(place))
         return None if named is None else Input(name, x, y, **held, key=named[0], code=named[1])
@@ -140,6 +137,6 @@ class Inputs:
 
 def _fraction(message: Mapping[Any, Any], name: str) -> float:
     value: Any = message.get(name)
-    if not is_number(value) or not abs(value) <= _FARTHEST:
+    if not is_number(value) or not abs(value) <= _FARTHEST_FRACTION:
         raise ArgumentError(f"{name} must be a fraction of the view; got {shown(value)}")
     return float(value)

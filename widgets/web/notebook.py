@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import asyncio
 import base64
-import html
 import logging
 import secrets
 import socket
@@ -29,28 +28,17 @@ import pyvista as pv
 
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.importing import imported
-from vtk_segdeform.pictures import require_offscreen
 from vtk_segdeform.session import Session
 
 from ..hosting import add_editor, edited
 
 if TYPE_CHECKING:
     from ..editor import DeformEditor, KeyChoice
-    from .pictures import Pictures
     from .web_editor import WebEditor
 
 _log = logging.getLogger(__name__)
 _TEMPLATE = Path(__file__).with_name("page") / "notebook.html"
 _LIVE = ("trame", "server", "client")
-_SIZE = 1000, 600  # pixels of a picture
-_INSTALL = (
-    "This is a picture. For an editor that can be used, run pip install 'vtk-segdeform[jupyter]', "
-    "restart the kernel and run the cell again."
-)
-_CHOOSE = (
-    "This is a picture. For an editor that can be used, call pyvista.set_jupyter_backend('trame') "
-    "and run the cell again."
-)
 
 
 def shows_in_notebook(theme: Any) -> bool:
@@ -68,15 +56,12 @@ class NotebookEditor:
 
     Attributes
     ----------
-    web : WebEditor or None
-        The editor; None where only a picture can be shown.
-    note : str
-        What to do for an editor that can be used, if this one cannot.
+    web : WebEditor
+        The editor.
     """
 
-    def __init__(self, given: Any, session: Session, web: WebEditor | None, note: str = "") -> None:
-        self.web, self.note = web, note
-        self._given, self._session = given, session
+    def __init__(self, given: Any, web: WebEditor) -> None:
+        self.web, self._given = web, given
         self._page = ""  # PORT/SECRET/index.html
         self._serving: asyncio.Task[None] | None = None
         self._stop: weakref.finalize[Any, Any] | None = None
@@ -84,7 +69,7 @@ class NotebookEditor:
     @property
     def session(self) -> Session:
         """The session being edited; another one after the page has opened a file."""
-        return self.web.session if self.web is not None else self._session
+        return self.web.session
 
     @property
     def mesh(self) -> Any:
@@ -104,7 +89,7 @@ class NotebookEditor:
 
     def start(self) -> None:
         """Serve the page in the running event loop; again, do nothing."""
-        if self.web is None or self._stop is not None:
+        if self._stop is not None:
             return
         secret, port = secrets.token_urlsafe(32), _free_port()
         self._page = f"{port}/{secret}/index.html"
@@ -117,8 +102,7 @@ class NotebookEditor:
     def close(self) -> None:
         """End the editor; the session and the mesh stay as they are."""
         if self._stop is not None:
-            if self.web is not None:
-                self.web.stream.close()
+            self.web.stream.close()
             self._stop()
 
     remove = close
@@ -128,14 +112,10 @@ class NotebookEditor:
         return {"text/html": self._html(), "text/plain": repr(self)}
 
     def __repr__(self) -> str:
-        state = "live" if self.is_live else "a picture" if self.web is None else "closed"
+        state = "live" if self.is_live else "closed"
         return f"<NotebookEditor of {self.session.mesh.n_vertices:,} vertices, {state}>"
 
     def _html(self) -> str:
-        if self.web is None:
-            picture = _picture_of(self._session)
-            image = f'<img alt="The surface" src="data:image/jpeg;base64,{picture}">'
-            return f"{image}<p>{html.escape(self.note)}</p>"
         if not self.is_live:
             return "<p>This editor is closed. Run the cell again to edit.</p>"
         imported(f"{__package__}.pictures")
@@ -145,20 +125,21 @@ class NotebookEditor:
         values = {
             "id": f"segdeform-{secrets.token_hex(8)}",
             "page": self._page,
-            "picture": _encoded(Pictures(self.web.editor.view)),
+            "picture": base64.b64encode(Pictures(self.web.editor.view).draw()().data).decode(),
             "proxy": theme.server_proxy_prefix if theme.server_proxy_enabled else "",
         }
         return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(values)
 
 
 def edit_in_notebook(given: Any, session: Session, *, name: str, keys: KeyChoice) -> NotebookEditor:
-    """Return the editor of *session*, served, or a picture and what would be needed."""
-    if _backend(pv.global_theme) not in _LIVE:
-        return NotebookEditor(given, session, None, _CHOOSE)
-    web_editor = _web_editor()
-    if web_editor is None:
-        return NotebookEditor(given, session, None, _INSTALL)
-    editor = NotebookEditor(given, session, web_editor(session, name=name, keys=keys))
+    """Return the editor of *session*, served.
+
+    Raises
+    ------
+    MissingDependencyError
+        If trame is not installed.
+    """
+    editor = NotebookEditor(given, _web_editor()(session, name=name, keys=keys))
     editor.start()
     return editor
 
@@ -166,21 +147,23 @@ def edit_in_notebook(given: Any, session: Session, *, name: str, keys: KeyChoice
 def add_to_notebook(
     plotter: Any, session: Session, *, path: Path | None, name: str, keys: KeyChoice
 ) -> DeformEditor:
-    """Add an editor to *plotter*, whose `show` then shows the page of its first editor."""
-    is_first = "show" not in vars(plotter)
-    web_editor = _web_editor() if is_first else None
-    if web_editor is None:
-        web, editor = None, add_editor(plotter, session, keys=keys)
+    """Add an editor to *plotter*, whose `show` then shows the page of its first editor.
+
+    Raises
+    ------
+    MissingDependencyError
+        If trame is not installed.
+    """
+    if "show" in vars(plotter):
+        editor = add_editor(plotter, session, keys=keys)
         if path is not None:
             editor.path = path
-    else:
-        web = web_editor(session, plotter=plotter, name=name, keys=keys)
-        editor = web.editor
-    if is_first:
-        shown = NotebookEditor(session, session, web, _CHOOSE if web else _INSTALL)
-        plotter.segdeform.added.append(shown)
-        plotter.show = _Show(plotter, shown)
-    return editor
+        return editor
+    web = _web_editor()(session, plotter=plotter, name=name, keys=keys)
+    shown = NotebookEditor(session, web)
+    plotter.segdeform.added.append(shown)
+    plotter.show = _Show(plotter, shown)
+    return web.editor
 
 
 class _Show:
@@ -198,15 +181,11 @@ class _Show:
         **keywords: Any,
     ) -> Any:
         imported("IPython.display")
-        from IPython.display import HTML, display
+        from IPython.display import display
 
-        backend = (jupyter_backend or _backend(self._plotter.theme)).lower()
-        if self._shown.web is None or backend not in _LIVE:
+        if (jupyter_backend or _backend(self._plotter.theme)).lower() not in _LIVE:
             keywords.update(jupyter_backend=jupyter_backend, return_viewer=return_viewer)
-            result = self._show(*arguments, **keywords)
-            if backend != "none":
-                display(HTML(f"<p>{html.escape(self._shown.note)}</p>"))
-            return result
+            return self._show(*arguments, **keywords)
         keywords.update(jupyter_backend="none", interactive=False, auto_close=False)
         result = self._show(*arguments, **keywords)
         self._shown.start()
@@ -221,13 +200,14 @@ def _backend(theme: Any) -> str:
     return str(theme.jupyter_backend or _LIVE[0]).lower()
 
 
-def _web_editor() -> type[WebEditor] | None:
-    """Return the class `WebEditor`, or None if what it needs is not installed."""
+def _web_editor() -> type[WebEditor]:
+    """Return the class `WebEditor`."""
     try:
         from . import WebEditor
     except MissingDependencyError as error:
-        _log.info("%s", error)
-        return None
+        raise MissingDependencyError(
+            f"{error}, or for notebooks 'vtk-segdeform[jupyter]'"
+        ) from None
     return WebEditor
 
 
@@ -246,26 +226,3 @@ def _end(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:
 def _report(serving: asyncio.Task[None]) -> None:
     if not serving.cancelled() and (error := serving.exception()) is not None:
         _log.error("the editor in a notebook has ended: %s", error)
-
-
-def _encoded(pictures: Pictures) -> str:
-    """Return a picture as JPEG, in base 64."""
-    return base64.b64encode(pictures.draw()().data).decode("ascii")
-
-
-def _picture_of(session: Session) -> str:
-    """Return a picture of *session* as an editor shows it first."""
-    imported(f"{__package__}.pictures")
-    from ..scene import set_background, set_lights
-    from .pictures import Pictures
-
-    require_offscreen()
-    plotter = pv.Plotter(off_screen=True, notebook=False, window_size=[*_SIZE])
-    set_lights(plotter.renderer)
-    set_background(plotter.renderer)
-    try:
-        editor = add_editor(plotter, session, keys={})
-        plotter.show(interactive=False, auto_close=False)
-        return _encoded(Pictures(editor.view))
-    finally:
-        plotter.close()

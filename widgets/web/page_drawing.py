@@ -14,8 +14,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from ..editor import DeformEditor
 from ..scene import Draft, SurfaceStyle
 from .drawing import Mark, SurfaceStream, label_actors, labels_of, look_of, marks_of
@@ -49,13 +47,7 @@ class Update:
 
 
 class PageDrawing:
-    """What the page of *editor* draws itself.
-
-    Parameters
-    ----------
-    editor : DeformEditor
-        The editor in the view of the page.
-    """
+    """What the page of *editor* draws itself."""
 
     def __init__(self, editor: DeformEditor) -> None:
         self._editor = editor
@@ -144,22 +136,16 @@ class PageDrawing:
         vertices, camera = self._drawn
         return vertices is self._editor.session.vertices and camera == self._camera
 
-    def first_update(self) -> Update:
-        """Return the update for the state that the page shows, as drawn by the server."""
-        self._labels = label_actors(self._editor.view)
-        return self._update(is_first=True)
-
-    def update(self) -> Update:
-        """Return the update for the current state."""
-        return self._update(is_first=False)
-
     @property
     def _camera(self) -> tuple[object, ...]:
         camera, size = self._editor.view.camera, self._editor.view.window.GetSize()
         places = camera.GetPosition(), camera.GetFocalPoint(), camera.GetViewUp()
         return *size, *places, camera.GetViewAngle(), camera.GetParallelScale()
 
-    def _update(self, *, is_first: bool) -> Update:
+    def update(self, *, is_first: bool = False) -> Update:
+        """Return the update for the current state; *is_first*: as drawn by the server already."""
+        if is_first:
+            self._labels = label_actors(self._editor.view)
         messages, view = self._due(), self._editor.view
         added = [actor for actor in label_actors(view) if actor not in self._labels]
         labels = tuple(labels_of(added, view))
@@ -174,8 +160,6 @@ class PageDrawing:
 
     def _due(self) -> list[bytes]:
         editor, surface = self._editor, self._editor.widgets.surface
-        view, viewpoint = editor.view, editor.controller.camera.viewpoint
         marks = self._marks  # first, because this lays out
-        material, focus = surface.actor.GetProperty(), np.array(view.camera.GetFocalPoint())
-        look = look_of(view.renderer, material, viewpoint.turning_axis(), focus)
+        look = look_of(editor.view.renderer, surface.actor.GetProperty())
         return self._stream.due(look, colours=surface.colours, marks=marks)

@@ -46,7 +46,6 @@ class PageModel:
         self._editor, self._state, self._names = editor, state, names
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_due = False
-        self._shown: dict[str, Any] = {}
         cards = panel.first_steps()
         state.cards = _plain(cards)
         state.touch_cards = _plain(tuple(map(card_for_fingers, cards)))
@@ -64,35 +63,25 @@ class PageModel:
             self._loop.call_later(_PERIOD, self._flush)
 
     def _flush(self) -> None:
-        """Show the editor; while the hand drags only its status, and everything else after that.
-
-        All of it takes a tenth of the time of a frame.
-        """
         self._is_due = False
-        if any(widget.is_grabbing for widget in self._editor.widgets.interactive):
-            self._refresh_status()
-        else:
-            self.refresh()
+        self.refresh()
         self._state.flush()
 
     def refresh(self) -> None:
         """Show the editor as it is."""
         editor, keys, name = self._editor, self._editor.keys, self.name
-        self._refresh_status()
+        status = panel.status(editor)
+        self._show("status", status)
+        self._show("touch_words", for_fingers(status.words))
         self._show("toolbar", panel.toolbar(editor))
         self._show("sections", panel.sections(editor))
         self._show("history", panel.history(editor))
         is_modified = editor.controller.is_modified
         stem = name.rpartition(".")[0] or name
-        self._set("document", {"name": name, "stem": stem, "modified": is_modified})
-        self._set("trame__title", f"{name} · segdeform")
-        self._set("uses_tab", keys.binding_of("tab", editor.mode) is not None)
-        self._set("help", {"keys": keys["help"].keys, "sections": [*keys.sections(), _OWN_KEYS]})
-
-    def _refresh_status(self) -> None:
-        status = panel.status(self._editor)
-        self._show("status", status)
-        self._show("touch_words", for_fingers(status.words))
+        self._state["document"] = {"name": name, "stem": stem, "modified": is_modified}
+        self._state["trame__title"] = f"{name} · segdeform"
+        self._state["uses_tab"] = keys.binding_of("tab", editor.mode) is not None
+        self._state["help"] = {"keys": keys["help"].keys, "sections": [*keys.sections(), _OWN_KEYS]}
 
     def press(self, name: object, value: object = None) -> None:
         """Use a control; see `panel.press`.  "hint" runs the action of a word of the hint."""
@@ -118,12 +107,7 @@ class PageModel:
 
     def _show(self, key: str, model: Any) -> None:
         keys = self._editor.keys
-        self._set(key, self._public(_plain(model, lambda field: panel.tooltip(field, keys))))
-
-    def _set(self, key: str, value: Any) -> None:
-        if self._shown.get(key) != value:
-            self._shown[key] = value
-            self._state[key] = value
+        self._state[key] = self._public(_plain(model, lambda field: panel.tooltip(field, keys)))
 
     def _public(self, value: Any) -> Any:
         """Return *value* with the names that the page shows for files of the server."""

@@ -6,13 +6,10 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from vtkmodules.util.numpy_support import vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
 from ..scene import View
 
@@ -38,13 +35,7 @@ Encode = Callable[[], Picture]
 
 
 class Pictures:
-    """Draws a view, and encodes the result.
-
-    Parameters
-    ----------
-    view : View
-        The view.
-    """
+    """Draws a view, and encodes the result."""
 
     def __init__(self, view: View) -> None:
         self._view = view
@@ -53,22 +44,13 @@ class Pictures:
     def draw(self) -> Encode:
         """Draw the view now; return what encodes the picture for a view that moves."""
         self._view.draw()
-        self._pixels = pixels = _pixels_of(self._view.window)
+        self._pixels = pixels = self._view.pixels()
         return lambda: _encoded(pixels, is_still=False)
 
     def still(self) -> Encode | None:
         """Return what encodes the last picture completely, if there is one."""
         pixels = self._pixels
         return None if pixels is None else (lambda: _encoded(pixels, is_still=True))
-
-
-def _pixels_of(window: Any) -> NDArray[np.uint8]:
-    """Return the (height, width, 3) colours of the last picture, the lowest row first."""
-    width, height = window.GetSize()
-    values = vtkUnsignedCharArray()
-    window.GetPixelData(0, 0, width - 1, height - 1, 0, values, 0)
-    pixels: NDArray[np.uint8] = vtk_to_numpy(values).reshape(height, width, 3)
-    return pixels
 
 
 def _encoded(pixels: NDArray[np.uint8], *, is_still: bool) -> Picture:

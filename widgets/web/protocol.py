@@ -17,7 +17,7 @@ from .page_drawing import PageDrawing, Surface, Update
 from .pictures import Picture
 from .stream import Stream
 
-_SMALLEST, _LARGEST = 16, 8192  # pixels, width or height of a view
+_SMALLEST_SIDE, _LARGEST_SIDE = 16, 8192  # pixels, width or height of a view
 _MOST_PIXELS = 8_000_000
 _MOST_EVENTS = 200  # of one message
 
@@ -75,11 +75,13 @@ class ViewProtocol(LinkProtocol):
     def size(self, width: Any, height: Any, ratio: Any) -> None:
         """Show the view at this size, in CSS pixels, with *ratio* device pixels each."""
         for value in (width, height, ratio):
-            if not is_number(value) or not 0 < value <= _LARGEST:
+            if not is_number(value) or not 0 < value <= _LARGEST_SIDE:
                 raise ArgumentError(f"width, height and ratio must be numbers; got {shown(value)}")
         columns, rows = width * ratio, height * ratio
         scale = min(1.0, (_MOST_PIXELS / (columns * rows)) ** 0.5)
-        size = [min(_LARGEST, max(_SMALLEST, round(scale * each))) for each in (columns, rows)]
+        size = [
+            min(_LARGEST_SIDE, max(_SMALLEST_SIDE, round(scale * each))) for each in (columns, rows)
+        ]
         self._stream.open(size[0], size[1])
         self._sized()
 

@@ -47,19 +47,7 @@ Started = Callable[[int, str, str], object]
 
 
 class Autosaver:
-    """Saves the unsaved work on *web* in another thread, from `start` on.
-
-    Parameters
-    ----------
-    web : WebEditor
-        The editor.
-    autosaves : Autosaves
-        Where to save.
-    about : About
-        The document that *web* has opened.
-    slot : Slot, optional
-        The slot that it was recovered from.
-    """
+    """Saves the unsaved work on *web* in another thread, from `start` on."""
 
     def __init__(
         self, web: WebEditor, autosaves: Autosaves, about: About, slot: Slot | None = None

@@ -49,8 +49,8 @@ class Stream:
         Sends a picture; see `Send`.
     handled : callable
         Called after input was handled.
-    drawing : PageDrawing, optional
-        What the page draws itself; nothing by default.
+    drawing : PageDrawing
+        What the page draws itself.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Stream:
         timers: Timers,
         send: Send,
         handled: Callable[[], object],
-        drawing: PageDrawing | None = None,
+        drawing: PageDrawing,
     ) -> None:
         self.view, self.inputs = view, Inputs(view)
         self._timers, self._handled = timers, handled
@@ -167,9 +167,9 @@ class Stream:
     async def _handle_input(self) -> None:
         """Send the oldest event to the view; if it begins a drag, let the page draw."""
         drawing = self._drawing
-        was_dragging = drawing is not None and drawing.is_dragging
+        was_dragging = drawing.is_dragging
         self.inputs.send_next()
-        if drawing is None or was_dragging or self._is_live or not self._is_open:
+        if was_dragging or self._is_live or not self._is_open:
             return
         if drawing.is_dragging and drawing.is_possible:
             if not drawing.is_current:
@@ -178,18 +178,18 @@ class Stream:
                 await asyncio.wait([self._encoding])
             self._cancel_rest()
             self._is_live = True
-            self._update(drawing.first_update())
+            self._update(drawing.update(is_first=True))
 
     def _end_live(self) -> None:
         """Let the server draw again, once the view rests or the page cannot draw any more."""
         drawing = self._drawing
-        if self._is_live and drawing and not (drawing.is_moving and drawing.is_possible):
+        if self._is_live and not (drawing.is_moving and drawing.is_possible):
             self._is_live = False
             self._is_wanted = self._is_wanted or self._has_updates
 
     async def _show(self) -> None:
         """Show the view in the page: by an update or by a picture."""
-        if self._is_live and self._drawing is not None:
+        if self._is_live:
             self._is_wanted, self._has_updates = False, True
             self._update(self._drawing.update())
             return
@@ -204,7 +204,7 @@ class Stream:
 
     def _announce(self) -> None:
         """Let the page fetch the surface, if it lacks it."""
-        if self._drawing is not None and self._is_open and not self._is_live:
+        if self._is_open and not self._is_live:
             surface = self._drawing.announce()
             if surface is not None:
                 self._send(surface, self._sent)
@@ -233,8 +233,7 @@ class Stream:
         finally:
             self._is_drawing = False
             self._timers.postpone(_RECEIVING)  # input that has arrived meanwhile comes first
-            if self._drawing is not None:
-                self._drawing.note_picture()
+            self._drawing.note_picture()
 
     def _drawn(self, *_: object) -> None:
         """Send what somebody else has drawn, too."""

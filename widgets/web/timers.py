@@ -15,19 +15,11 @@ from functools import partial
 from typing import Any
 
 _ONE_SHOT = 1  # type of a timer, as vtkRenderWindowInteractor numbers them
-_LONGEST = 0.5  # seconds between two ticks of a timer that waits for input, if its period is less
-_SHARE = 0.05  # of the time, for ticks that take so long that this is more than `_LONGEST`
-_MOST = 2.0  # seconds between two ticks, even if that is more than their share
+_LONGEST_WAIT = 1.0  # seconds that input may delay a timer, after its last tick
 
 
 class Timers:
-    """Fires all timers that *interactor* creates from now on, between `start` and `stop`.
-
-    Parameters
-    ----------
-    interactor : vtkGenericRenderWindowInteractor
-        Their owner.
-    """
+    """Fires all timers that *interactor* creates from now on, between `start` and `stop`."""
 
     def __init__(self, interactor: Any) -> None:
         self._interactor = interactor
@@ -35,16 +27,10 @@ class Timers:
         self._periods: dict[int, tuple[float, bool]] = {}  # seconds, and whether it repeats
         self._handles: dict[int, asyncio.TimerHandle] = {}
         self._begun: dict[int, float] = {}  # when the period of each began, in the loop's time
-        self._duration = 0.0  # of the last tick, in seconds
         self._tags = [
             interactor.AddObserver("CreateTimerEvent", self._created),
             interactor.AddObserver("DestroyTimerEvent", self._destroyed),
         ]
-
-    @property
-    def running(self) -> tuple[float, ...]:
-        """The periods of the timers that run, in seconds."""
-        return tuple(seconds for seconds, _ in self._periods.values())
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Fire timers in *loop* from now on."""
@@ -55,13 +41,12 @@ class Timers:
     def postpone(self, pause: float = math.inf) -> None:
         """Let repeating timers wait for input: for their period, or *pause* seconds if less.
 
-        Repeated calls cannot hold a timer back forever; see `_LONGEST` and `_SHARE`.
+        Repeated calls cannot hold a timer back forever; see `_LONGEST_WAIT`.
         """
-        longest = max(_LONGEST, min(self._duration / _SHARE, _MOST))
         for timer, handle in self._handles.items():
             seconds, is_repeating = self._periods[timer]
             if self._loop is not None and is_repeating:
-                latest = self._begun[timer] + max(seconds, longest)
+                latest = self._begun[timer] + max(seconds, _LONGEST_WAIT)
                 when = min(self._loop.time() + min(seconds, pause), latest)
                 if when > handle.when():
                     handle.cancel()
@@ -104,10 +89,8 @@ class Timers:
     def _fire(self, timer: int) -> None:
         assert self._loop is not None
         _, is_repeating = self._periods[timer]
-        began = self._loop.time()
         if is_repeating:
             self._schedule(timer)  # first: the observers may destroy it
         else:
             self._forget(timer)
         self._interactor.InvokeEvent("TimerEvent")
-        self._duration = self._loop.time() - began

@@ -31,9 +31,9 @@ from ..editor import DeformEditor, WrittenMesh, opening, write_posed
 
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
-_LONGEST = 80  # letters of a name
-_PERIOD = 0.05  # seconds between two looks at whether the pose has settled
-_PATIENCE = 30.0  # seconds to wait for the next part of an upload
+_LONGEST_NAME = 80  # letters of a name
+_POLL = 0.05  # seconds between two looks at whether the pose has settled
+_UPLOAD_TIMEOUT = 30.0  # seconds to wait for the next part of an upload
 UPLOAD_LIMIT = 1 << 30  # bytes
 _COMMON = (".ply", ".obj", ".stl", ".glb", ".off")  # first in the list
 _LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
@@ -86,7 +86,7 @@ class Transfer:
 
     async def upload(self, request: web.Request) -> web.Response:
         """Store the body, and open it in the background."""
-        name = re.sub(r"[^\w .()+-]", "_", request.query.get("name", ""))[-_LONGEST:].strip()
+        name = re.sub(r"[^\w .()+-]", "_", request.query.get("name", ""))[-_LONGEST_NAME:].strip()
         suffix = Path(name).suffix.lower()
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may upload files.")
@@ -121,7 +121,7 @@ class Transfer:
         """Write the body to *place*; return False if it is larger than the limit."""
         size = 0
         with replacing(place) as draft, draft.open("wb") as file:
-            while data := await asyncio.wait_for(request.content.readany(), _PATIENCE):
+            while data := await asyncio.wait_for(request.content.readany(), _UPLOAD_TIMEOUT):
                 size += len(data)
                 if size > self.limit:
                     return False
@@ -136,7 +136,7 @@ class Transfer:
         if suffix != _SESSION and suffix not in writable_suffixes():
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:
-            await asyncio.sleep(_PERIOD)
+            await asyncio.sleep(_POLL)
         place = self._new_folder() / f"download{suffix}"
         self._downloads.add(place.parent)
         try:

@@ -1,4 +1,4 @@
-"""Cages as wireframes: their colours, the pose, dragging vertices, rejected cages."""
+"""Cages as wireframes: their colours, the pose, dragging vertices."""
 
 from __future__ import annotations
 
@@ -9,15 +9,12 @@ import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from hands import Hand, draw_seldom, picture, plain_view
 from scenes import Scene, sausage
-from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Session
 from vtk_segdeform.cages.cage import Cage
-from vtk_segdeform.errors import CageError
 from vtk_segdeform.pictures.palette import HANDLE, of_region, rgb
 from vtk_segdeform.session.state import State
 from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
-from vtk_segdeform.widgets.cage_display.rejected_cage import WARNING
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 
@@ -207,18 +204,6 @@ def test_a_dragged_vertex_follows_the_pointer_at_constant_depth(cages, hand):
     assert not hand.failures
 
 
-def test_the_volume_is_preserved_at_every_move_if_the_option_is_on(cages, hand):
-    session = cages.session
-    session.change_options(preserve_volume=True)
-    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
-    hand.press((x, y))
-    for step in range(1, 6):
-        hand.move((x, y + 10 * step))
-        assert abs(session.volume_change) < 1e-12
-    hand.release()
-    assert not hand.failures
-
-
 def test_escape_and_the_right_button_cancel_the_drag(cages, hand):
     session = cages.session
     before, step = picture(cages.view), session.history.undo_label
@@ -243,17 +228,6 @@ def test_a_click_makes_no_undo_step(cages, hand):
     hand.click(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     assert cages.session.history.undo_label == step
     assert cages.session.state.pose is None
-
-
-def test_cancelling_keeps_an_earlier_unfinished_drag(cages, hand):
-    session = cages.session
-    moved = session.cage_vertices[0] * 1.1
-    session.move_cage(0, moved)
-    x, y = hand.at(session.cage_vertices[1][top_of(cages, 1)])
-    hand.press((x, y))
-    hand.move((x, y + 30))
-    hand.key("Escape")
-    assert np.array_equal(session.cage_vertices[0], moved)
 
 
 def test_a_hidden_vertex_can_only_be_dragged_with_through(cages, hand):
@@ -350,101 +324,8 @@ def test_new_cages_during_a_drag_cancel_it(cages, hand):
     assert not hand.failures
 
 
-def test_an_open_cage_is_marked_along_its_hole(cages):
-    cage = cages.session.cages[1]
-    hole = int(np.argmin(cage.vertices[cage.faces].mean(axis=1)[:, 1]))  # in front
-    faces = np.delete(cage.faces, hole, axis=0)
-    assert count(cages, WARNING) == 0
-    assert cages.show_faults(cage.vertices, faces, 1) == (
-        "3 edges border only one face: the cage is open"
-    )
-    assert count(cages, of_region(1)) < 20  # the cage of the region is hidden
-    for a, b in ((0, 1), (1, 2), (2, 0)):
-        middle = cage.vertices[cage.faces[hole][[a, b]]].mean(axis=0)
-        assert near(cages, middle, WARNING)
-    far = int(np.argmax(np.linalg.norm(cage.vertices - middle, axis=1)))
-    assert not near(cages, cage.vertices[far], WARNING)
-    cages.clear_faults()
-    assert count(cages, WARNING) == 0
-    assert count(cages, of_region(1)) > 500
-
-
-def test_vertices_outside_a_cage_are_marked(cages):
-    session, cage = cages.session, cages.session.cages[1]
-    tight = Cage(cage.vertices * [1.0, 0.8, 0.8], cage.faces)
-    with pytest.raises(CageError, match="are outside the cage") as refused:
-        session.set_cages([session.cages[0], tight, session.cages[2]])
-    outside = session.mesh.vertices[session.regions.membership[1]]
-    outside = outside[~tight.contains(outside)]
-    message = cages.show_faults(tight.vertices, tight.faces, 1, message=str(refused.value))
-    assert message == str(refused.value)
-    facing = outside[outside[:, 1] < -0.2]
-    assert len(facing)
-    image = picture(cages.view)
-    assert all(near(cages, point, WARNING, image) for point in facing)
-    shown = [
-        p.GetInput() for p in cages.view.foreground.GetViewProps() if isinstance(p, vtkTextActor)
-    ]
-    assert [" ".join(text.split()) for text in shown] == [message]
-
-
-@pytest.mark.parametrize("fault", ["crossing", "flat", "inside-out", "loose vertex", "no fault"])
-def test_other_faults_are_marked_and_described(cages, fault):
-    cage = cages.session.cages[1]
-    vertices, faces = cage.vertices.copy(), cage.faces
-    if fault == "crossing":
-        vertices[5] = 2.0 * vertices.mean(axis=0) - vertices[5]
-    elif fault == "flat":
-        vertices[faces[0, 0]] = vertices[faces[0, 1]]
-    elif fault == "inside-out":
-        faces = faces[:, ::-1]
-    elif fault == "loose vertex":
-        vertices = np.concatenate([vertices, [[0.0, -1.0, 1.5]]])
-    messages = {
-        "crossing": "intersects itself",
-        "flat": "no area",
-        "inside-out": "inside-out",
-        "loose vertex": "in no face",
-        "no fault": "",
-    }
-    message = cages.show_faults(vertices, faces)
-    assert messages[fault] in message
-    assert (message == "") == (fault == "no fault")
-    assert (count(cages, WARNING) > 0) == (fault != "no fault")
-    if fault == "loose vertex":
-        assert near(cages, vertices[-1], WARNING)
-        assert not near(cages, vertices[top_of(cages, 1)], WARNING)
-
-
-@pytest.mark.parametrize("zoom", [0.5, 1.6, 4.0])
-def test_the_message_stays_inside_the_window_and_beside_the_marks(cages, zoom):
-    cage = cages.session.cages[2]
-    view = cages.view
-    view.camera.Zoom(zoom)
-    cages.show_faults(cage.vertices, cage.faces[:-1], 2)
-    picture(view)
-    text = next(p for p in view.foreground.GetViewProps() if isinstance(p, vtkTextActor))
-    low, size = np.array(text.GetPosition()), np.zeros(2)
-    text.GetSize(view.foreground, size)
-    assert (low >= 0).all()
-    assert (low + size <= view.renderer.GetSize()).all()
-    marks = view.to_display(cage.vertices[cage.faces[-1]])[:, :2]
-    assert not ((marks > low) & (marks < low + size)).all(axis=1).any()
-
-
-def test_new_cages_clear_the_faults(cages):
-    session = cages.session
-    cages.show_faults(session.cages[0].vertices, session.cages[0].faces[1:], 0)
-    session.set_cages([Cage(c.vertices * 1.05, c.faces) for c in session.cages])
-    assert count(cages, WARNING) == 0
-    assert count(cages, of_region(0)) > 500
-    with pytest.raises(CageError, match="no region 7"):
-        cages.show_faults(session.cages[0].vertices, session.cages[0].faces, 7)
-
-
 def test_remove_restores_the_view(cages, hand):
     view = cages.view
-    cages.show_faults(cages.session.cages[0].vertices, cages.session.cages[0].faces[1:], 0)
     hand.hover(hand.at(cages.session.cage_vertices[1][top_of(cages, 1)]))
     cages.remove()
     assert view.renderer.GetViewProps().GetNumberOfItems() == 1  # the surface

@@ -130,8 +130,7 @@ def test_what_is_saved_is_what_was_shown_and_is_not_changed_later(bench, tmp_pat
 def settling(bench, monkeypatch):  # noqa: F811
     """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
     monkeypatch.setattr(queue, "_SHOWN_AFTER", 0.0)
-    for each in ("_EVENT_TIME", "_REFINE_TIME"):  # the fewest steps, however fast the machine is
-        monkeypatch.setattr(f"vtk_segdeform.widgets.handle_dragger.live_solve.{each}", 0.0)
+    monkeypatch.setattr("vtk_segdeform.widgets.handle_dragger.live_solve.STEPS", 3)
     bench.editor.do(finishing_after_drags(False))
     bench.type("4")
     pull_handle(bench, (-40, 90))

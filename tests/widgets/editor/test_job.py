@@ -187,37 +187,3 @@ def test_a_computing_thread_makes_progress_while_the_window_is_idle():
         hand.tick()
         ticks += 1
     assert delivered == ["counted"]
-
-
-def test_a_job_reports_during_a_camera_drag_and_delivers_after_it():
-    view, told, done = plain_view((500, 300)), [], []
-    view.render()
-    hand = Hand(view)
-    go_on = threading.Event()
-
-    def work(progress):
-        progress(0.5, "half")
-        assert go_on.wait(20.0)
-        return "all"
-
-    hand.press((100, 150))  # the camera style now receives all events exclusively
-    hand.move((120, 150))
-    Job(
-        view_timer(view),
-        work,
-        done=done.append,
-        watch=lambda job: told.append((job.text, job.is_running)),
-    )
-    for _ in range(20):
-        hand.tick()
-        time.sleep(0.01)
-    assert told == [("half", True)]
-    go_on.set()
-    for _ in range(5):
-        hand.tick()
-    assert done == []
-    hand.release((130, 150))
-    for _ in range(5):
-        hand.tick()
-    assert done == ["all"]
-    assert hand.failures == []

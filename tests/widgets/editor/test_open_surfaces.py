@@ -171,7 +171,6 @@ def test_a_handle_is_dragged_and_an_enclosed_volume_stays_exact(open_editor, nam
     session.handles.add(x[:, along] > high)
     scene.editor.mode = Mode.DEFORM
     scene.editor.wait()
-    scene.editor.widgets.dragger.refine_while_resting = False
     start = np.array(scene.hand.at(scene.editor.widgets.dragger.gizmo.centre))
     scene.hand.press(start)
     for k in range(1, 4):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -164,17 +163,6 @@ def test_a_film_that_is_cancelled_leaves_no_file(tmp_path, ball):
     assert list(tmp_path.iterdir()) == []
     made.save(tmp_path / "ball.gif", progress=lambda *said: reported.append(said))
     assert max(fraction for fraction, _ in reported) <= 1.0
-
-
-def test_the_history_becomes_a_picture_for_each_state(tmp_path, session):
-    film(tmp_path / "bend.gif", session, TURNS)
-    film(tmp_path / "reset.gif", session, [SCENE.turned(40.0)])
-    here, n_states = session.history.position, len(session.history.labels)
-    film(tmp_path / "all", session, [partial(session.history.jump, k) for k in range(n_states)])
-    pictures = read(tmp_path / "all")
-    assert len(pictures) == n_states
-    assert (session.history.position, len(session.history.labels)) == (here, n_states)
-    assert len({picture.tobytes() for picture in pictures[-3:]}) == 3
 
 
 def test_a_path_that_cannot_be_written_is_refused_before_the_first_frame(tmp_path, ball):

@@ -86,28 +86,6 @@ def test_its_size_on_the_screen_is_constant(view, parallel):
     assert 60.0 < sizes[0] < 130.0
 
 
-def test_it_grows_a_little_with_the_window():
-    def size(height):
-        view = plain_view((height, height))
-        gizmo = Gizmo(view)
-        gizmo.place(np.zeros(3))
-        return gizmo.radius / view.pixel_at(np.zeros(3))
-
-    assert size(600) == pytest.approx(90.0)
-    assert 100.0 < size(1200) < 150.0
-
-
-def test_the_mesh_does_not_hide_it(view):
-    gizmo = Gizmo(view)
-    before = picture(view)
-    gizmo.place(CENTRE)
-    middle = view.to_display(CENTRE[None])[0, :2]
-    assert not is_painted(before, middle, INK)
-    assert is_painted(picture(view), middle, INK)
-    gizmo.place(None)
-    assert np.array_equal(picture(view), before)
-
-
 @pytest.mark.parametrize(
     ("place", "axes"), every(3, [(look, axes) for look in LOOKS for axes in (np.eye(3), TURNED)])
 )
@@ -218,6 +196,10 @@ def test_a_highlighted_part_is_yellow_and_show_only_hides_the_others(view):
     image = picture(view)
     assert is_painted(image, there, COLOURS[4])
     assert not any(is_painted(image, place, AXIS_COLOURS[2]) for place in other)
+    middle = view.to_display(CENTRE[None])[0, :2]
+    assert not is_painted(image, middle, INK)
+    gizmo.show_only(ring)
+    assert is_painted(picture(view), middle, INK)  # the centre of the rotation
     gizmo.show_only(None)
     gizmo.highlight(None)
     assert is_painted(picture(view), there, AXIS_COLOURS[0])

@@ -59,8 +59,7 @@ def is_kept(stand: Stand, place) -> Story:
     stand.hand.release(place)
     stand.hand.failures.clear()  # refusals are reported
     with pytest.MonkeyPatch.context() as patch:  # nothing interrupts any more
-        for name in ("_MOST_STEPS", "_LEAST_REFINE_STEPS"):
-            patch.setattr(live_solve, name, 20)
+        patch.setattr(live_solve, "STEPS", 20)
         stand.settle()
     story = Story.of(stand.session)
     assert story.labels[0] == DRAG

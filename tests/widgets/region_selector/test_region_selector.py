@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, picture, plain_view
-from scenes import sausage
-from solids import icosphere, rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkRenderingCore import vtkTextActor
 
-from vtk_segdeform import Mesh, Regions, Session, models
+from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
 from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
+from vtk_segdeform.widgets.region_selector.region_outlines import RegionOutlines
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
 from vtk_segdeform.widgets.scene.view import View
-
-WHOLE = [(2, 2), (398, 2), (398, 398), (2, 398)]
 
 
 class Desk:
@@ -74,16 +72,6 @@ def test_a_brush_stroke_adds_the_vertices_along_its_path_in_one_step(desk):
         assert np.abs(places[:, 0] - x).min() < 0.15
     assert desk.session.undo() == "paint region 2"
     assert np.array_equal(desk.session.regions.membership[1], before)
-
-
-def test_a_fast_stroke_of_a_small_brush_has_no_gaps(desk):
-    desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.12
-    desk.hand.drag([desk.under(-0.7, 0.0), desk.under(0.7, 0.0)])
-    x, y, z = desk.points.T
-    along = (np.abs(x) < 0.65) & (y < 0.0) & (np.abs(z) < 0.05)
-    assert along.sum() > 5
-    assert np.isin(np.flatnonzero(along), desk.session.fixed).all()
-    assert np.abs(z[desk.session.fixed]).max() < 0.2
 
 
 def test_a_second_stroke_adds_to_the_fixed_vertices(desk):
@@ -157,27 +145,6 @@ def test_a_rectangle_selects_visible_vertices_or_all(desk, through):
     assert x1 > x0
 
 
-def test_a_rectangle_selects_one_side_of_a_sheet_2e_8_thick():
-    vertices, faces = icosphere(3)
-    flat = vertices * [1.0, 1.0, 2e-8]
-    session = Session(Mesh(flat @ rotation([1.0, 0.0, 0.0], 0.5).T, faces))
-    view = plain_view()
-    selector, hand = RegionSelector(view, session), Hand(view)
-    view.camera.ParallelProjectionOn()
-    view.camera.SetParallelScale(1.2)
-    view.camera.SetPosition(0.0, 0.0, 10.0)
-    view.camera.SetFocalPoint(0.0, 0.0, 0.0)
-    view.camera.SetClippingRange(5.0, 15.0)
-    selector.On()
-    selector.tool, selector.paints = Tool.RECTANGLE, Paint.FIXED
-    hand.drag([(2, 2), (200, 200), (398, 398)])
-    assert hand.failures == []
-    selected = np.isin(np.arange(len(vertices)), session.fixed)
-    assert selected[vertices[:, 2] > 0.5].all()
-    assert not selected[vertices[:, 2] < -0.5].any()  # 2e-9 of the depth range or more behind
-    selector.remove()
-
-
 def test_a_lasso_selects_the_vertices_inside(desk):
     desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.HANDLE
     angle = np.linspace(0, 2 * np.pi, 40)
@@ -202,6 +169,29 @@ def test_the_line_is_drawn_while_the_button_is_down(desk):
     assert not changed[30:60, 30:60].any()  # the inside is not filled
     desk.hand.key("Escape")
     desk.hand.release()
+    assert (picture(desk.view) == idle).all()
+
+
+def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
+    outlines, idle = RegionOutlines(desk.selector.surface), picture(desk.view)
+    outlines.show(lines=True, numbers=False)
+    labels = desk.session.regions.labels
+    between = labels[desk.session.mesh.edges]
+    assert len(outlines._ends) == np.count_nonzero(between[:, 0] != between[:, 1])
+    changed = (picture(desk.view) != idle).any(axis=2)
+    (left, middle), (right, _) = desk.under(-0.6, 0.0), desk.under(0.6, 0.0)
+    assert changed[:, round(left) : round(right)].any(axis=0).mean() > 0.85  # a thin line
+    reach = desk.under(0.0, 0.2)[1] - middle
+    assert np.abs(399 - np.flatnonzero(changed.any(axis=1)) - middle).max() < reach
+    outlines.show(lines=False, numbers=True)
+    assert (picture(desk.view) != idle).any()
+    props = desk.view.renderer.GetViewProps()
+    first, second = [prop for prop in props if isinstance(prop, vtkTextActor)]
+    assert (first.GetInput(), second.GetInput()) == (" 1 ", " 2 ")
+    assert outlines.n_numbers == 2
+    assert first.GetPosition()[1] > middle + reach
+    assert second.GetPosition()[1] < middle - reach
+    outlines.remove()
     assert (picture(desk.view) == idle).all()
 
 
@@ -265,17 +255,6 @@ def test_vertices_of_no_other_region_cannot_be_erased(
     assert desk.session.regions is regions
 
 
-def test_a_region_cannot_be_emptied(desk):
-    desk.session.painting.paint(1, desk.points[:, 2] < np.inf)  # contains all of region 0
-    desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
-    regions = desk.session.regions
-    desk.hand.drag([(2, 2), (398, 398)], control=True)
-    error = desk.hand.failures.pop()
-    assert isinstance(error, RegionError)
-    assert "region 1 would become empty; merge it" in str(error)
-    assert desk.session.regions is regions
-
-
 def test_brackets_and_the_wheel_with_shift_over_the_mesh_change_the_brush(desk):
     here, radius = desk.under(0.0, 0.0), desk.selector.radius
     desk.hand.wheel(+2, here, shift=True)
@@ -334,26 +313,6 @@ def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
     assert not ((sides > -0.6) & (sides < 0.6)).any()
 
 
-def test_a_lasso_is_previewed_before_it_changes_anything(desk):
-    desk.selector.tool, desk.selector.paints = Tool.LASSO, Paint.FIXED
-    corners = [(100, 100), (300, 100), (300, 300), (100, 300)]
-
-    def grey():
-        pixel = picture(desk.view)[200, 200].astype(int)
-        return np.ptp(pixel) < 30
-
-    assert not grey()
-    desk.hand.press(corners[0])
-    for corner in corners[1:]:
-        desk.hand.move(corner)
-    assert grey()
-    assert not len(desk.session.fixed)
-    desk.hand.event("RightButtonPressEvent")
-    assert not grey()
-    desk.hand.release(corners[0])
-    assert not len(desk.session.fixed)
-
-
 def test_the_preview_shows_only_vertices_that_will_change(desk):
     desk.session.set_fixed(desk.points[:, 2] > 0.5)
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
@@ -392,34 +351,6 @@ def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk)
     assert not desk.session.handles
     assert desk.session.undo() == "remove handle 1"
     assert len(desk.session.handles["handle 1"])
-
-
-def test_painting_a_handle_keeps_the_pose_and_painting_a_region_resets_it():
-    scene = sausage(is_coarse=True)
-    view = plain_view()
-    session = scene.session()
-    selector = RegionSelector(view, session)
-    view.camera.SetPosition(0.0, -9.0, 1.0)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    selector.On()
-    hand = Hand(view)
-    session.drag(scene.turned(40.0), max_steps=5)
-    session.commit()
-    pose = session.vertices.copy()
-    middle = int(np.argmin(np.linalg.norm(scene.mesh.vertices - [0.0, -0.8, 0.0], axis=1)))
-    selector.paints = Paint.HANDLE
-    hand.click(hand.at(pose[middle]))  # in the current pose
-    assert middle in session.handles["handle 2"]
-    assert np.array_equal(session.vertices, pose)
-    selector.paints, selector.region = Paint.REGION, 2
-    hand.click(hand.at(pose[middle]))
-    assert session.regions.membership[2, middle]
-    assert np.array_equal(session.vertices, scene.mesh.vertices)
-    assert session.undo() == "paint region 3"
-    assert np.array_equal(session.vertices, pose)
-    assert not hand.failures
-    selector.remove()
 
 
 def test_region_under_pointer_is_that_of_the_vertex_there(desk):
@@ -514,18 +445,6 @@ def test_fixed_vertices_are_grey_handles_red_and_overlaps_mixed(desk):
     for (x, z), name in (((0.0, -0.85), FIXED), ((0.0, 0.85), HANDLE)):
         wanted = rgb(name) / rgb(name).max()
         assert np.abs(colour(x, z) - wanted).max() < 0.12
-
-
-def test_undo_and_redo_are_displayed(desk):
-    before = picture(desk.view)
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
-    desk.hand.drag([(2, 300), (398, 398)])
-    after = picture(desk.view)
-    assert (after != before).any()
-    desk.session.undo()
-    assert (picture(desk.view) == before).all()
-    desk.session.redo()
-    assert (picture(desk.view) == after).all()
 
 
 def test_remove_restores_the_view():

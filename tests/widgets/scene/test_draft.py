@@ -86,19 +86,6 @@ def test_slow_drafts_last_as_long_as_another_thread_is_spared(shown, monkeypatch
     assert shown.actor.GetVisibility()
 
 
-def test_pictures_in_full_quality_are_measured(shown):
-    view, seconds = shown.view, 0.05
-    view.renderer.AddObserver("StartEvent", lambda *_: time.sleep(seconds), -1.0)  # a late one
-    drafts = Draft.of(view)
-    view.render()
-    measured = drafts.seconds
-    assert 0.05 < measured < 1.0
-    drafts.begin()
-    seconds = 0.2
-    view.render()
-    assert drafts.seconds == measured
-
-
 def test_a_picture_is_measured_until_the_driver_has_drawn_it(shown):
     """OpenGL in software returns before that."""
     renderer, window = shown.view.renderer, shown.view.window

@@ -111,18 +111,6 @@ def test_views_of_one_interactor_share_it(view, host):
     stops[1]()
 
 
-def test_views_of_two_interactors_do_not(view, host):
-    other = plain_view((60, 60))
-    its_host, heard = OneTimerHost(other.interactor), []
-    stops = [each.every(20, lambda k=k: heard.append(k)) for k, each in enumerate((view, other))]
-    stops[0]()
-    its_host.tick()
-    host.tick()
-    assert heard == [1]
-    stops[1]()
-    assert not its_host.is_running
-
-
 @pytest.mark.parametrize("kind", ["CreateRepeatingTimer", "CreateOneShotTimer"])
 def test_it_keeps_running_when_a_foreign_timer_ends(view, host, kind):
     heard = []
@@ -136,18 +124,6 @@ def test_it_keeps_running_when_a_foreign_timer_ends(view, host, kind):
     stop()
     view.interactor.DestroyTimer(getattr(view.interactor, kind)(50))  # ours has no subscribers now
     assert not host.is_running
-
-
-def test_it_keeps_running_when_the_interactor_is_initialised_again(view, host):
-    heard = []
-    stop = view.every(20, lambda: heard.append("tick"))
-    view.interactor.Disable()
-    host.tick()
-    assert heard == []
-    view.interactor.ReInitialize()
-    host.tick(2)
-    assert heard == ["tick"] * 2
-    stop()
 
 
 def test_stopping_after_the_window_is_closed_is_harmless():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from campaign import every
-from hands import Hand, draw_seldom, picture, plain_view
+from hands import draw_seldom, picture, plain_view
 from open_meshes import open_box, sheet
 from scenes import sausage
 from solids import rotation
@@ -20,7 +20,6 @@ from vtk_segdeform import Regions, Session
 from vtk_segdeform.geometry.local_volume import LocalVolume
 from vtk_segdeform.pictures.palette import of_region
 from vtk_segdeform.solver.volume_constraints import region_volumes
-from vtk_segdeform.widgets.cage_display.cage_display import CageDisplay
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.volume_overlay.diverging import (
@@ -30,7 +29,6 @@ from vtk_segdeform.widgets.volume_overlay.diverging import (
     half_range_for,
     lookup_table,
 )
-from vtk_segdeform.widgets.volume_overlay.legend import percent
 from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -38,18 +36,11 @@ pytestmark = pytest.mark.usefixtures("bound_once")
 RNG = np.random.default_rng(5)
 
 
-def session_of(n_regions: int, *, is_coarse: bool = True) -> Session:
-    scene = sausage(n_regions, is_coarse=is_coarse)
-    session = scene.session()
-    session.change_options(preserve_volume=False)
-    return session
-
-
 @pytest.fixture
 def overlay(request):
     """Return the overlay of a sausage along x seen from -y, by default with one region."""
-    n_regions, is_coarse = getattr(request, "param", (1, True))
-    session = session_of(n_regions, is_coarse=is_coarse)
+    session = sausage(getattr(request, "param", 1), is_coarse=True).session()
+    session.change_options(preserve_volume=False)
     view = plain_view((400, 300))
     surface = SurfaceDisplay(view, session)
     view.camera.SetPosition(0.0, -10.0, 0.0)
@@ -65,8 +56,7 @@ def overlay(request):
     surface.remove()
 
 
-def several(n_regions, *, is_coarse=True):
-    return pytest.mark.parametrize("overlay", [(n_regions, is_coarse)], indirect=True)
+three_regions = pytest.mark.parametrize("overlay", [3], indirect=True)
 
 
 def colours(overlay):
@@ -116,19 +106,6 @@ def test_lightness_falls_evenly_and_alike_on_both_sides():
         assert np.abs(side - expected).max() < 2.0
         assert (np.diff(side) <= 0.3).all()  # colours are rounded to whole numbers
     assert below[-1] < 40 < 85 < below[0]
-
-
-def test_the_two_sides_stay_apart_for_colour_blind_eyes():
-    # Vienot, Brettel, Mollon 1999: what is seen without red or without green receptors.
-    blind = {
-        "protanope": [[0.1124, 0.8876, 0.0], [0.1124, 0.8876, 0.0], [0.004, -0.004, 1.0]],
-        "deuteranope": [[0.2928, 0.7072, 0.0], [0.2928, 0.7072, 0.0], [-0.0223, 0.0223, 1.0]],
-    }
-    size = np.linspace(0.25, 1.0, 16)
-    for matrix in blind.values():
-        seen = [(colours_of(s, 1.0) / 255.0) ** 2.2 @ np.array(matrix).T for s in (-size, size)]
-        below, above = (np.clip(s, 0.0, 1.0) ** (1 / 2.2) * 255 for s in seen)
-        assert (np.linalg.norm(below - above, axis=1) > 50).all()
 
 
 @pytest.mark.parametrize("half_range", HALF_RANGES)
@@ -202,50 +179,17 @@ def test_a_stretch_is_one_colour_everywhere_that_of_its_determinant(overlay, fac
     assert lines_of(overlay)[0] == f"Volume: {100 * (factor - 1):+.0f} %"
 
 
-def bent(overlay):
-    """Bend the mesh; return the mean colour of the picture inside the bend and at the end."""
-    scene = sausage(1)
-    overlay.session.drag(scene.turned(75.0))
-    view = overlay.view
-    view.renderer.ResetCamera()
-    x = overlay.session.vertices
-    image = picture(view)[::-1].astype(float)
-    middle = np.abs(scene.mesh.vertices[:, 0]) < 0.25
-    inside = x[middle][np.argmin(x[middle][:, 1] + 2.0 * x[middle][:, 2])]
-    seen = []
-    for point in (inside, x[scene.fixed].mean(axis=0)):
-        u, v = (round(float(p)) for p in view.to_display(point[None])[0, :2])
-        seen.append(image[v - 1 : v + 4, u - 2 : u + 3].reshape(-1, 3).mean(axis=0))
-    return seen
-
-
-@several(1, is_coarse=False)
-def test_a_bend_that_loses_volume_is_blue_inside(overlay):
-    overlay.show()
-    pinch, end = bent(overlay)
-    assert overlay.session.volume_change < -0.05
-    assert overlay.change.min() < -0.3
-    assert pinch[2] > pinch[0] + 25  # blue
-    assert abs(end[2] - end[0]) < 12  # pale grey
-    before = (overlay.change < -0.15).mean()
-    overlay.session.reset_pose()
-    overlay.session.change_options(preserve_volume=True)
-    bent(overlay)
-    assert (overlay.change < -0.15).mean() < 0.7 * before
-    assert abs(overlay.session.volume_change) < 1e-12
-
-
 # The lines of text.
 
 
-@several(3)
-def test_the_lines_show_totals_regions_and_steps(overlay):
+@three_regions
+def test_the_lines_show_totals_and_regions(overlay):
     session = overlay.session
     overlay.show()
     regions = [f"region {r}: 0 %" for r in (1, 2, 3)]
     assert lines_of(overlay) == ["Volume: 0 %", "Local: 0 to 0 %", *regions]
     session.change_options(preserve_volume=True)
-    solution = session.drag(sausage(3, is_coarse=True).turned(30.0), max_steps=4)
+    session.drag(sausage(3, is_coarse=True).turned(30.0), max_steps=4)
     lines = lines_of(overlay)
     assert lines[0] == "Volume: 0 %"
     s = LocalVolume(session.mesh).change(session.vertices)
@@ -254,17 +198,16 @@ def test_the_lines_show_totals_regions_and_steps(overlay):
         share = volume.violation(session.vertices) / volume.target
         assert float(lines[2 + r].split()[2]) == pytest.approx(100 * share, abs=0.051)
     assert any("region" in line and line.split()[2] != "0" for line in lines)
-    assert lines[-1] == f"{solution.steps} steps"
     overlay.hide()
     loaded = Session(session.mesh, state=session.state)  # has no solution,
     assert loaded.solution is None
     again = VolumeOverlay(overlay.view, loaded, overlay.surface)
     again.show()
-    assert lines_of(again) == lines[:-1]  # so the regions' volumes are measured
+    assert lines_of(again) == lines  # so the regions' volumes are measured
     again.remove()
 
 
-@several(3)
+@three_regions
 def test_the_line_of_a_region_has_its_colour(overlay):
     overlay.show()
     lines = {
@@ -280,29 +223,7 @@ def test_the_line_of_a_region_has_its_colour(overlay):
     assert len(lines_of(overlay)) == 2  # a single region has no line
 
 
-def test_the_time_per_frame_is_shown_from_the_second_frame_on(overlay):
-    del overlay.view.render  # drawn at every event
-    cages = CageDisplay(overlay.view, overlay.session)
-    cages.through = True
-    cages.On()
-    overlay.show()
-    hand = Hand(overlay.view)
-    cage = overlay.session.cage_vertices[0]
-    x, y = hand.at(cage[np.argmin(np.abs(cage).sum(axis=1))])
-    hand.press((x, y))
-    hand.move((x - 5, y))
-    assert not any("ms" in line for line in lines_of(overlay))
-    hand.move((x - 9, y))
-    assert lines_of(overlay)[-1].endswith(" ms per frame")
-    assert 1 <= int(lines_of(overlay)[-1].split()[0]) < 5000
-    hand.release()
-    overlay.session.undo()  # outside an event
-    assert not any("ms" in line for line in lines_of(overlay))
-    cages.remove()
-    assert not hand.failures
-
-
-@several(3)
+@three_regions
 @pytest.mark.parametrize(
     ("background", "size"),
     every(
@@ -352,17 +273,6 @@ def test_the_ticks_follow_the_range(overlay):
     assert overlay.half_range == 0.2
 
 
-def test_the_range_does_not_flicker_during_a_drag(overlay):
-    overlay.show()
-    seen = []
-    for factor in (1.102, 1.098, 1.102, 1.098):
-        overlay.session.move_cage(0, overlay.session.cages[0].vertices * [1.0, 1.0, factor])
-        seen.append(overlay.half_range)
-    assert seen == [0.2] * 4
-    overlay.session.revert()
-    assert overlay.half_range == 0.05
-
-
 def test_a_region_without_a_face_is_left_out():
     scene = sausage(1)
     x = scene.mesh.vertices[:, 0]
@@ -394,12 +304,6 @@ def test_of_more_than_eight_regions_the_rest_is_counted():
     session.painting.merge([0, 1])
     assert lines_of(overlay)[-1] == "1 more region"
     overlay.remove()
-
-
-def test_small_changes_are_percentages_too():
-    shares = [0.25, -0.0123, 1e-3, -4e-4, 1.2e-5, 2e-16, 0.0]
-    texts = ["+25 %", "-1.2 %", "+0.1 %", "-0.04 %", "+0.0012 %", "0 %", "0 %"]
-    assert [percent(share) for share in shares] == texts
 
 
 def test_remove_restores_the_view(overlay):

@@ -14,12 +14,11 @@ from posed_scenes import random_cages, sausage_session
 from scenes import sausage
 from sheets import moebius
 
-from vtk_segdeform import Regions, fit_cages, sizes
-from vtk_segdeform.errors import ArgumentError, CageError
-from vtk_segdeform.geometry import VertexNormals, signed_volume
+from vtk_segdeform import Regions, fit_cages
+from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session, State
-from vtk_segdeform.widgets.web.drawing import encode_surface, encoding
+from vtk_segdeform.widgets.web.drawing import SurfaceStream, encode_surface, encoding
 
 ROUNDING = 1e-6  # diagonals, of single precision
 
@@ -27,7 +26,7 @@ ROUNDING = 1e-6  # diagonals, of single precision
 def split(data: bytes, *types: tuple[str, int]) -> list[np.ndarray]:
     """Return the arrays of a message, each given by its type and length."""
     magic, version, _, length, _ = struct.unpack_from("<4sHHII", data)
-    assert (magic, version, length) == (b"SDFM", 2, len(data))
+    assert (magic, version, length) == (b"SDFM", 3, len(data))
     arrays, at = [], 16
     for kind, count in types:
         arrays.append(np.frombuffer(data, kind, count, at))
@@ -38,18 +37,17 @@ def split(data: bytes, *types: tuple[str, int]) -> list[np.ndarray]:
 
 def read_surface(data: bytes) -> SimpleNamespace:
     """Return the arrays of the message of a surface."""
-    n, t, f, coarse, m, sets, columns, weights, closed = np.frombuffer(data, "<u4", 9, 16)
-    rest, steps, of_set, lengths, which, q, faces, fewer, twice = split(
-        data, ("<u4", 9), ("<f4", 3 * n), ("<f4", n), ("<u2", n), ("<u4", sets), ("<u2", columns),
-        ("<i2", weights), ("<u4", 3 * f), ("<u4", 3 * coarse),
-        ("<u4", t),
+    n, t, f, m, sets, columns, weights = np.frombuffer(data, "<u4", 7, 16)
+    rest, steps, of_set, lengths, which, q, faces, twice = split(
+        data, ("<u4", 7), ("<f4", 3 * n), ("<f4", n), ("<u2", n), ("<u4", sets), ("<u2", columns),
+        ("<i2", weights), ("<u4", 3 * f), ("<u4", t),
     )[1:]  # fmt: skip
     ends = np.cumsum(lengths)
     own = [which[end - length : end] for end, length in zip(ends, lengths, strict=True)]
     rows = np.split(q, np.cumsum(lengths[of_set])[:-1])
     return SimpleNamespace(
         rest=rest.reshape(-1, 3), steps=steps, columns=[own[k] for k in of_set], rows=rows,
-        faces=faces.reshape(-1, 3), coarse=fewer.reshape(-1, 3), twice=twice, closed=closed, m=m,
+        faces=faces.reshape(-1, 3), twice=twice, m=m,
     )  # fmt: skip
 
 
@@ -98,44 +96,13 @@ def test_every_entry_of_w_is_sent_to_half_a_step(session):
         assert np.abs(w[own[used]] - step * q[used].astype(float)).max() <= 0.5001 * step
 
 
-def test_at_rest_the_mesh_is_that_at_rest(session):
-    surface = encoded(session)
-    received = read_surface(surface.message(1))
-    at_rest = [cage.vertices for cage in session.cages]
-    moves = np.frombuffer(surface.cage_message(1, 0, at_rest), "<f4", offset=20)
-    assert not moves.any()
-    back = surface.centre + surface.scale * received.rest
-    np.testing.assert_allclose(
-        back, session.mesh.vertices[surface.order], atol=1e-7 * surface.scale
-    )
-
-
 def test_faces_are_those_of_the_mesh(session):
     surface = encoded(session)
     received = read_surface(surface.message(1))
     mine = np.sort(surface.order[received.faces], axis=1)
     theirs = np.sort(session.mesh.faces, axis=1)
-    assert received.closed == 1
     assert not len(received.twice)
     np.testing.assert_array_equal(np.unique(mine, axis=0), np.unique(theirs, axis=0))
-
-
-def test_a_large_mesh_has_fewer_faces_for_software_close_to_it(session, monkeypatch):
-    monkeypatch.setattr(sizes, "DRAFT", 100)
-    monkeypatch.setattr(sizes, "PAGE_POINTS", 600)
-    surface = encoded(session)
-    coarse = surface.order[read_surface(surface.message(1)).coarse]
-    mesh = session.mesh
-    assert 0 < len(coarse) < 0.6 * mesh.n_faces
-    volume = signed_volume(mesh.vertices, mesh.faces)
-    assert signed_volume(mesh.vertices, coarse) == pytest.approx(volume, rel=0.03)
-    received, p = read_surface(surface.message(1)), random_cages(session, 1)
-    assert received.coarse.max() + 1 == len(np.unique(coarse))  # their vertices come first
-    moves = np.frombuffer(surface.cage_message(1, 5, p), "<f4", offset=20).reshape(-1, 3)
-    x, bound = posed(received, moves.astype(float))
-    exact = (session.deformer.surface(p) - surface.centre) / surface.scale
-    error = np.linalg.norm(x - exact[surface.order], axis=1)
-    assert (error <= bound + ROUNDING).all()
 
 
 def test_far_from_the_origin_no_digits_are_lost():
@@ -172,18 +139,9 @@ def test_the_seam_of_a_surface_with_one_side_is_drawn_twice():
     received = read_surface(encoded(session).message(1))
     assert len(received.twice) == 5
     assert received.faces.max() == mesh.n_vertices + 4
-    assert received.closed == 0
 
 
-def test_what_is_too_large_for_a_page_is_refused(session, monkeypatch):
+def test_what_is_too_large_for_a_page_is_not_drawable(session, monkeypatch):
+    assert SurfaceStream(session).is_possible
     monkeypatch.setattr(encoding, "MOST_WEIGHTS", 100)
-    with pytest.raises(ArgumentError, match="let the server draw this one"):
-        encoded(session)
-
-
-def test_cages_and_colours_of_another_mesh_are_refused(session):
-    surface = encoded(session)
-    with pytest.raises(CageError, match="the cages must have"):
-        surface.cage_message(1, 1, [cage.vertices for cage in session.cages[:1]])
-    with pytest.raises(ArgumentError, match="colours must be uint8"):
-        surface.colour_message(1, np.zeros((3, 3), np.uint8))
+    assert not SurfaceStream(session).is_possible

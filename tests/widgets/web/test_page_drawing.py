@@ -40,17 +40,12 @@ class Drawn:
         self.web.editor.controller.finishing.is_wanted = False  # which moves the pose at rest
         self.page: Page = served.page(browser, size=SIZE)
         self.page.evaluate("document.querySelector('.sd-cards').click()")
-        self.spare(pixels=1e9)
         self.await_surface()
         window = self.web.plotter.render_window
         served.call(lambda: window.AddObserver("StartEvent", self._count))
 
     def _count(self, *_: object) -> None:
         self.renders += self.drawing.is_dragging
-
-    def spare(self, pixels: float) -> None:
-        """Let the page draw fewer pixels if a picture takes longer than *pixels* milliseconds."""
-        self.page.evaluate(f"SegdeformSurface.slow.pixels = {pixels}")
 
     def await_surface(self) -> None:
         """Wait until the page has the surface."""
@@ -157,28 +152,6 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     drawn.served.wait(lambda: session.history.position == 0)
     drawn.rest()
     assert overlap(before, drawn.body()) > 0.99
-
-
-@pytest.mark.campaign
-def test_the_layer_of_a_drag_is_opaque_and_its_texts_take_little_room(drawn: Drawn) -> None:
-    end = drawn.drag((70.0, 20.0))
-    drawn.hold(end)
-    page = drawn.page
-    page.key("x")
-    page.wait(WORDS)
-    texts, backdrop = f"{BODY}.nextElementSibling", f"{BODY}.previousElementSibling"
-    width, height = page.evaluate(f"[{texts}.width, {texts}.height]")
-    whole = page.evaluate(f"[{BODY}.width, {BODY}.height]")
-    assert 1 < width < 0.5 * whole[0]
-    assert 1 < height < 0.2 * whole[1]
-    shown = page.evaluate(
-        f"(({{width, height}}) => [width, height])({texts}.getBoundingClientRect())"
-    )
-    assert shown == pytest.approx([width, height], abs=1.0)
-    assert page.evaluate(f"{backdrop}.getContext('2d').getContextAttributes().alpha") is False
-    page.key("Escape")
-    page.release(end)
-    drawn.rest()
 
 
 def test_messages_reach_the_page_as_array_buffers(drawn: Drawn) -> None:
@@ -297,35 +270,6 @@ def test_of_two_pages_none_draws(drawn: Drawn) -> None:
     drawn.rest()
     other.close()
     drawn.await_surface()
-
-
-@pytest.mark.campaign
-def test_slow_software_draws_a_quarter_of_the_pixels_in_the_same_place(drawn: Drawn) -> None:
-    page, session = drawn.page, drawn.web.session
-    drawn.rest()
-    before = drawn.body()
-    drawn.spare(pixels=-1.0)
-    end = drawn.drag((70.0, 20.0))
-    drawn.hold(end)
-    for k in range(1, 9):  # one of eight pictures is timed
-        page.move((end[0] + k % 2, end[1]))
-        drawn.hold((end[0] + k % 2, end[1]))
-    assert page.evaluate(f"2 * {BODY}.width <= {BACKDROP}.width + 1")
-    held = drawn.body()
-    assert overlap(before, held) < 0.93
-    page.release(end)
-    drawn.rest()
-    assert drawn.renders == 0
-    assert overlap(held, drawn.body()) > 0.97
-    page.key("z")
-    drawn.served.wait(lambda: session.history.position == 0)
-    end = drawn.drag((70.0, 20.0))  # whose first picture is cut out of the server's
-    drawn.hold(end)
-    assert overlap(held, drawn.body()) > 0.97
-    page.key("Escape")
-    page.release(end)
-    drawn.rest()
-    assert overlap(before, drawn.body()) > 0.99
 
 
 def test_the_page_has_reported_no_error(drawn: Drawn) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,6 +24,9 @@ from vtk_segdeform.widgets.web.key_names import vtk_key
 from vtk_segdeform.widgets.web.stream import Stream
 from vtk_segdeform.widgets.web.timers import Timers
 
+IDLE: Any = SimpleNamespace(  # what a page draws that cannot
+    is_dragging=False, is_possible=False, announce=lambda: None, note_picture=lambda: None
+)
 _MIDDLE = {"x": 0.5, "y": 0.25}
 # What a browser calls the keys whose names in a table are words.
 _BROWSER = {
@@ -105,7 +109,6 @@ def test_timers_fire_while_they_run_and_not_otherwise(view: View) -> None:
     stop()
     stop_other()
     assert loop.due == []
-    assert timers.running == ()
     view.interactor.CreateOneShotTimer(30)
     loop.run(1.0)
     assert loop.due == []
@@ -114,54 +117,21 @@ def test_timers_fire_while_they_run_and_not_otherwise(view: View) -> None:
     assert loop.due == []
 
 
-def test_a_timer_of_vtk_that_ends_does_not_end_ours(view: View) -> None:
-    loop, timers = started(view)
-    ticks: list[float] = []
-    view.every(20, lambda: ticks.append(loop.now))
-    other = view.interactor.CreateRepeatingTimer(500)
-    view.interactor.DestroyTimer(other)
-    loop.run(0.1)
-    assert len(ticks) == 5
-    timers.stop()
-
-
 def test_timers_wait_for_input_but_not_for_long(view: View) -> None:
     loop, timers = started(view)
     ticks: list[float] = []
     view.every(40, lambda: ticks.append(loop.now))
-    for _ in range(60):  # input every 0.03 seconds
+    for _ in range(80):  # input every 0.03 seconds
         loop.run(0.03)
         timers.postpone()
-    assert ticks == pytest.approx([0.5, 1.0, 1.5])
+    assert ticks == pytest.approx([1.0, 2.0])
     loop.run(0.1)
-    assert ticks[3:] == pytest.approx([1.84, 1.88])
+    assert ticks[2:] == pytest.approx([2.44, 2.48])
     view.interactor.CreateOneShotTimer(30)
     for _ in range(3):
         loop.run(0.02)
         timers.postpone()
     assert len(loop.due) == 1  # a timer that fires once does not wait
-    timers.stop()
-
-
-def test_slow_ticks_take_a_twentieth_of_the_time_while_input_arrives(view: View) -> None:
-    loop, timers = started(view)
-    ticks = []
-
-    def tick() -> None:
-        ticks.append(loop.now)
-        loop.now += duration
-
-    view.every(40, tick)
-    duration = 0.06
-    while loop.now < 3.5:
-        loop.run(0.01)
-        timers.postpone()
-    assert ticks == pytest.approx([0.5, 1.7, 2.9], abs=0.02)
-    duration = 1.0
-    while len(ticks) < 5:
-        loop.run(0.01)
-        timers.postpone()
-    assert ticks[4] - ticks[3] == pytest.approx(2.0, abs=0.02)  # no longer than that
     timers.stop()
 
 
@@ -190,7 +160,7 @@ def test_a_move_is_replaced_by_one_that_takes_two_more_turns_to_be_read(view: Vi
     places: list[int] = []
 
     async def story() -> None:
-        stream = Stream(view, Timers(view.interactor), lambda *_: None, lambda: None)
+        stream = Stream(view, Timers(view.interactor), lambda *_: None, lambda: None, IDLE)
         stream.start(asyncio.get_running_loop())
         place = view.interactor.GetEventPosition
         view.interactor.AddObserver("MouseMoveEvent", lambda *_: places.append(place()[0]))
@@ -222,7 +192,7 @@ def test_what_arrives_during_a_drawing_comes_before_timers_and_after_its_picture
     async def story() -> None:
         loop = asyncio.get_running_loop()
         timers = Timers(view.interactor)
-        stream = Stream(view, timers, lambda _, number: seen.append(number), lambda: None)
+        stream = Stream(view, timers, lambda _, number: seen.append(number), lambda: None, IDLE)
         stream.start(loop)
         stream.open(200, 100)
         while seen != [1]:
@@ -253,7 +223,11 @@ def test_a_picture_names_the_last_event_that_it_shows(view: View) -> None:
 
     async def story() -> None:
         stream = Stream(
-            view, Timers(view.interactor), lambda picture, _: sent.append(picture), lambda: None
+            view,
+            Timers(view.interactor),
+            lambda picture, _: sent.append(picture),
+            lambda: None,
+            IDLE,
         )
         stream.start(asyncio.get_running_loop())
         stream.open(200, 100)
@@ -363,7 +337,7 @@ def test_many_requests_make_one_picture_and_none_is_drawn_ahead_of_the_page(view
 
     async def story() -> None:
         stream = Stream(
-            view, Timers(view.interactor), lambda _, number: sent.append(number), lambda: None
+            view, Timers(view.interactor), lambda _, number: sent.append(number), lambda: None, IDLE
         )
         stream.start(asyncio.get_running_loop())
 

@@ -112,41 +112,6 @@ def settle(editor):
     raise AssertionError(editor.status)
 
 
-def test_while_the_hand_drags_only_the_status_of_the_page_follows(web):
-    """The rest follows after the release."""
-    editor, state, inputs = web.editor, web.server.state, web.stream.inputs
-    web.plotter.render_window.Render()
-    settle(editor)
-    top = editor.session.vertices[:, 2].argmax()
-    x, y = editor.view.to_display(editor.session.vertices[[top]])[0][:2]
-    width, height = editor.view.window.GetSize()
-
-    def send(name, shift=0.0):
-        inputs.put({"name": name, "x": float((x + shift) / width), "y": float(1 - y / height)})
-        inputs.send_next()
-
-    async def follow():
-        web.model.changed()
-        await asyncio.sleep(0.25)
-
-    async def dragged():
-        web.model.start(asyncio.get_running_loop())
-        await follow()
-        history, status = state.history, state.status
-        send("MouseMove")
-        send("LeftButtonPress")
-        send("MouseMove", 60.0)
-        await follow()
-        assert state.status != status
-        assert state.history == history
-        send("LeftButtonRelease", 60.0)
-        await asyncio.sleep(0.25)
-        assert state.history != history
-
-    asyncio.run(dragged())
-    settle(editor)
-
-
 def test_a_download_waits_until_the_pose_has_settled(web, tmp_path):
     editor, session = web.editor, web.session
     settle(editor)

@@ -205,20 +205,6 @@ def test_an_upload_above_the_limit_is_refused_by_its_size_and_as_it_arrives(serv
         assert do(send(body)) == (413, "a.ply is larger than 1 MB, the limit of this server.")
 
 
-def test_half_sent_requests_keep_out_nobody(served):
-    async def story():
-        half = b"GET / HTTP/1.1\r\nHost: local"
-        crowd = [await asyncio.open_connection("127.0.0.1", served.port) for _ in range(300)]
-        for _, writer in crowd:
-            writer.write(half)
-        async with connected(f"{served.address}ws") as (_, answers):
-            assert await answers() == []
-        for _, writer in crowd:
-            writer.transport.abort()
-
-    do(story())
-
-
 def test_a_crowd_larger_than_the_usual_limit_of_files_keeps_out_nobody(tmp_path):
     """1,200 half-sent requests, without the secret, to a program that may open 1,024 files."""
     resource = pytest.importorskip("resource")

@@ -143,7 +143,7 @@ def test_an_upload_that_breaks_off_leaves_nothing_and_the_next_one_works(told, t
 def test_an_upload_that_stops_is_ended(told, tmp_path, monkeypatch):
     async def story(editor, names, send):
         slow = Slow(b"first ", b"file")
-        monkeypatch.setattr(transfer, "_PATIENCE", 0.05)
+        monkeypatch.setattr(transfer, "_UPLOAD_TIMEOUT", 0.05)
         assert await send("one.ply", slow.parts()) == (408, "The upload stopped. Try it again.")
         assert [*(tmp_path / "uploads").glob("*")] == []
         monkeypatch.undo()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,10 @@ import pytest
 
 pytest.importorskip("trame")
 from chromium import ALT, CTRL, Chromium, Page, needs_chromium
-from solids import OCTAHEDRON, icosphere
+from solids import OCTAHEDRON
 from web_hands import Served, line, only_file
 
-from vtk_segdeform import Mesh, models, read_mesh
+from vtk_segdeform import Mesh, read_mesh
 from vtk_segdeform.io import write_mesh
 from vtk_segdeform.models.implicit import Limb, standing_body
 from vtk_segdeform.session import Change, load_session
@@ -210,32 +210,6 @@ def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(
     write_mesh(tmp_path / "arm.ply", standing_body(LIMBS, 250, blend=0.05))
     (tmp_path / "down").mkdir()
     tell_a_story(served, page, tmp_path / "arm.ply", tmp_path / "down", n_cage_vertices=50)
-
-
-def _bumpy(n: int) -> Mesh:
-    """Return a rough ellipsoid."""
-    vertices, faces = icosphere(n)
-    rough = 1.0 + 0.06 * np.sin(7.0 * vertices @ np.array([[1.0, 0.4], [0.3, 1.0], [0.8, 0.1]]))
-    return Mesh(vertices * rough.prod(axis=1)[:, None] * [0.5, 0.4, 1.0], faces)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: models.cactus(5000),
-        lambda: models.dinosaur(3000),
-        lambda: _bumpy(3),
-        lambda: _bumpy(4),
-    ],
-    ids=["cactus", "dinosaur", "bumpy", "fine bumpy"],
-)
-def test_stories_of_other_meshes(
-    served: Served, page: Page, tmp_path: Path, make: Callable[[], Mesh]
-) -> None:
-    write_mesh(tmp_path / "other.ply", make())
-    (tmp_path / "down").mkdir()
-    tell_a_story(served, page, tmp_path / "other.ply", tmp_path / "down")
 
 
 @pytest.mark.campaign

@@ -15,7 +15,6 @@
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
     paths           `blending.border_distance`
-    beams           `line_of_sight.faces_in_beam`
     shells          `shells.shell_volumes`, `shells.shell_depths`
     triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`,
                     `polygons.cut_into_triangles`
@@ -26,7 +25,6 @@ They release the GIL and start no threads; `threads.in_parallel` runs several at
 are positional, as numba requires, and outputs are arrays passed as arguments.
 """
 
-from .beams import faces_in_beam
 from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
 from .crossings import grow_tree, may_meet, touching_boxes
@@ -96,7 +94,6 @@ __all__ = [
     "edge_rows",
     "face_areas",
     "face_sides",
-    "faces_in_beam",
     "facet_corners",
     "facing_pairs",
     "first_equal_points",

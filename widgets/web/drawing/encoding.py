@@ -9,10 +9,7 @@ Every row of W~ is sent with all its entries, as whole numbers of 16 bits times 
 
 so that a vertex is displaced by no more than ``s_i / 2 * sum_j |p_j - p_rest_j|``, over the cage
 vertices j that move it; at rest by nothing.  On drags by up to 0.9 diagonals of the mesh that is
-4e-5 diagonals and 0.5 degrees of a normal at most, and 4e-6 and 0.02 root mean square.  The 16
-largest entries of each row alone, corrected to reproduce affine maps, err by 4 to 12 % of the
-diagonal and 3 to 15 degrees root mean square, because mean value coordinates fall off slowly; so
-do 16 columns of a factorisation of low rank, by 3 to 21 %.
+4e-5 diagonals and 0.5 degrees of a normal at most.
 
 All lengths in messages are in diagonals of the mesh, from the middle of its bounds.
 """
@@ -21,18 +18,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vtk_segdeform import sizes
 from vtk_segdeform.arrays import FloatArray, IntArray, as_points, bounds_of
 from vtk_segdeform.cages import Cage
-from vtk_segdeform.errors import ArgumentError, CageError
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.subspace import Subspace
 
-from ...scene import decimated_triangles
 from .messages import Kind, message
 
 MOST_VERTICES = 1 << 17
@@ -40,9 +35,8 @@ MOST_VERTICES = 1 << 17
 MOST_WEIGHTS = 1 << 24
 """Entries of W~ that a page receives at most: 32 megabytes."""
 _GROUP = 4  # entries of a row are read four at a time; rows are padded to a multiple
-_LARGEST = 32767
+_LARGEST_INT16 = 32767
 _ROWS = 1 << 14  # encoded together
-_CELLS = 1023  # along an axis, for `_along_curve`
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,61 +48,26 @@ class EncodedSurface:
     centre, scale : (3,) float, float
         A point u of a message is ``centre + scale * u`` in the scene.
     order : (n,) int
-        The vertices of the mesh in the order of the message: those of *coarse* first, and both
-        parts set by set.
-    rest : (n, 3) float32
-        The vertices at rest, in units of the message.
-    steps : (n,) float32
-        s.
-    sets : (n,) uint16
-        The set of each vertex; vertices of a set are moved by the same cage vertices.
-    columns : sequence of (c,) uint16
-        For each set its cage vertices, c a multiple of four; padding has weight 0.
-    weights : (w,) int16
-        q, row after row.
-    faces : (f, 3) uint32
-        Triangles of the vertices, and from n on of *twice*.
-    coarse : (c, 3) uint32
-        Fewer triangles between the first vertices, for slow software; none for a small mesh.
-    twice : (t,) uint32
-        Vertices that are drawn a second time, with the opposite normal.
+        The vertices of the mesh in the order of the message: set by set.
     cages : (m, 3) float
         The cage vertices at rest, in the scene.
-    is_closed : bool
-        Whether the back of every face is inside, so that software need not draw it.
+    arrays : sequence of array
+        Those of the message, `Kind.SURFACE`.
     """
 
     centre: FloatArray
     scale: float
     order: IntArray
-    rest: NDArray[np.float32]
-    steps: NDArray[np.float32]
-    sets: NDArray[np.uint16]
-    columns: Sequence[NDArray[np.uint16]]
-    weights: NDArray[np.int16]
-    faces: NDArray[np.uint32]
-    coarse: NDArray[np.uint32]
-    twice: NDArray[np.uint32]
     cages: FloatArray
-    is_closed: bool
+    arrays: Sequence[NDArray[Any]]
 
     def message(self, serial: int) -> bytes:
         """Return the message; *serial* tells this surface from earlier ones."""
-        n, t, f, m = len(self.rest), len(self.twice), len(self.faces), len(self.cages)
-        lengths = np.array([len(each) for each in self.columns], dtype=np.uint32)
-        columns = np.concatenate(self.columns)
-        rows = m, len(lengths), len(columns), len(self.weights)
-        counts = np.array([n, t, f, len(self.coarse), *rows, self.is_closed], dtype=np.uint32)
-        return message(
-            Kind.SURFACE, serial, counts, self.rest, self.steps, self.sets, lengths, columns,
-            self.weights, self.faces, self.coarse, self.twice,
-        )  # fmt: skip
+        return message(Kind.SURFACE, serial, *self.arrays)
 
     def cage_message(self, serial: int, number: int, cage_vertices: Sequence[ArrayLike]) -> bytes:
         """Return the message of a pose, (m_r, 3) for each cage; *number* counts the poses."""
         p = np.concatenate([np.asarray(each, dtype=np.float64) for each in cage_vertices])
-        if p.shape != self.cages.shape:
-            raise CageError(f"the cages must have {len(self.cages)} vertices; got {len(p)}")
         moves = ((p - self.cages) / self.scale).astype(np.float32)
         return message(Kind.CAGES, serial, np.array([number], np.uint32), moves)
 
@@ -116,8 +75,8 @@ class EncodedSurface:
         """Return the message of *offsets* (n, 3), in the scene, that are added to every pose."""
         if offsets is None:
             return message(Kind.OFFSETS, serial, np.zeros(1, np.float32))
-        shift = as_points(offsets, "offsets", len(self.rest)) / self.scale
-        step = max(float(np.abs(shift).max()) / _LARGEST, float(np.finfo(np.float32).tiny))
+        shift = as_points(offsets, "offsets", len(self.order)) / self.scale
+        step = max(float(np.abs(shift).max()) / _LARGEST_INT16, float(np.finfo(np.float32).tiny))
         rounded = np.rint(shift[self.order] / step).astype(np.int16)
         return message(Kind.OFFSETS, serial, np.array([step], np.float32), rounded)
 
@@ -125,11 +84,6 @@ class EncodedSurface:
         """Return the message of vertex *colours* (n, 3) uint8, or of none."""
         if colours is None:
             return message(Kind.COLOURS, serial)
-        if colours.shape != self.rest.shape or colours.dtype != np.uint8:
-            expected = self.rest.shape
-            raise ArgumentError(
-                f"colours must be uint8 of shape {expected}; got {colours.dtype}, {colours.shape}"
-            )
         opaque = np.full((len(colours), 4), 255, dtype=np.uint8)
         opaque[:, :3] = colours[self.order]
         return message(Kind.COLOURS, serial, opaque)
@@ -144,7 +98,7 @@ def is_drawable(mesh: Mesh, subspace: Subspace) -> bool:
 def encode_surface(
     mesh: Mesh, subspace: Subspace, cages: Sequence[Cage], turned: IntArray
 ) -> EncodedSurface:
-    """Return *mesh* with its W~ as a page needs them.
+    """Return *mesh*, which `is_drawable`, with its W~ as a page needs them.
 
     Parameters
     ----------
@@ -156,81 +110,41 @@ def encode_surface(
         At rest, in the order of the columns of W~.
     turned : (k,) int
         The corners of faces that are drawn with opposite normals, `VertexNormals.turned`.
-
-    Raises
-    ------
-    ArgumentError
-        If the mesh or its W~ is too large; see `is_drawable`.
     """
-    if not is_drawable(mesh, subspace):
-        raise ArgumentError(
-            f"a page can draw meshes of up to {MOST_VERTICES} vertices whose vertices and cage "
-            f"vertices have up to {MOST_WEIGHTS} pairs; let the server draw this one"
-        )
     low, high = bounds_of(mesh.vertices)
     centre, scale = 0.5 * (low + high), float(mesh.diagonal)
-    near = _along_curve(mesh.vertices)
-    coarse, is_late = np.empty((0, 3), dtype=np.int64), np.ones(mesh.n_vertices, dtype=bool)
-    if mesh.n_vertices > sizes.DRAFT:
-        kept, coarse = decimated_triangles(mesh, sizes.PAGE_POINTS)
-        coarse = kept[coarse]
-        is_late[coarse] = False
-    parts: list[tuple[int, IntArray]] = []  # numbers of sets, and vertices of them
+    parts = subspace.sets_by_cages()  # vertices of each set
     columns: list[NDArray[np.uint16]] = []
-    for k, ids in enumerate(subspace.sets_by_cages()):
-        own = subspace.nonzeros(ids[:1])[0]
+    for members in parts:
+        own = subspace.nonzeros(members[:1])[0]
         columns.append(np.pad(own, (0, -len(own) % _GROUP)).astype(np.uint16))
-        members = ids[np.argsort(near[ids], kind="stable")]
-        parts += [(k, members[is_late[members] == late]) for late in (False, True)]
-    parts.sort(key=lambda part: bool(is_late[part[1]].any()))
     steps, weights = [], []
-    for k, members in parts:
+    for k, members in enumerate(parts):
         for start in range(0, len(members), _ROWS):
             w = subspace.nonzeros(members[start : start + _ROWS])[1]
-            step = (np.abs(w).max(axis=1) / _LARGEST).astype(np.float32)
+            step = (np.abs(w).max(axis=1) / _LARGEST_INT16).astype(np.float32)
             steps.append(step.copy())
             step[step == 0.0] = 1.0
-            q = np.rint(w / step[:, None]).astype(np.int16)
-            weights.append(np.pad(q, ((0, 0), (0, len(columns[k]) - w.shape[1]))).ravel())
-    drawn = np.concatenate([members for _, members in parts])
+            whole = np.rint(w / step[:, None]).astype(np.int16)
+            weights.append(np.pad(whole, ((0, 0), (0, len(columns[k]) - w.shape[1]))).ravel())
+    drawn = np.concatenate(parts)
     place = np.empty(mesh.n_vertices, dtype=np.int64)
     place[drawn] = np.arange(mesh.n_vertices)
     twice, second = np.unique(place[mesh.faces.ravel()[turned]], return_inverse=True)
     faces = place[mesh.faces.ravel()]
     faces[turned] = mesh.n_vertices + second
-    return EncodedSurface(
-        centre,
-        scale,
-        drawn,
+    rest = np.concatenate([cage.vertices for cage in cages])
+    lengths, q = [len(own) for own in columns], np.concatenate(weights)
+    counts = [len(drawn), len(twice), mesh.n_faces, len(rest), len(parts), sum(lengths), len(q)]
+    arrays = (
+        np.array(counts, dtype=np.uint32),
         ((mesh.vertices[drawn] - centre) / scale).astype(np.float32),
         np.concatenate(steps),
-        np.concatenate([np.full(len(ids), k, dtype=np.uint16) for k, ids in parts]),
-        columns,
-        np.concatenate(weights),
-        _sorted(faces.reshape(-1, 3), mesh.faces, mesh.vertices),
-        _sorted(place[coarse], coarse, mesh.vertices),
+        np.concatenate([np.full(len(ids), k, dtype=np.uint16) for k, ids in enumerate(parts)]),
+        np.array(lengths, dtype=np.uint32),
+        np.concatenate(columns),
+        q,
+        faces.astype(np.uint32),
         twice.astype(np.uint32),
-        np.concatenate([cage.vertices for cage in cages]),
-        mesh.is_closed,
     )
-
-
-def _sorted(numbers: IntArray, faces: IntArray, points: FloatArray) -> NDArray[np.uint32]:
-    """Return *numbers* (f, 3) in the order of the *faces* (f, 3) of *points* along a curve."""
-    if not len(faces):
-        return numbers.astype(np.uint32)
-    middles = points[faces].mean(axis=1)
-    return numbers[np.argsort(_along_curve(middles), kind="stable")].astype(np.uint32)
-
-
-def _along_curve(points: FloatArray) -> IntArray:
-    """Return numbers (n,) of *points* (n, 3) along a curve (Morton's); close ones are near.
-
-    Drawn in this order, vertices and faces are found in caches: a third as many are computed.
-    """
-    low = points.min(axis=0)
-    size = max(float(np.ptp(points, axis=0).max()), float(np.finfo(float).tiny))
-    cells = ((points - low) / size * _CELLS).astype(np.int64)
-    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
-        cells = (cells | cells << shift) & mask
-    return np.asarray(cells @ np.array([1, 2, 4]))
+    return EncodedSurface(centre, scale, drawn, rest, arrays)

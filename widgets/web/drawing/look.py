@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from vtk_segdeform.arrays import FloatArray
 
-from ...scene import TURN
 from .encoding import EncodedSurface
 from .messages import Kind, message
 
@@ -23,8 +22,6 @@ class Look:
     ----------
     view, projection : (4, 4) float
         From the scene to the camera, and from there to the clip space of OpenGL.
-    axis, pivot : (3,) float
-        The axis about which the camera orbits, of length 1, and a point of it, in the scene.
     colour : (3,) float
         Of the body, 0 to 1.
     ambient, diffuse : float
@@ -36,8 +33,6 @@ class Look:
 
     view: FloatArray
     projection: FloatArray
-    axis: FloatArray
-    pivot: FloatArray
     colour: FloatArray
     ambient: float
     diffuse: float
@@ -52,10 +47,8 @@ class Look:
         numbers: list[ArrayLike] = [
             (self.view @ to_scene).T.ravel(),
             projection.T.ravel(),
-            self.axis,
-            (self.pivot - surface.centre) / surface.scale,
             self.colour,
-            [self.ambient, self.diffuse, TURN],
+            [self.ambient, self.diffuse],
             self.lights.ravel(),
         ]
         return message(
@@ -65,7 +58,7 @@ class Look:
         )
 
 
-def look_of(renderer: Any, material: Any, axis: FloatArray, pivot: FloatArray) -> Look:
+def look_of(renderer: Any, material: Any) -> Look:
     """Return how *renderer* shows a body.
 
     Parameters
@@ -74,8 +67,6 @@ def look_of(renderer: Any, material: Any, axis: FloatArray, pivot: FloatArray) -
         In a window.
     material : vtkProperty
         Of the body.
-    axis, pivot : (3,) float
-        As in `Look`.
     """
     camera = renderer.GetActiveCamera()
     view = matrix_of(camera.GetViewTransformMatrix())
@@ -85,8 +76,6 @@ def look_of(renderer: Any, material: Any, axis: FloatArray, pivot: FloatArray) -
     return Look(
         view,
         projection,
-        np.asarray(axis, dtype=float),
-        np.asarray(pivot, dtype=float),
         np.array(material.GetDiffuseColor()),
         material.GetAmbient(),
         material.GetDiffuse(),

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-VERSION = 2
+VERSION = 3
 _MAGIC = b"SDFM"
 _HEADER = struct.Struct("<4sHHII")
 
@@ -28,7 +28,18 @@ class Kind(enum.IntEnum):
     """What a message contains; arrays in this order."""
 
     SURFACE = 1
-    """Nine counts, and the arrays of `EncodedSurface`."""
+    """The mesh and its W~; see `encoding`.
+
+    counts (7,) uint32    vertices n, `twice`, faces, cage vertices, sets, `columns`, `weights`
+    rest (n, 3) float32   the vertices at rest
+    steps (n,) float32    s
+    sets (n,) uint16      the set of each vertex; those of a set follow the same cage vertices
+    lengths uint32        how many of `columns` each set has, a multiple of four
+    columns uint16        the cage vertices of each set; padding has weight 0
+    weights int16         q, row after row
+    faces (f, 3) uint32   triangles of the vertices, and from n on of `twice`
+    twice uint32          vertices that are drawn a second time, with the opposite normal
+    """
     CAGES = 2
     """The number of the pose, and the moves of the cage vertices (m, 3) float32."""
     OFFSETS = 3

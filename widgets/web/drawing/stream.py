@@ -34,13 +34,7 @@ _VISIBLE = 1e-4  # diagonals
 
 
 class SurfaceStream:
-    """The messages for one page; after `reset`, for a page that knows nothing.
-
-    Parameters
-    ----------
-    session : Session
-        The session whose body is drawn.
-    """
+    """The messages for one page; after `reset`, for a page that knows nothing."""
 
     def __init__(self, session: Session) -> None:
         self.session = require(session, Session, "session")
@@ -76,10 +70,6 @@ class SurfaceStream:
         self._marks.reset()
         self._cages: tuple[FloatArray, ...] = ()
         self._offsets: FloatArray | None = None
-
-    def repeat_look(self) -> None:
-        """Send the look again: to a page that has turned the camera itself."""
-        self._look = b""
 
     def encode(self) -> None:
         """Encode the mesh and its cages, if `is_possible`; 0.1 s for 50,000 vertices.

@@ -67,8 +67,7 @@ export default class Drawing {
   show({ number, messages, labels, width, height, is_first: isFirst, time }) {
     if (!this.surface || !this.receive(messages)) return;
     resize(this.backdrop, width, height);
-    const share = this.surface.share; // of the pixels, each way
-    resize(this.body, Math.round(share * width), Math.round(share * height));
+    resize(this.body, width, height);
     this.number = number;
     this.time = time;
     this.write(labels, width, height);

@@ -17,16 +17,16 @@
 
 (() => {
   const MAGIC = 0x4d464453; // "SDFM"
-  const VERSION = 2;
+  const VERSION = 3;
   const HEADER = 16;
   const SURFACE = 1, CAGES = 2, OFFSETS = 3, COLOURS = 4, LOOK = 5, MARKS = 6;
   const ROW = 1024; // texels in a row of a texture; a power of two
   const ROW_BITS = 10;
   const GROUP = 4; // weights in a texel
-  const LOOK_NUMBERS = 44;
+  const LOOK_NUMBERS = 37;
   const MARK_NUMBERS = 30;
   const LIGHTS = 4;
-  const MEASURED = 8; // one of so many pictures is timed, the third one first
+  const MOST_IN_SOFTWARE = 20000; // vertices drawn without a graphics processor
   const POSITION = 0, DIRECTION = 1, COLOUR = 2; // attributes of the body
 
   const HEAD = `#version 300 es
@@ -279,9 +279,6 @@ void main() {
   }
 
   class SegdeformSurface {
-    // Milliseconds for a picture beyond which software draws fewer pixels, and fewer triangles.
-    static slow = { pixels: 15, triangles: 40 };
-
     // Return a surface that draws in a canvas, or null where WebGL 2 cannot do it.
     static create(canvas, { antialias } = {}) {
       const options = { alpha: true, premultipliedAlpha: true, depth: true };
@@ -303,12 +300,9 @@ void main() {
       this.isSoftware = isSoftware;
       this.serial = null; // of the surface in use
       this.pose = null; // number of the pose that the next picture shows
-      this.share = 1; // of the pixels of the view that the canvas should have, each way
-      this.pictures = 0;
       this.ondraw = null; // called after each picture with the number of its pose
       this.onlost = null; // called when the graphics memory was lost: the server must send all again
       this._look = null;
-      this._held = null; // during a turn in the page: the last look from the server
       this._request = 0;
       this._begin();
       canvas.addEventListener("webglcontextlost", (event) => {
@@ -375,7 +369,6 @@ void main() {
       gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       if (this.serial === null || !this._look) return;
-      const began = performance.now();
       if (this._isMoved) this._pose();
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
       gl.viewport(0, 0, this.canvas.width, this.canvas.height);
@@ -384,57 +377,27 @@ void main() {
       for (const mark of this._marks) if (!mark.isAbove) this._drawMark(mark, projection);
       gl.clear(gl.DEPTH_BUFFER_BIT);
       for (const mark of this._marks) if (mark.isAbove) this._drawMark(mark, projection);
-      this._spareSoftware(began);
-      this.pictures++;
       this.ondraw?.(this.pose);
-    }
-
-    // Turn the camera in the page: dx and dy in heights of the canvas, dy upwards.  Looks from the
-    // server are kept for `endTurn`; until then the server need not draw.
-    turn(dx, dy) {
-      const look = this._look;
-      if (!look) return;
-      this._held ??= look;
-      const rows = [0, 1, 2].map((r) => [look.view[r], look.view[r + 4], look.view[r + 8]]);
-      const unit = rows.map((row) => scaled(row, 1 / Math.hypot(...row)));
-      const height = Math.asin(Math.max(-1, Math.min(1, dot(unit[2], look.axis))));
-      const most = Math.PI / 2;
-      const tilted = Math.max(-most, Math.min(most, height - dy * look.turn));
-      // The camera turns by tilt, then about the axis; the view is turned by the inverse.
-      const back = product(
-        rotation(unit[0], tilted - height), rotation(look.axis, dx * look.turn));
-      const view = look.view.slice();
-      for (let r = 0; r < 3; r++) {
-        const row = [0, 1, 2].map((c) => dot(rows[r], back.map((each) => each[c])));
-        for (let c = 0; c < 3; c++) view[r + 4 * c] = row[c];
-        view[r + 12] += dot(rows[r], look.pivot) - dot(row, look.pivot);
-      }
-      this._look = { ...look, view };
-      this.request();
-    }
-
-    // End a turn; the camera is again that of the server once its next look arrives.
-    endTurn() {
-      this._held = null;
     }
 
     // Reading messages.
 
     _readSurface(reader, serial) {
       const gl = this.gl;
-      const [n, t, f, nCoarse, m, nSets, nColumns, nWeights, isClosed] =
-        reader.take(Uint32Array, 9);
-      require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23 && m <= 1 << 16 && isClosed <= 1,
+      const [n, t, f, m, nSets, nColumns, nWeights] = reader.take(Uint32Array, 7);
+      require(n > 0 && f > 0 && n + t < 1 << 22 && f < 1 << 23 && m <= 1 << 16,
         "a surface of impossible size");
+      require(!this.isSoftware || n <= MOST_IN_SOFTWARE,
+        "this surface is too large without a graphics processor");
       const rest = reader.take(Float32Array, 3 * n), steps = reader.take(Float32Array, n);
       const sets = reader.take(Uint16Array, n), lengths = reader.take(Uint32Array, nSets);
       const columns = reader.take(Uint16Array, nColumns);
       const weights = reader.take(Int16Array, nWeights);
       const faces = reader.take(Uint32Array, 3 * f);
-      const coarse = reader.take(Uint32Array, 3 * nCoarse), twice = reader.take(Uint32Array, t);
+      const twice = reader.take(Uint32Array, t);
       reader.end();
       require(areFinite(rest) && areFinite(steps), "a surface with coordinates that are no numbers");
-      require(largest(faces) < n + t && largest(coarse) < n, "a face without its vertices");
+      require(largest(faces) < n + t, "a face without its vertices");
       require(t === 0 || largest(twice) < n, "a second copy of no vertex");
       require(largest(sets) < nSets, "a vertex in no set");
       require(nColumns === 0 || largest(columns) < m, "a weight of no cage vertex");
@@ -468,14 +431,12 @@ void main() {
       require(Math.max(...tall) < most, "this surface is too large for the graphics memory");
       this._free();
       this.serial = serial;
-      this._held = null;
       this._n = n;
       this._twice = twice.slice();
       this._m = m;
       this._columns = columns.slice();
       this._rest = this._texture(gl.RGBA32F, places, height);
       this._rows = this._texture(gl.RGBA32UI, rows, height);
-      this._posedRows = height; // of texels, whose vertices are drawn
       this._weights = this._texture(gl.RGBA16I, weights);
       this._fans = this._texture(gl.RGBA32UI, fans);
       this._neighbours = this._texture(gl.RGBA32UI, neighbours);
@@ -491,7 +452,6 @@ void main() {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this._faces);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, faces, gl.STATIC_DRAW);
       this._corners = faces.length;
-      this._coarse = this.isSoftware ? coarse.slice() : coarse.slice(0, 0);
       [this._places, this._directions] = [POSITION, DIRECTION].map((attribute) => {
         const buffer = gl.createBuffer();
         gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
@@ -505,7 +465,6 @@ void main() {
       gl.vertexAttribPointer(COLOUR, 4, gl.UNSIGNED_BYTE, true, 0, 0);
       this._buffers = [this._faces, this._places, this._directions, this._colours];
       gl.bindVertexArray(null);
-      this._hidesBacks = this.isSoftware && isClosed === 1;
       this._hasColours = false;
       this.pose = null;
       this._isMoved = true;
@@ -574,16 +533,13 @@ void main() {
       const directions = new Float32Array(3 * LIGHTS), strengths = new Float32Array(3 * LIGHTS);
       for (let k = 0; k < lights.length / 6; k++) {
         directions.set(lights.subarray(6 * k, 6 * k + 3), 3 * k);
-        strengths.set(scaled(lights.subarray(6 * k + 3, 6 * k + 6), numbers[42]), 3 * k);
+        strengths.set(scaled(lights.subarray(6 * k + 3, 6 * k + 6), numbers[36]), 3 * k);
       }
-      const look = {
+      this._look = {
         view: numbers.slice(0, 16), projection: numbers.slice(16, 32),
-        axis: [...numbers.slice(32, 35)], pivot: [...numbers.slice(35, 38)],
-        colour: [...numbers.slice(38, 41)], ambient: numbers[41], turn: numbers[43],
+        colour: [...numbers.slice(32, 35)], ambient: numbers[35],
         count: lights.length / 6, directions, strengths,
       };
-      if (this._held) this._held = look; // the page turns its own camera
-      else this._look = look;
     }
 
     _readMarks(reader) {
@@ -714,14 +670,14 @@ void main() {
       gl.disable(gl.DEPTH_TEST);
       gl.disable(gl.BLEND);
       gl.bindVertexArray(this._none);
-      gl.viewport(0, 0, ROW, this._posedRows);
+      gl.viewport(0, 0, ROW, this._height);
       gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
       const into = (texture, buffer) => {
         gl.framebufferTexture2D(
           gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, 0);
         gl.drawArrays(gl.TRIANGLES, 0, 3);
         gl.bindBuffer(gl.PIXEL_PACK_BUFFER, buffer);
-        gl.readPixels(0, 0, ROW, this._posedRows, gl.RGBA, gl.FLOAT, 0);
+        gl.readPixels(0, 0, ROW, this._height, gl.RGBA, gl.FLOAT, 0);
         gl.bindBuffer(gl.PIXEL_PACK_BUFFER, null);
       };
       const uniforms = this._use(this._posed, {
@@ -735,29 +691,6 @@ void main() {
       });
       into(this._normals, this._directions);
       this._isMoved = false;
-    }
-
-    // Draw a quarter of the pixels, if pictures take too long without a graphics processor; then
-    // fewer triangles, between the first vertices, and pose only these from now on.
-    _spareSoftware(began) {
-      const gl = this.gl;
-      const isSpared = this.share < 1 && !this._coarse.length;
-      if (!this.isSoftware || isSpared || this.pictures % MEASURED !== 2) return;
-      gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4)); // waits
-      const duration = performance.now() - began;
-      const { pixels, triangles } = SegdeformSurface.slow;
-      if (duration > pixels) this.share = 0.5;
-      if (duration < triangles || !this._coarse.length) return;
-      const n = largest(this._coarse) + 1;
-      const { fans, neighbours } = fansOf(n, this._coarse, []);
-      this._fans = this._texture(gl.RGBA32UI, fans);
-      this._neighbours = this._texture(gl.RGBA32UI, neighbours);
-      this._posedRows = Math.ceil(n / ROW);
-      gl.bindVertexArray(this._body);
-      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, this._coarse, gl.STATIC_DRAW);
-      this._corners = this._coarse.length;
-      this._hidesBacks = false; // they may have gaps
-      this._coarse = this._coarse.slice(0, 0);
     }
 
     // Return the server's projection with planes in front of and behind any pose of the surface.
@@ -794,9 +727,7 @@ void main() {
         gl.disableVertexAttribArray(COLOUR);
         gl.vertexAttrib4f(COLOUR, ...look.colour, 1);
       }
-      if (this._hidesBacks) gl.enable(gl.CULL_FACE);
       gl.drawElements(gl.TRIANGLES, this._corners, gl.UNSIGNED_INT, 0);
-      gl.disable(gl.CULL_FACE);
     }
 
     _drawMark(mark, projection) {
@@ -827,7 +758,7 @@ void main() {
       }
       if (each) {
         gl.uniform2f(uniforms.pixels, this.canvas.width / 2, this.canvas.height / 2);
-        gl.uniform1f(uniforms.size, this.share * mark.size / 2 + 0.5);
+        gl.uniform1f(uniforms.size, mark.size / 2 + 0.5);
         gl.uniform1f(uniforms.lift, 2e-3);
         gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, points.count / mark.shape);
       } else {
@@ -844,22 +775,7 @@ void main() {
     }
   }
 
-  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const scaled = (a, s) => [a[0] * s, a[1] * s, a[2] * s];
-
-  function product(a, b) {
-    return a.map((row) => [0, 1, 2].map((c) => dot(row, b.map((each) => each[c]))));
-  }
-
-  // The rotation matrix, rows first, about an axis of length 1.
-  function rotation([x, y, z], angle) {
-    const c = Math.cos(angle), s = Math.sin(angle), k = 1 - c;
-    return [
-      [c + k * x * x, k * x * y - s * z, k * x * z + s * y],
-      [k * y * x + s * z, c + k * y * y, k * y * z - s * x],
-      [k * z * x - s * y, k * z * y + s * x, c + k * z * z],
-    ];
-  }
 
   globalThis.SegdeformSurface = SegdeformSurface;
 })();
