@@ -40,11 +40,6 @@ from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
 from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import (
-    _clipped_ears,
-    _convex_cuts,
-    _failed,
-    _quad_cuts,
-    cut_into_triangles,
     triangles_of,
 )
 from vtk_segdeform.io.stl import read_stl
@@ -654,51 +649,6 @@ def test_boxes_of_shells_are_equal(twin, monkeypatch):
         assert_array_equal(high[shell], corners.max(axis=0))
 
 
-@pytest.mark.parametrize("kind", ["any", "flat", "whole numbers", "not finite"])
-def test_quads_are_cut_alike(twin, monkeypatch, kind):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    points = 3.0 * np.random.default_rng(4).normal(size=(800, 3))
-    if kind in ("flat", "whole numbers"):
-        points[:, 2] = 0.0
-    if kind == "whole numbers":
-        points = (0.5 * points).round()
-    if kind == "not finite":
-        points[::7] = np.nan, np.inf, 1e200
-    quads = np.arange(len(points)).reshape(-1, 4)
-    quick, slow = twin(lambda: _quad_cuts(points, quads))
-    assert_array_equal(quick, slow)
-    faces, others = twin(
-        lambda: cut_into_triangles(points, np.full(len(quads), 4), quads.ravel())[0]
-    )
-    assert_array_equal(faces, others)
-    assert set(quick.tolist()) >= ({-1, 0, 1, 2} if kind == "whole numbers" else {-1, 0, 1})
-
-
-@pytest.mark.parametrize("kind", ["flat", "bent", "whole numbers", "not finite"])
-def test_convex_polygons_are_cut_alike(twin, monkeypatch, kind):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    rng = np.random.default_rng(4)
-    counts = rng.integers(3, 9, 400)
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    angle = 2.0 * np.pi * (number + 0.9 * rng.random(len(number))) / np.repeat(counts, counts)
-    height = (0.2 if kind == "bent" else 0.0) * rng.normal(size=len(angle))
-    points = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
-    if kind == "whole numbers":
-        points = (2.0 * points).round()
-    if kind == "not finite":
-        points[::9] = np.nan, np.inf, 1e200
-
-    def cuts():
-        faces = np.full((int((counts - 2).sum()), 3), -1)
-        return faces, _convex_cuts(faces, points, counts, order)
-
-    order = np.arange(len(points))
-    (quick, some), (slow, others) = twin(cuts)
-    assert_array_equal(quick, slow)
-    assert_array_equal(some, others)
-    assert 20 < some.sum() < 380
-
-
 @pytest.mark.parametrize("density", [None, 2.0])
 @pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
 def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, density):
@@ -737,23 +687,6 @@ def test_first_members_are_equal(twin, monkeypatch):
         quick, slow = twin(lambda each=each: first_members(each))
         assert_array_equal(quick, slow)
         assert quick.tolist() == [labels.tolist().index(k) for k in range(7)]
-
-
-@pytest.mark.parametrize("height", [0.0, 1e-8, 1.0])
-def test_wrongly_cut_polygons_are_found_alike(twin, monkeypatch, height):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    rng = np.random.default_rng(6)
-    counts = rng.integers(3, 7, 300)
-    corners = np.arange(counts.sum())
-    corners[1::29] = corners[:-1:29]  # repeated corners
-    points = rng.normal(size=(len(corners), 3)) * [1.0, 1.0, height]
-    faces, polygon = _clipped_ears(points, counts, corners)
-    left = np.arange(len(polygon)) % 11 > 0
-    faces, polygon = faces[left], polygon[left]
-    faces[::7] = faces[::7, ::-1]
-    quick, slow = twin(lambda: _failed(points, counts, corners, faces, polygon))
-    assert_array_equal(quick, slow)
-    assert 30 < len(quick) < 270
 
 
 @pytest.mark.parametrize("name", ["closed", "open", "two parts"])

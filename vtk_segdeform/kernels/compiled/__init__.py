@@ -17,8 +17,7 @@
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     shells          `shells.shell_volumes`, `shells.shell_depths`
-    triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`,
-                    `polygons.cut_into_triangles`
+    triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
                     `ply_tables.tables_of`
 
@@ -61,13 +60,9 @@ from .text import (
     rows_of_lists,
 )
 from .triangles import (
-    convex_cuts,
     face_areas,
     first_equal_points,
     flat_faces,
-    quad_cuts,
-    quad_halves,
-    wrongly_cut,
 )
 from .volumes import (
     determinants,
@@ -87,7 +82,6 @@ __all__ = [
     "cell_forces",
     "cell_sums",
     "collapse_costs",
-    "convex_cuts",
     "corners_of_lines",
     "determinants",
     "distances_inside",
@@ -115,8 +109,6 @@ __all__ = [
     "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",
-    "quad_cuts",
-    "quad_halves",
     "ring_normals",
     "rings",
     "rotations",
@@ -137,5 +129,4 @@ __all__ = [
     "volume_gradient",
     "volume_sums",
     "weights",
-    "wrongly_cut",
 ]
