@@ -18,8 +18,7 @@
     beams           `line_of_sight.faces_in_beam`
     shells          `shells.shell_volumes`, `shells.shell_depths`
     triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`
-    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
-                    `ply_tables.tables_of`
+    text            `number_lines.numbers_of`, `number_lines.Lines`, `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -54,7 +53,6 @@ from .rotations import rotations
 from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
 from .text import (
     corners_of_lines,
-    facet_corners,
     numbers_of_lines,
     plain_numbers,
     rows_of_lists,
@@ -90,7 +88,6 @@ __all__ = [
     "face_areas",
     "face_sides",
     "faces_in_beam",
-    "facet_corners",
     "facing_pairs",
     "first_equal_points",
     "first_members",
