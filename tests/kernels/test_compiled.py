@@ -45,8 +45,6 @@ from vtk_segdeform.io.polygons import (
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
-from vtk_segdeform.mesh.grouping import first_members
-from vtk_segdeform.mesh.shells import _boxes
 from vtk_segdeform.regions.blending import blend_weights, border_distance
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
@@ -626,29 +624,6 @@ def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype, piece
             assert quick.tobytes() == slow.tobytes()
 
 
-def test_areas_of_faces_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    quick, slow = twin(lambda: Mesh(MESH.vertices, MESH.faces).face_areas)
-    assert_array_equal(quick, slow)
-    corners = MESH.vertices[MESH.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert_allclose(quick, 0.5 * np.linalg.norm(normals, axis=1), rtol=1e-14)
-
-
-def test_boxes_of_shells_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    vertices, faces = together(icosphere(1), torus(9, 6))
-    faces = faces[RNG.permutation(len(faces))]
-    shells = (faces[:, 0] < len(icosphere(1)[0])).astype(np.int64)
-    for quick, slow in zip(*twin(lambda: _boxes(vertices, faces, shells)), strict=True):
-        assert_array_equal(quick, slow)
-    for shell in range(2):
-        corners = vertices[faces[shells == shell]].reshape(-1, 3)
-        low, high = _boxes(vertices, faces, shells)
-        assert_array_equal(low[shell], corners.min(axis=0))
-        assert_array_equal(high[shell], corners.max(axis=0))
-
-
 @pytest.mark.parametrize("density", [None, 2.0])
 @pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
 def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, density):
@@ -678,31 +653,6 @@ def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
     quick, slow = twin(lambda: _valid(surface, to))
     assert_array_equal(quick, slow)
     assert 0 < quick.sum() < len(quick)
-
-
-def test_first_members_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    labels = np.append(RNG.permutation(7), RNG.integers(0, 7, 50))
-    for each in (labels, labels.astype(np.int32)):
-        quick, slow = twin(lambda each=each: first_members(each))
-        assert_array_equal(quick, slow)
-        assert quick.tolist() == [labels.tolist().index(k) for k in range(7)]
-
-
-@pytest.mark.parametrize("name", ["closed", "open", "two parts"])
-def test_neighbours_are_equal(twin, monkeypatch, name):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    parts = {"closed": [OCTAHEDRON], "open": [SHEET], "two parts": [torus(9, 6), SHEET]}
-    vertices, faces = together(*parts[name])
-
-    def call():
-        mesh = Mesh(vertices, faces)
-        near, numbers = mesh.adjacency, mesh._edge_numbers
-        return near.indptr, near.indices, near.data, numbers.data
-
-    for one, other in zip(*twin(call), strict=True):
-        assert one.dtype == other.dtype
-        assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(

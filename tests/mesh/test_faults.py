@@ -11,11 +11,9 @@ import pytest
 from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import faults as search
-from vtk_segdeform.mesh import shells, topology
+from vtk_segdeform.mesh import shells, topology, triangles
 from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Fault, Kind
@@ -350,7 +348,7 @@ def test_faults_do_not_depend_on_the_size_of_tasks_or_the_number_of_rounds(monke
     apart = together(SPHERE, *far)  # their volumes need an origin near each
     meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, apart, (SPHERE[0], SPHERE[1][:, ::-1])]
     before = [find_faults(*mesh) for mesh in meshes]
-    for module in (search, shells):
+    for module in (triangles, shells):
         monkeypatch.setattr(module, "_PIECE", 7)
     monkeypatch.setattr(topology, "_ROUNDS", 4)  # more faces meet at most vertices
     assert [find_faults(*mesh) for mesh in meshes] == before
@@ -495,15 +493,7 @@ def test_points_far_from_most_others_are_a_fault_if_they_are_in_a_face():
     assert find_faults(np.where(np.arange(n)[:, None] == 5, 3.0, vertices), faces).ok
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range(
-    compiled, monkeypatch
-):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if compiled:
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range():
     vertices, faces = CUBE
     found = search.Search(np.vstack([vertices, [[9.0, 9, 9]]]), faces)
     assert found.n_repeating == 0

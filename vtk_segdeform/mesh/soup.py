@@ -26,12 +26,13 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
 from .edges import components, repeats_vertex
-from .faults import UNREPAIRABLE, Search, as_soup, flat_faces
+from .faults import UNREPAIRABLE, Search, as_soup
 from .grouping import connected, first_members
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
 from .topology import HalfEdges
+from .triangles import flat_faces
 from .welding import rounding, sewn, welded
 
 _POINT = 1e-13  # of the largest component: no cage resolves so small a one

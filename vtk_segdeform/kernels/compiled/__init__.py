@@ -10,14 +10,12 @@
     cells           `cell_energy.CellEnergy`
     factor          `hessian.Factor`, `finish.factor.factored`
     collapses       `simplify.simplify`
-    half_edges      `topology.HalfEdges`, `grouping.connected`,
-                    `grouping.first_members`, `Mesh.adjacency`
+    half_edges      `topology.HalfEdges`, `grouping.connected`, `grouping.first_equal_row`
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
     paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     shells          `shells.shell_volumes`, `shells.shell_depths`
-    triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
@@ -31,17 +29,14 @@ from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import solve_factored, solve_sparse
 from .half_edges import (
     border_half_edges,
-    edge_lengths,
-    edge_rows,
     face_sides,
-    first_members,
+    first_equal_points,
     link,
     link_corners,
     number_trees,
     one_fan_each,
     pair_half_edges,
     same_across,
-    used_vertices,
 )
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
@@ -50,17 +45,12 @@ from .pairs import facing_pairs, opposite_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
-from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
+from .shells import shell_extremes, shell_sums, shells_around
 from .text import (
     corners_of_lines,
     numbers_of_lines,
     plain_numbers,
     rows_of_lists,
-)
-from .triangles import (
-    face_areas,
-    first_equal_points,
-    flat_faces,
 )
 from .volumes import (
     determinants,
@@ -83,15 +73,10 @@ __all__ = [
     "corners_of_lines",
     "determinants",
     "distances_inside",
-    "edge_lengths",
-    "edge_rows",
-    "face_areas",
     "face_sides",
     "faces_in_beam",
     "facing_pairs",
     "first_equal_points",
-    "first_members",
-    "flat_faces",
     "grow_tree",
     "independent_edges",
     "interpolated_rows",
@@ -111,7 +96,6 @@ __all__ = [
     "rotations",
     "rows_of_lists",
     "same_across",
-    "shell_boxes",
     "shell_extremes",
     "shell_sums",
     "shells_around",
@@ -120,7 +104,6 @@ __all__ = [
     "sorted_edges",
     "spread_cells",
     "touching_boxes",
-    "used_vertices",
     "valid_collapses",
     "volume_along_sums",
     "volume_gradient",

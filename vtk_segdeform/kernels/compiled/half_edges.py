@@ -250,63 +250,31 @@ def number_trees(parent):
             parent[i] = parent[parent[i]]  # which has its number already
 
 
-@_compile("i8[:], const i8[:]")
-def first_members(first, labels):
-    """Put the first item with each of *labels* (n,) into *first* (k,)."""
-    for i in range(len(labels) - 1, -1, -1):
-        first[labels[i]] = i
+@_compile("i8[:], const f8[:,:], i4[:]")
+def first_equal_points(first, points, table):
+    """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 
-
-@_compile("b1[:], const i8[:,:]")
-def used_vertices(used, faces):
-    """Mark the vertices of faces in *used* (n,) and return how many faces repeat a vertex.
-
-    Return -1 if a face has a vertex outside of 0..n-1.
+    *table* (a power of two above n,) must be filled with -1.
     """
-    n, n_repeating = len(used), 0
-    for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if min(a, b, c) < 0 or max(a, b, c) >= n:
-            return -1
-        n_repeating += (a == b) | (b == c) | (c == a)
-        used[a] = used[b] = used[c] = True
-    return n_repeating
-
-
-@_compile("i4[:], i4[:], i4[:], const i8[:,:]")
-def edge_rows(starts, ends, numbers, edges):
-    """Put the neighbours of each vertex into *ends* (2e,), and 1 + the edge to each into *numbers*.
-
-    Those of vertex v are from starts[v] to starts[v + 1], in ascending order; *starts* is (n + 1,).
-    *edges* (e, 2) have the smaller vertex first, and are in lexicographic order.
-    """
-    starts[:] = 0
-    for e in range(len(edges)):
-        starts[edges[e, 0]] += 1
-        starts[edges[e, 1]] += 1
-    total = 0
-    for v in range(len(starts)):
-        starts[v], total = total, total + starts[v]
-    for e in range(len(edges)):
-        i, j = edges[e, 0], edges[e, 1]
-        k = starts[i]
-        starts[i], ends[k], numbers[k] = k + 1, j, e + 1
-        k = starts[j]
-        starts[j], ends[k], numbers[k] = k + 1, i, e + 1
-    for v in range(len(starts) - 1, 0, -1):
-        starts[v] = starts[v - 1]
-    starts[0] = 0
-
-
-@_compile("f8[:], f8, const i4[:], const i4[:], const f8[:,:]")
-def edge_lengths(lengths, least, starts, ends, points):
-    """Put the lengths of these edges, at least *least*, into *lengths* (2e,); see `edge_rows`."""
-    for i in range(len(starts) - 1):
-        for k in range(starts[i], starts[i + 1]):
-            j = ends[k]
-            x, y, z = (
-                points[i, 0] - points[j, 0],
-                points[i, 1] - points[j, 1],
-                points[i, 2] - points[j, 2],
-            )
-            lengths[k] = max(np.sqrt((x * x + y * y) + z * z), least)
+    mask = np.uint64(len(table) - 1)
+    bits = np.zeros(3, np.float64)
+    as_bits = bits.view(np.uint64)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] + 0.0, points[i, 1] + 0.0, points[i, 2] + 0.0  # 0 and -0 are equal
+        bits[0], bits[1], bits[2] = x, y, z
+        mixed = np.uint64(0)
+        for c in range(3):
+            mixed = (mixed ^ as_bits[c]) * np.uint64(0x9E3779B97F4A7C15)
+            mixed ^= mixed >> np.uint64(29)
+        first[i] = i
+        if x != x or y != y or z != z:
+            continue
+        slot = mixed & mask
+        while table[slot] >= 0:
+            j = table[slot]
+            if points[j, 0] == x and points[j, 1] == y and points[j, 2] == z:
+                first[i] = j
+                break
+            slot = (slot + np.uint64(1)) & mask
+        else:
+            table[slot] = i
