@@ -273,31 +273,25 @@ def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
     """
     if len(faces) < 4:
         return [f"a closed surface needs at least 4 faces; got {len(faces)}"]
-    a, b, c = faces.T
-    repeated = np.count_nonzero((a == b) | (b == c) | (c == a))
-    if repeated:
-        return [f"{counted(int(repeated), 'face repeats', 'faces repeat')} a vertex"]
+    if repeated := int(np.count_nonzero(repeats_vertex(faces))):
+        return [f"{counted(repeated, 'face repeats', 'faces repeat')} a vertex"]
     half_edges = HalfEdges(faces, n_points)
     faults = []
     if len(half_edges.boundary):
         border = counted(len(half_edges.boundary), "edge borders", "edges border")
         faults.append(f"{border} only one face: the cage is open")
-    if len(half_edges.non_manifold):
-        edges = counted(len(half_edges.non_manifold), "edge borders", "edges border")
+    if len(half_edges.branching):
+        edges = counted(len(half_edges.branching), "edge borders", "edges border")
         faults.append(f"{edges} three or more faces")
-    inconsistent = int(np.count_nonzero(half_edges.inconsistent))
-    if inconsistent:
-        edges = counted(inconsistent, "edge has", "edges have")
+    if len(half_edges.turned):
+        edges = counted(len(half_edges.turned), "edge has", "edges have")
         faults.append(f"{edges} faces of opposite orientation")
     unused = n_points - len(np.unique(faces))
     if unused:
         faults.append(f"{counted(unused, 'vertex is', 'vertices are')} in no face")
-    if not faults:
-        fans = half_edges.fans(half_edges.pairs)
-        pinched = len(np.unique(fans)) - n_points
-        if pinched:
-            vertices = counted(pinched, "vertex joins", "vertices join")
-            faults.append(f"{vertices} several surfaces at one point")
+    if not faults and len(half_edges.pinched):
+        vertices = counted(len(half_edges.pinched), "vertex joins", "vertices join")
+        faults.append(f"{vertices} several surfaces at one point")
     return faults
 
 

@@ -277,12 +277,6 @@ class HalfEdges:
         return parallel
 
     @cached_property
-    def non_manifold(self) -> list[IntArray]:
-        """The half-edges of every edge that has three or more, one array per edge."""
-        where = np.flatnonzero(self.counts > 2)
-        return [self.order[self.first[e] : self.first[e] + self.counts[e]] for e in where]
-
-    @cached_property
     def inconsistent(self) -> BoolArray:
         """(p,) bool: pairs of the same direction, whose two faces have opposite orientation."""
         one, other = self.pairs.T
@@ -349,8 +343,6 @@ class HalfEdges:
         """
         if not flip.any():
             return self
-        if "oriented" in self.__dict__ and self.oriented is not self:
-            return self.oriented.flipped(flip ^ self.sides[1])
         turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
         known = self.__dict__
         turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
@@ -392,18 +384,6 @@ class HalfEdges:
             return read_only((patch, flip, one_sided[:count].copy()))
         one, other = self.neighbours.T
         return read_only(two_sides(m, one // 3, other // 3, self._parallel))
-
-    @cached_property
-    def oriented(self) -> HalfEdges:
-        """The half-edges after the flips of `sides`."""
-        return self.flipped(self.sides[1])
-
-    @property
-    def one_fan_after_flips(self) -> bool:
-        """Whether every vertex of `oriented` has one fan; False if that is not known."""
-        if self._alone is not None or self._paired is None or self.is_oriented:
-            return self._alone is not None
-        return self.oriented._alone is not None
 
     @cached_property
     def one_sided(self) -> BoolArray:

@@ -129,7 +129,7 @@ def _failing(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the edges (e, 2) and the vertices (v,) at which a surface fails to be a cage."""
     broken = repeats_vertex(faces)
     sides = HalfEdges(faces[~broken], len(points))
-    bad = np.concatenate([sides.boundary, *sides.non_manifold, sides.pairs[sides.inconsistent, 0]])
+    bad = np.concatenate([sides.boundary, sides.crowded, sides.pairs[sides.inconsistent, 0]])
     edges = np.stack([sides.tail[bad], sides.head[bad]], axis=1)
     unused = np.setdiff1d(np.arange(len(points)), faces)
     corners = np.concatenate([unused, sides.pinched, faces[broken].ravel()])
