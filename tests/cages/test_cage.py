@@ -13,8 +13,7 @@ from vtk_segdeform import models
 from vtk_segdeform.cages.cage import Cage, cage_faults, encloses_region
 from vtk_segdeform.cages.fit import fit_cages
 from vtk_segdeform.errors import CageError
-from vtk_segdeform.mesh import distance_to_surface
-from vtk_segdeform.mesh.inside import winding_number
+from vtk_segdeform.mesh.inside import distance_to_surface, winding_number
 from vtk_segdeform.regions.regions import Regions
 
 TURN = rotation([1, 2, 3], 0.7)

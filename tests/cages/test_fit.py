@@ -21,8 +21,8 @@ from vtk_segdeform.cages.simplify import roundness
 from vtk_segdeform.cages.spacing import thickness
 from vtk_segdeform.errors import ArgumentError, CageError, Cancelled, RegionError
 from vtk_segdeform.geometry.ties import principal_axes
-from vtk_segdeform.mesh import distance_to_surface
 from vtk_segdeform.mesh.inside import (
+    distance_to_surface,
     winding_number,
 )
 from vtk_segdeform.mesh.mesh import Mesh

@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, OCTAHEDRON, icosphere, rotation, somewhere, together, torus, two_components
 
-from vtk_segdeform.mesh import distance_to_surface, inside
+from vtk_segdeform.mesh import inside
 from vtk_segdeform.mesh.inside import (
+    distance_to_surface,
     inside_nodes,
     inside_points,
     winding_number,
@@ -81,7 +82,7 @@ def test_a_doubly_enclosed_region_is_inside():
     assert found[6, 5, 5]
 
 
-def test_the_distance_to_a_cube_is_known_inside_and_outside():
+def test_the_distance_to_a_cube_is_known_inside_and_outside(monkeypatch):
     x = somewhere(400, seed=1)
     x = np.vstack([x, CUBE[0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.0], [-1.0, 0.3, 0.3]]])
     outside = np.linalg.norm(np.maximum(np.maximum(-x, x - 1.0), 0.0), axis=1)
@@ -89,6 +90,7 @@ def test_the_distance_to_a_cube_is_known_inside_and_outside():
     expected = np.where(depth > 0, depth, outside)
     found = distance_to_surface(x @ TURN.T + 3.0, CUBE[0] @ TURN.T + 3.0, CUBE[1])
     assert_allclose(found, expected, atol=1e-12)
+    monkeypatch.setattr(inside, "_BLOCK", 100)
     assert_allclose(distance_to_surface(x, *CUBE), expected, atol=1e-12)
 
 

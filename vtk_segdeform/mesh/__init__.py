@@ -12,8 +12,8 @@ The files, in reading order:
     soup             a mesh from any triangles, and the map between both
     welding          points at the same position on borders become one vertex
     shells           orientation of closed shells
-    surface_point    a point of a face, which moves with it; distance to a surface
-    inside           winding numbers, points inside a surface
+    surface_point    a point of a face, which moves with it
+    inside           winding numbers, points inside a surface, distance to it
     near_faces       pairs of triangles that may do so: a tree of boxes
     intersections    pairs of triangles that cross or touch
     triangles        angles and normals of triangles
@@ -30,7 +30,7 @@ from .grouping import (
     row_hashes,
     two_sides,
 )
-from .inside import inside_nodes, inside_points, winding_number
+from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import (
     Crossings,
     intersections_of,
@@ -41,7 +41,7 @@ from .mesh import Mesh, conversion_of, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
-from .surface_point import SurfacePoint, distance_to_surface
+from .surface_point import SurfacePoint
 from .topology import HalfEdges
 from .triangles import corner_angles, cross_rows, flat_faces, least_angle, normals
 

@@ -1,4 +1,4 @@
-"""Points inside or outside a closed surface.
+"""Points inside or outside a closed surface, and their distance to it.
 
 The winding number is the signed fraction of the unit sphere that the surface covers as seen from
 x, with a, b, c the corners of a face relative to x:
@@ -72,6 +72,28 @@ def winding_number(
 
     in_parallel(work, len(x), max(1, _BLOCK // (9 * len(faces))), blas=False)
     return number
+
+
+def distance_to_surface(x: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the distance from each point *x* (n, 3) to the nearest face, (n,)."""
+    a = vertices[faces]  # (k, 3 corners, 3)
+    along = a[:, [1, 2, 0]] - a
+    normal = np.cross(along[:, 0], along[:, 1])
+    size, squares = np.linalg.norm(normal, axis=1), np.einsum("kcj,kcj->kc", along, along)
+    has_area = size > 0.0
+    normal /= np.where(has_area, size, 1.0)[:, None]
+    squares = np.where(squares > 0.0, squares, 1.0)  # of coinciding corners
+    nearest = np.empty(len(x))
+    rows = max(1, _BLOCK // (3 * len(faces)))
+    for start in range(0, len(x), rows):
+        to_x = x[start : start + rows, None, None] - a  # (rows, k, 3 corners, 3)
+        t = np.einsum("nkcj,kcj->nkc", to_x, along) / squares
+        off_edge = np.linalg.norm(to_x - t.clip(0, 1)[..., None] * along, axis=-1).min(axis=2)
+        over = (np.einsum("nkcj,kcj->nkc", to_x, np.cross(normal[:, None], along)) >= 0).all(axis=2)
+        over &= has_area
+        off_plane = np.abs(np.einsum("nkj,kj->nk", to_x[:, :, 0], normal))
+        nearest[start : start + rows] = np.where(over, off_plane, off_edge).min(axis=1)
+    return nearest
 
 
 def inside_nodes(vertices: FloatArray, faces: IntArray, shape: tuple[int, int, int]) -> BoolArray:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray
 from .mesh import Mesh
 
 _ROUNDING = 1e-9  # smaller shares are rounding: the point is on an edge, or a vertex
@@ -74,12 +74,6 @@ class SurfacePoint(NamedTuple):
         if self.is_vertex:
             return np.array(values[self.corners[0]])
         return np.asarray(np.array(self.shares) @ values[list(self.corners)])
-
-
-def distance_to_surface(x: FloatArray, vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the distance from each point *x* (n, 3) to the nearest face, (n,)."""
-    corners = vertices[faces]
-    return np.array([_nearest(corners, point)[1].min() for point in x])
 
 
 def _nearest(corners: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
