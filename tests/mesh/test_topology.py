@@ -107,43 +107,6 @@ def test_any_few_triangles_have_the_properties_of_the_definitions(seed):
         )
 
 
-def test_renumbered_half_edges_are_those_of_the_renumbered_faces():
-    for seed in range(40):
-        faces = random_faces(seed)
-        gaps = np.cumsum(np.random.default_rng(seed).integers(1, 4, faces.max() + 1))
-        known = HalfEdges(gaps[faces], int(gaps.max()) + 1)
-        assert known.shells is not None
-        number = np.zeros(known.n_vertices, dtype=np.int64)
-        number[gaps] = np.arange(len(gaps))
-        found, fresh = known.renumbered(number, len(gaps)), HalfEdges(faces, len(gaps))
-        assert "shells" in vars(found)
-        for name in (
-            "order", "first", "pairs", "boundary", "net_boundary", "pinched", "across", "shells",
-            "crowded", "turned", "branching", "repeated", "one_sided",
-        ):  # fmt: skip
-            assert_array_equal(getattr(found, name), getattr(fresh, name))
-
-
-@pytest.mark.parametrize("whole", [True, False])
-def test_flipped_half_edges_are_those_of_the_flipped_faces(whole):
-    two = np.concatenate([SHEET, SHEET[:, ::-1] + 9, [[18, 19, 20], [18, 20, 19]]])
-    for faces in (two[:-2], two):  # the last two are one face, given twice
-        flip = np.arange(len(faces)) < (8 if whole else 3)
-        known = HalfEdges(faces, int(faces.max()) + 1)
-        assert len(known.boundary)
-        assert len(known.shells)
-        assert len(known.order)
-        found = known.flipped(flip)
-        assert {"order", "shells"} <= vars(found).keys()
-        fresh = HalfEdges(np.where(flip[:, None], faces[:, [0, 2, 1]], faces), known.n_vertices)
-        assert known.flipped(np.zeros(len(faces), dtype=bool)) is known
-        for name in (
-            "faces", "order", "boundary", "shells", "turned", "pinched", "net_boundary",
-            "all_twins",
-        ):  # fmt: skip
-            assert_array_equal(getattr(found, name), getattr(fresh, name))
-
-
 def test_two_faces_back_to_back_are_a_repeated_face():
     half_edges = HalfEdges(np.array([[0, 1, 2], [0, 2, 1]]), 3)
     assert half_edges.repeated.tolist() == [False, True]

@@ -182,7 +182,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         mesh = Mesh.of(Search.known(valid, flipped, sums, depth))
     else:
         number = np.cumsum(left) - 1
-        flipped = flipped.renumbered(number, int(left.sum()))
+        flipped = HalfEdges(number[flipped.faces], int(left.sum()))
         mesh = Mesh.of(Search.known(valid[left], flipped, sums, depth))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]

@@ -39,12 +39,6 @@ from .grouping import (
     two_sides,
 )
 
-_NAMELESS = (
-    "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
-    "repeated", "shells", "sides", "one_sided", "crowded", "is_oriented", "turned", "neighbours",
-    "_parallel", "_alone", "_paired",
-)  # fmt: skip
-_UNDIRECTED = ("first", "counts", "shells")  # the same if faces are flipped
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
 _LARGEST = 2**63  # of 64-bit integers
 _LARGE = 200_000  # faces for which another thread is worth waking
@@ -325,38 +319,11 @@ class HalfEdges:
             repeated[some] = first != np.arange(len(some))
         return repeated
 
-    def renumbered(self, number: IntArray, n_vertices: int) -> HalfEdges:
-        """Return the half-edges with each vertex v called number[v], which keeps their order.
-
-        What does not depend on the names of vertices is passed on.
-        """
-        renamed = HalfEdges(number[self.faces], n_vertices)
-        for name in _NAMELESS:
-            if name in self.__dict__:
-                renamed.__dict__[name] = self.__dict__[name]
-        return renamed
-
     def flipped(self, flip: BoolArray) -> HalfEdges:
-        """Return the half-edges with the faces *flip* (m,) in the other direction.
-
-        If these are whole shells, and every vertex has one fan, that is so afterwards, too.
-        """
+        """Return the half-edges with the faces *flip* (m,) in the other direction."""
         if not flip.any():
             return self
-        turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
-        known = self.__dict__
-        turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
-
-        def renamed(half_edges: IntArray) -> IntArray:
-            face, corner = np.divmod(half_edges, 3)
-            return np.where(flip[face], half_edges + 2 - 2 * corner, half_edges)
-
-        if "order" in known:
-            turned.__dict__["order"] = renamed(self.order)
-        alone = known.get("_alone")
-        if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
-            turned.__dict__["_alone"] = renamed(alone)
-        return turned
+        return HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
 
     @cached_property
     def shells(self) -> IntArray:
