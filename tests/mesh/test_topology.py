@@ -12,27 +12,18 @@ from numpy.testing import assert_array_equal
 
 from vtk_segdeform import sizes
 from vtk_segdeform.kernels import dispatch
-from vtk_segdeform.mesh import topology
 from vtk_segdeform.mesh.grouping import two_sides
 from vtk_segdeform.mesh.topology import HalfEdges
 
 
-@pytest.fixture(params=["compiled", "threads", "numpy"], autouse=True)
+@pytest.fixture(params=["compiled", "numpy"], autouse=True)
 def kernels(request, monkeypatch):
-    """Run each test with compiled kernels, in one thread and in several, and without."""
+    """Run each test with compiled kernels, and without."""
     if request.param == "numpy":
         monkeypatch.setattr(dispatch, "_kernels", lambda: None)
         return
     pytest.importorskip("numba")
     monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if request.param == "threads":
-        monkeypatch.setattr(topology, "_LARGE", 0)
-
-
-# Of 3 x 3 vertices.
-SHEET = np.array(
-    [face for i in (0, 1, 3, 4) for face in ((i, i + 1, i + 4), (i, i + 4, i + 3))]
-)  # fmt: skip
 
 
 def random_faces(seed: int) -> np.ndarray:

@@ -29,14 +29,11 @@ from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import solve_factored, solve_sparse
 from .half_edges import (
     border_half_edges,
-    face_sides,
     first_equal_points,
     link,
-    link_corners,
     number_trees,
     one_fan_each,
     pair_half_edges,
-    same_across,
 )
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
@@ -73,7 +70,6 @@ __all__ = [
     "corners_of_lines",
     "determinants",
     "distances_inside",
-    "face_sides",
     "faces_in_beam",
     "facing_pairs",
     "first_equal_points",
@@ -81,7 +77,6 @@ __all__ = [
     "independent_edges",
     "interpolated_rows",
     "link",
-    "link_corners",
     "map_packed",
     "may_meet",
     "number_trees",
@@ -95,7 +90,6 @@ __all__ = [
     "rings",
     "rotations",
     "rows_of_lists",
-    "same_across",
     "shell_extremes",
     "shell_sums",
     "shells_around",

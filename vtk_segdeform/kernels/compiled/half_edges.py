@@ -140,56 +140,6 @@ def pair_half_edges(opposite, starts, edges, bucket, faces):
     return n_alone, n_several, n_parallel
 
 
-@_compile("b1[:], const i8[:]")
-def same_across(same, opposite):
-    """Mark the faces without an edge alone that have one face, or several, across two edges.
-
-    *opposite* (3m,) is as of `pair_half_edges`; *same* is (m,) bool.
-    """
-    for f in range(len(same)):
-        a, b, c = opposite[3 * f], opposite[3 * f + 1], opposite[3 * f + 2]
-        a = a // 3 if a >= 0 else a
-        b = b // 3 if b >= 0 else b
-        c = c // 3 if c >= 0 else c
-        same[f] = (a == b or b == c or c == a) and a != -1 and b != -1 and c != -1
-
-
-@_compile("i8[:], b1[:], b1[:], i8[:], const i8[:], const i8[:,:]")
-def face_sides(patch, flip, one_sided, pending, opposite, faces):
-    """Put the patch of each face into *patch* (m,), and whether to flip it into *flip* (m,) bool.
-
-    Return the number of patches.  *opposite* (3m,) is as of `pair_half_edges`; a patch is connected
-    across pairs, and no face of a patch with one side is flipped.  *one_sided* (m,) bool gets
-    whether each patch has one side; *pending* (m,) int64 is of any values.
-    """
-    count = 0
-    patch[:] = -1
-    for first in range(len(faces)):
-        if patch[first] >= 0:
-            continue
-        patch[first], flip[first], one_sided[count] = count, False, False
-        pending[0], left = first, 1
-        while left:
-            left -= 1
-            f = pending[left]
-            for c in range(3):
-                h = opposite[3 * f + c]
-                if h < 0:
-                    continue
-                g = h // 3
-                turned = flip[f] ^ (faces[f, c] == faces[g, h - 3 * g])
-                if patch[g] < 0:
-                    patch[g], flip[g] = count, turned
-                    pending[left] = g
-                    left += 1
-                elif flip[g] != turned:
-                    one_sided[count] = True
-        count += 1
-    for f in range(len(faces)):
-        flip[f] &= not one_sided[patch[f]]
-    return count
-
-
 @_compile("i8[:], const i8[:], const i8[:]")
 def link(parent, one, other):
     """Join the trees of items one[i] and other[i]; *parent* (n,) of each is at most itself."""
@@ -205,37 +155,6 @@ def link(parent, one, other):
             parent[b] = a
         elif b < a:
             parent[a] = b
-
-
-@_compile("i8[:], const i8[:,:]")
-def link_corners(parent, faces):
-    """Join the trees of the vertices of each face; see `link`.  Return how many trees are left."""
-    for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        lowest = min(a, b, c)
-        parent[a] = min(parent[a], lowest)
-        parent[b] = min(parent[b], lowest)
-        parent[c] = min(parent[c], lowest)
-    left = 0
-    for v in range(len(parent)):
-        parent[v] = parent[parent[v]]
-        left += parent[v] == v
-    for f in range(len(faces)):
-        a = parent[faces[f, 0]]
-        for c in range(1, 3):
-            b = parent[faces[f, c]]
-            if a == b:
-                continue
-            while parent[a] != a:
-                parent[a] = parent[parent[a]]
-                a = parent[a]
-            while parent[b] != b:
-                parent[b] = parent[parent[b]]
-                b = parent[b]
-            left -= a != b
-            a, b = min(a, b), max(a, b)
-            parent[b] = parent[faces[f, 0]] = parent[faces[f, c]] = a
-    return left
 
 
 @_compile("i8[:]")
