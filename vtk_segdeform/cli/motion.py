@@ -127,9 +127,9 @@ def rotation(axis: ArrayLike, angle: float, pivot: ArrayLike = (0.0, 0.0, 0.0)) 
     array([[2., 1., 0.]])
     """
     turn = Rotation.from_rotvec(angle * np.asarray(axis, dtype=float) / np.linalg.norm(axis))
-    matrix = np.eye(4)
+    matrix, centre = np.eye(4), np.asarray(pivot, dtype=float)
     matrix[:3, :3] = turn.as_matrix()
-    matrix[:3, 3] = pivot - turn.apply(pivot)
+    matrix[:3, 3] = centre - turn.apply(centre)
     return matrix
 
 

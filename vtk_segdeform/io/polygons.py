@@ -267,8 +267,8 @@ def _failed(
         cosine = np.einsum("fx,fx->f", normal, up[polygon])
         square = np.einsum("cx,cx->c", up, up)
         for each in np.unique(polygon[cosine < _DOWN * square[polygon]]):
-            ring = points[corners[starts[each] :][: counts[each]]]
-            spokes = ring - ring[0]
+            around = points[corners[starts[each] :][: counts[each]]]
+            spokes = around - around[0]
             height = np.abs(spokes @ up[each]).max()
             failed[each] |= height <= _PLANAR * np.sqrt(square[each]) * np.abs(spokes).max()
     return np.flatnonzero(failed)

@@ -69,7 +69,8 @@ def products(matrices: Any, vectors: Any) -> FloatArray:
     >>> products(np.diag([2.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0]]))
     array([[2., 2., 3.]])
     """
-    return np.einsum("...ij,...j->...i", matrices, np.asarray(vectors, dtype=np.float64))
+    x = np.asarray(vectors, dtype=np.float64)
+    return np.asarray(np.einsum("...ij,...j->...i", matrices, x))
 
 
 def scene_of(document: Document) -> tuple[list[Block], list[Piece]]:
