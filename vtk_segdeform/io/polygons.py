@@ -168,7 +168,9 @@ def cut_into_triangles(
     n_triangles = np.bincount(polygon, minlength=len(counts))
     some = np.flatnonzero((counts > 3) & (n_triangles == counts - 2))
     if len(some):
-        sums = np.add.reduceat(row_hashes(points)[corners], starts)[some]
+        hashes = row_hashes(points)
+        hashes *= hashes >> np.uint64(32) | np.uint64(1)  # else sums are equal where signs differ
+        sums = np.add.reduceat(hashes[corners], starts)[some]
         ordered = np.sort(sums)
         repeated = ordered[1:][ordered[1:] == ordered[:-1]]
         some = some[np.isin(sums, repeated)] if len(repeated) else some[:0]
@@ -262,7 +264,8 @@ def _failed(
         n_repeated = np.count_nonzero(ring == np.roll(ring, 1))
         failed[each] = n_triangles[each] < counts[each] - n_repeated - 2
     with np.errstate(invalid="ignore", over="ignore"):
-        normal = cross_rows(*(points[faces[:, k]] - points[faces[:, 0]] for k in (1, 2)))
+        a, b, c = (points.take(corner, axis=0) for corner in faces.T.copy())
+        normal = cross_rows(b - a, c - a)
         up = np.stack([np.bincount(polygon, x, len(counts)) for x in normal.T], axis=1)
         cosine = np.einsum("fx,fx->f", normal, up[polygon])
         square = np.einsum("cx,cx->c", up, up)
