@@ -1,4 +1,4 @@
-"""Grids of surface cells are written as they were read: cells and arrays."""
+"""Grids of surface cells are written as they were read: types and order of cells, arrays."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from test_vtk_formats import contents
 from vtkmodules.vtkCommonCore import vtkFloatArray, vtkIdTypeArray, vtkStringArray
 
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.surface import Surface
 
 RING = np.arange(6) * np.pi / 3.0
@@ -24,15 +25,7 @@ CELLS = [
 ]  # fmt: skip
 
 
-# The same in the order of a PolyData, of the types that VTK gives to its cells.
-ORDERED = [
-    (1, [12]), (2, [12, 12]), (3, [0, 12]), (4, [1, 12, 2]), *((9, side) for side in SIDES),
-    (5, [0, 2, 1]), (5, [0, 3, 2]), (9, [0, 5, 4, 3]), (5, [8, 10, 11]), (5, [8, 9, 10]),
-    (6, [6, 7, 11, 8]),
-]  # fmt: skip
-
-
-def grid(cells=ORDERED):
+def grid(cells=CELLS):
     rows = np.concatenate([[len(corners), *corners] for _, corners in cells])
     made = pv.UnstructuredGrid(rows, np.array([kind for kind, _ in cells]), POINTS)
     made.cell_data["number"] = np.arange(len(cells))
@@ -56,7 +49,7 @@ def grid(cells=ORDERED):
 
 
 @pytest.mark.parametrize("suffix", [".vtu", ".vtk"])
-@pytest.mark.parametrize("cells", [ORDERED, ORDERED[9:12]], ids=["all", "plain"])
+@pytest.mark.parametrize("cells", [CELLS, [*CELLS[:1], *CELLS[3:5]]], ids=["all", "plain"])
 @pytest.mark.parametrize("texts", [False, True])
 def test_a_grid_is_written_as_it_was_read(tmp_path, suffix, cells, texts):
     given = grid(cells)
@@ -81,15 +74,35 @@ def test_a_grid_is_written_as_it_was_read(tmp_path, suffix, cells, texts):
     assert contents(found) == contents(expected)
 
 
-def test_cells_in_another_order_than_that_of_polydata_keep_their_corners_and_arrays(tmp_path):
-    grid(CELLS).save(tmp_path / "a.vtu")
-    surface = Surface.read(tmp_path / "a.vtu")
-    surface.write(tmp_path / "b.vtu", surface.mesh.vertices)
-    found = pv.read(tmp_path / "b.vtu")
-    assert sorted(found["number"]) == list(range(len(CELLS)))
-    for k, number in enumerate(found["number"]):
-        assert found.get_cell(k).point_ids == CELLS[number][1]
-        assert_array_equal(found["wide"][k], 3.0 * number + np.arange(3))
+def test_the_cells_of_a_grid_are_those_of_the_mesh(tmp_path):
+    grid().save(tmp_path / "a.vtu")
+    mesh = Surface.read(tmp_path / "a.vtu").mesh
+    assert mesh.is_closed
+    assert mesh.n_vertices == 12
+
+
+def test_other_formats_know_nothing_of_the_grid(tmp_path, caplog):
+    grid().save(tmp_path / "a.vtu")
+    surface = read_polydata(tmp_path / "a.vtu")
+    for suffix in (".vtp", ".obj", ".vtkhdf"):
+        write_mesh(tmp_path / f"b{suffix}", surface)
+        assert "grid" not in caplog.text
+        assert list(read_polydata(tmp_path / f"b{suffix}").field_data) in (["times"], [])
+    assert len(surface.field_data) == 2
+
+
+def test_the_types_of_other_cells_are_not_used(tmp_path):
+    grid().save(tmp_path / "a.vtu")
+    surface = read_polydata(tmp_path / "a.vtu")
+    other = surface.copy()
+    other.verts = np.empty(0, dtype=int)
+    other.cell_data.clear()
+    write_mesh(tmp_path / "b.vtu", other)
+    assert_array_equal(pv.read(tmp_path / "b.vtu").celltypes[:2], [3, 4])
+    types = np.asarray(surface.field_data["types of the cells of a grid"])
+    types[types == 9] = 5  # not of four corners
+    write_mesh(tmp_path / "c.vtu", surface)
+    assert sorted(pv.read(tmp_path / "c.vtu").celltypes) == [1, 2, 3, 4, *[5] * 4, 6, *[9] * 7]
 
 
 @pytest.mark.parametrize("sort", [pv.StructuredGrid, pv.RectilinearGrid, pv.ImageData])

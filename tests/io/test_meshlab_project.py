@@ -124,16 +124,23 @@ def test_colours_show_regions_and_local_volume_change_and_none_are_replaced(tmp_
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
-def test_meshlab_shows_the_mesh_of_a_session_and_hides_its_cages(tmp_path):
+def test_meshlab_shows_cages_as_wires_that_hide_nothing(tmp_path):
     import pymeshlab
 
     session = posed_session()
     write_project(tmp_path / "work.mlp", session)
     meshset = pymeshlab.MeshSet(verbose=False)
     meshset.load_project(str(tmp_path / "work.mlp"))
-    (mesh,) = [layer for layer in meshset if layer.is_visible()]
-    assert mesh.label() == "mesh"
-    assert mesh.has_vertex_color()
+    shown = {layer.label(): layer for layer in meshset if layer.is_visible()}
+    hidden = {layer.label() for layer in meshset if not layer.is_visible()}
+    assert set(shown) == {"mesh", "cage 1, wires", "cage 2, wires"}
+    assert hidden == {"local volume change", "cage 1", "cage 2"}
+    assert shown["mesh"].has_vertex_color()
+    for k, cage in enumerate(session.cages, 1):
+        wires = shown[f"cage {k}, wires"]
+        assert wires.face_number() == 0
+        assert wires.edge_number() == 3 * cage.n_faces // 2
+        assert_array_equal(wires.vertex_matrix(), session.cage_vertices[k - 1])
 
 
 @pytest.mark.usefixtures("with_pymeshlab")

@@ -4,8 +4,8 @@
     work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
 
 A layer with quality and without colours is coloured by it, since MeshLab shows the quality only in
-colours.  The cages of a session and its local volume change are hidden, as they would cover the
-mesh.
+colours.  The cages of a session are hidden, and shown as wires by a layer beside each
+(`meshlab_shown`); its local volume change is hidden as well.
 
 PyMeshLab is not required.  MeshLab stores a selection in a PLY file as bit 32 of the property
 ``flags``; here it is the array "selection", as in `meshlab_layers`.
@@ -24,7 +24,6 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -36,23 +35,22 @@ from ..errors import MeshError
 from ..files import file_inside, open_regular, replacing, require_place
 from .convert import read_polydata, with_vertices, write_mesh
 from .meshlab_layers import HasLayers, Layer, as_layers, free_name
+from .meshlab_shown import coloured, is_cage, wires_of
 
 _SELECTED = 0x20  # of MeshLab's flags
 _GENERATED = re.compile(r"\d+-[0-9a-f]{12}(-wires)?\.ply")
-_WIRES = "-wires.ply"  # the edges of a cage, which earlier versions have written
+_WIRES = "-wires.ply"  # the end of the name of a file that only shows the edges of another layer
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
 _LARGEST = 10_000_000  # bytes of the .mlp
 _DEEPEST = 32  # nesting levels; MeshLab's projects have four
 _MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # in total, also if a file is listed several times
-# The colours of regions in pictures and in the editor.
-_REGIONS = ["E69F00", "56B4E9", "009E73", "CC79A7", "F0E442", "0072B2", "D55E00"]
-_LOSS, _NONE, _GAIN = [0, 114, 178], [255, 255, 255], [213, 94, 0]
-_COLOURS = {"RGB", "RGBA"}
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 
 
 def read_project(path: str | Path) -> dict[str, pv.PolyData]:
     """Read the layers of a MeshLab project, by name, transformed by their matrices.
+
+    Wires that `write_project` added to show cages are left out.
 
     Parameters
     ----------
@@ -107,7 +105,8 @@ def write_project(path: str | Path, what: Layer | HasLayers | Mapping[str, Layer
     path : str or Path
         For example ``work.mlp``; the layers are written to a folder ``work.layers`` beside it.
     what : Mesh, Surface, pyvista.PolyData, Session, or dict of str to one of the first three
-        As in `meshlab.to_meshset`, but polygons are kept.  Of a session only the mesh is visible.
+        As in `meshlab.to_meshset`, but polygons are kept.  Layers of a session with the names
+        "cage 1", "cage 2" ... are shown as wires.
 
     Raises
     ------
@@ -132,10 +131,16 @@ def write_project(path: str | Path, what: Layer | HasLayers | Mapping[str, Layer
         names = set()
         for number, (label, surface) in enumerate(layers.items()):
             name = f"{number}-{_digest(surface)}.ply"
-            write_mesh(folder / name, _with_flags(_coloured(surface)))
+            write_mesh(folder / name, _with_flags(coloured(surface)))
             shown = not isinstance(what, HasLayers) or label == "mesh"
             _add(group, label, f"{folder.name}/{name}", visible=shown)
             names.add(name)
+            if not shown and is_cage(label):
+                name = name.removesuffix(".ply") + _WIRES
+                with replacing(folder / name) as draft:
+                    draft.write_bytes(wires_of(surface))
+                _add(group, f"{label}, wires", f"{folder.name}/{name}", visible=True)
+                names.add(name)
         ElementTree.SubElement(project, "RasterGroup")
         ElementTree.indent(project, " ")
         text = _HEAD + ElementTree.tostring(project, encoding="unicode") + "\n"
@@ -156,40 +161,6 @@ def _add(group: ElementTree.Element, label: str, file: str, *, visible: bool) ->
     entry = {"label": _printable(label), "visible": "1" if visible else "0", "filename": file}
     mesh = ElementTree.SubElement(group, "MLMesh", entry)
     ElementTree.SubElement(mesh, "MLMatrix44").text = _IDENTITY
-
-
-def _coloured(surface: pv.PolyData) -> pv.PolyData:
-    """Return a surface with colours of its quality, unless it has colours or no quality.
-
-    Whole numbers, such as regions, get distinct colours; other numbers blue below and red above 0.
-    """
-    points = surface.point_data
-    if "quality" not in points or _COLOURS & {*points.keys(), *surface.cell_data.keys()}:
-        return surface
-    surface = surface.copy(deep=False)
-    colours = _colours_of_quality(np.asarray(points["quality"], dtype=np.float64))
-    surface.point_data["RGBA"] = colours
-    return surface
-
-
-def _colours_of_quality(quality: FloatArray) -> Any:
-    """Return colours (n, 4) uint8 of a quality (n,).
-
-    >>> _colours_of_quality(np.array([0.0, 1.0, 7.0]))[:, :3].tolist()
-    [[230, 159, 0], [86, 180, 233], [230, 159, 0]]
-    >>> _colours_of_quality(np.array([-0.5, 0.0, 0.25]))[:, :3].tolist()
-    [[0, 114, 178], [255, 255, 255], [234, 174, 128]]
-    """
-    quality = np.nan_to_num(quality, nan=0.0, posinf=0.0, neginf=0.0)
-    if (quality == np.rint(quality)).all():
-        palette = np.array([list(bytes.fromhex(colour)) for colour in _REGIONS])
-        colours = palette[quality.astype(np.int64) % len(palette)]
-    else:
-        share = (quality / np.abs(quality).max())[:, None]
-        towards = np.where(share < 0.0, _LOSS, _GAIN)
-        colours = _NONE + np.abs(share) * (towards - np.array(_NONE))
-    opaque = np.full((len(quality), 1), 255)
-    return np.rint(np.hstack([colours, opaque])).astype(np.uint8)
 
 
 def _digest(surface: pv.PolyData) -> str:

@@ -39,7 +39,7 @@ from .array_names import (
     warn_renamed,
 )
 from .confined import read_confined
-from .grids import grid_of, surface_of_grid
+from .grids import grid_of, is_grid, surface_of_grid
 from .reading_child import without_ranges
 from .vtk_arrays import data_sets
 
@@ -74,6 +74,8 @@ def read_with_vtk(path: Path) -> pv.PolyData:
         surfaces = [_surface(each, suffix) for each in data_sets(read_confined("vtk", path))]
     except MeshError as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
+    if len(surfaces) > 1:  # of several grids nothing is restored
+        surfaces = [_without_types(each) for each in surfaces]
     surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
     if suffix == ".vtkhdf":  # before VTK 9.7 it does not store which arrays are active
         _activate(surface.point_data, "Normals", "normals", 3)
@@ -138,7 +140,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            is_legacy_grid = suffix == ".vtk" and CELL_TYPES in surface.field_data
+            is_legacy_grid = suffix == ".vtk" and is_grid(surface)
             writer = vtkUnstructuredGridWriter() if is_legacy_grid else _WRITERS[suffix]()
             writer.SetInputData(grid_of(plain) if is_legacy_grid else _without_types(plain))
             again = surface
