@@ -173,7 +173,7 @@ def test_what_a_mechanism_improves_is_told_from_noise():
 @pytest.mark.campaign
 def test_the_tables_of_the_paper_have_its_numbers_beside_ours():
     section = paper.run(replace(TINY, regions=(1, 3)))
-    first, second, units, ours = section.tables
+    first, second, units = section.tables
     assert first.columns[1:] == (
         "one cage", "three regions", "paper: one cage", "paper: three regions",
     )  # fmt: skip
@@ -186,9 +186,6 @@ def test_the_tables_of_the_paper_have_its_numbers_beside_ours():
     assert units.column("diagonal, units") == [1.0, 10.0, 100.0, 1000.0]
     errors = units.column("handle error, diagonals")
     assert errors[0] > 100 * errors[2]  # rows (5) outweigh (7) in small units
-    printed, exact = rows["its volume change, %"], ours.rows[-1]
-    assert exact[0] == "its volume change, %"
-    assert max(map(abs, exact[1:])) <= 1e-10 < abs(printed[1])
 
 
 def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):

@@ -6,11 +6,10 @@ import os
 
 import numpy as np
 import pytest
-from campaign import every
 from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models, read_mesh
-from vtk_segdeform.cli import commands, selection
+from vtk_segdeform.cli import commands
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.outputs import report_pose
 from vtk_segdeform.cli.selection import parse_selection
@@ -97,15 +96,6 @@ def test_a_long_invalid_selection_is_named_and_truncated(text):
     assert len(str(error.value)) < 700
 
 
-def test_a_file_of_the_selection_of_many_gigabytes_is_refused(folder, monkeypatch):
-    monkeypatch.setattr(selection, "_LARGEST_FILE", 1 << 20)  # of 1 << 28, which are read
-    for size, says in ((45_000_000_000, "has 45 GB"), (1_500_000_000, "more than 1,048,576 bytes")):
-        with open("ids.txt", "wb") as file:
-            file.truncate(size)
-        with pytest.raises((ConstraintError, OSError), match=says):
-            parse_selection("ids.txt", BAR.vertices)
-
-
 def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatch, capsys):
     def read(path):
         raise MemoryError
@@ -127,13 +117,6 @@ def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, c
     assert capsys.readouterr().err.endswith("segdeform deform: out of memory\n")
 
 
-@posix
-def test_a_pipe_is_told_from_a_file_that_is_not_there(folder):
-    os.mkfifo("pipe.obj")
-    with pytest.raises(MeshError, match=r"pipe\.obj: a device or a pipe, not a file"):
-        read_mesh("pipe.obj")
-
-
 @pytest.mark.parametrize(
     "words",
     [
@@ -152,19 +135,6 @@ def test_a_name_that_is_too_long_is_an_error_that_names_it(capsys, words):
     assert "Traceback" not in error
     with pytest.raises(MeshError, match=LONG[:100]):
         read_mesh(f"{LONG}.ply")
-
-
-@posix
-@pytest.mark.parametrize("stem", every(2, [b"n" * 251, b"\xff\xfe", "Körper 身体".encode()]))
-def test_every_name_that_the_system_allows_can_be_read_and_written(folder, capsys, stem):
-    name, out = (os.fsdecode(stem[: 251 - len(end)] + end) for end in (b"", b"2"))
-    os.rename("bar.ply", f"{name}.ply")
-    assert main(["deform", f"{name}.ply", "-o", f"{out}.ply", *POSE]) == 0
-    told = capsys.readouterr()
-    assert "written" in told.out
-    assert told.err == ""
-    assert main(["check", f"{out}.ply"]) == 0
-    assert sorted(os.listdir(folder)) == sorted([f"{name}.ply", f"{out}.ply"])
 
 
 ESCAPES = "\x1b]0;title\x07\x1b[2J\r\nfake line\x9b31m"

@@ -436,22 +436,6 @@ def test_positions_that_are_zero_and_of_no_bytes_become_new_ones(tmp_path):
     require_moved(*moved_file(path, tmp_path / "b.glb"))
 
 
-@pytest.mark.parametrize("moves", [(0,), (1,), (0, 1)])
-def test_of_two_nodes_with_one_mesh_each_shows_its_own_positions(tmp_path, moves):
-    document = octahedron(*OCTAHEDRON)
-    document.head["nodes"] = [{"mesh": 0}, {"mesh": 0, "translation": [4, 0, 0]}]
-    document.head["scenes"][0]["nodes"] = [0, 1]
-    path = document.save(tmp_path / "a.glb")
-
-    def move(vertices):
-        moved = vertices.copy()
-        for k in moves:
-            moved[6 * k : 6 * k + 6] *= [1.0, 2.0 + k, 3.0]
-        return moved
-
-    require_moved(*moved_file(path, tmp_path / "b.glb", move))
-
-
 def test_positions_that_are_also_the_normals_are_moved_apart(tmp_path):
     document = Gltf()
     position = document.array(BALL)
@@ -614,11 +598,3 @@ def test_hostile_documents_are_written_or_refused_by_name(tmp_path):
         assert_allclose(read_polydata(tmp_path / "b.glb").points, moved.points, atol=1e-5)
         written += 1
     assert written > 50
-
-
-def test_cubes_of_vtk_keep_their_hard_edges(tmp_path):
-    cube = pv.Cube()  # 24 points with normals
-    write_mesh(tmp_path / "a.glb", cube.triangulate())
-    expected, found = moved_file(tmp_path / "a.glb", tmp_path / "b.glb")
-    require_moved(expected, found)
-    assert sd.Surface(found).mesh.n_vertices == 8

@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import polygons
 from vtk_segdeform.io.polygons import (
     _failed,
     cells_of,
@@ -24,7 +23,6 @@ from vtk_segdeform.io.polygons import (
     unstripped,
 )
 
-SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
 
 
@@ -66,7 +64,6 @@ def area_vectors(points, triangles):
     return 0.5 * np.cross(b - a, c - a)
 
 
-@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("scale", every(3, [1.0, 1e-6, 1e6]))
 def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, scale):
@@ -86,7 +83,6 @@ def test_a_planar_polygon_is_cut_without_overlaps_from_any_first_corner(name, sc
             assert_allclose(up.sum(axis=0), sign * area * np.array([0, 0, 1.0]) @ TURN, rtol=1e-9)
 
 
-@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_triangles_have_the_boundary_of_the_polygon_also_where_it_is_not_planar(name):
     rng = np.random.default_rng(2)
@@ -103,7 +99,6 @@ def test_the_triangles_have_the_boundary_of_the_polygon_also_where_it_is_not_pla
     assert_array_equal(total, expected - expected.T)
 
 
-@pytest.mark.usefixtures("either")
 def test_polygons_that_cannot_be_cut_by_ears_lose_nothing():
     frame = np.array([0, 1, 2, 3, 0, 4, 5, 6, 7, 4])  # around a hole, with a bridge passed twice
     points = flat((0, 0), (4, 0), (4, 4), (0, 4), (1, 1), (1, 3), (3, 3), (3, 1))
@@ -160,7 +155,6 @@ def test_no_polygons_have_no_triangles():
     assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1
 
 
-@pytest.mark.usefixtures("either")
 def test_polygons_that_were_cut_wrongly_are_found():
     dart = flat((0, 0), (2, 0), (0.5, 0.5), (0, 2))
     bent = dart + np.outer([0, 0, 1, 0], [0.0, 0.0, 0.5])
@@ -180,7 +174,6 @@ def test_polygons_that_were_cut_wrongly_are_found():
     assert _failed(dart, *args).tolist() == []
 
 
-@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("size", [4, 5, 7])
 @pytest.mark.parametrize("apart", [False, True])
 def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_at(size, apart):
@@ -202,71 +195,10 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
 
 
-@pytest.mark.usefixtures("either")
-@pytest.mark.parametrize("size", [5, 6, 7, 24])
-@pytest.mark.parametrize("height", [0.0, 0.05])
-def test_convex_polygons_are_cut_along_their_shortest_diagonals(monkeypatch, size, height):
-    monkeypatch.setattr(polygons, "_clipped", None)  # ears are not clipped
-    rng = np.random.default_rng(size)
-    angle = 2.0 * np.pi * (np.arange(size) + 0.6 * rng.random((30, size))) / size
-    x = np.stack([np.cos(angle), 0.7 * np.sin(angle), height * rng.normal(size=angle.shape)], 2)
-    points, counts = x.reshape(-1, 3) @ TURN, np.full(30, size)
-    corners = np.arange(len(points)).reshape(30, size)
-    corners[::2] = corners[::2, ::-1]
-    faces, owner = cut_into_triangles(points, counts, corners.ravel())
-    assert_array_equal(np.bincount(owner), counts - 2)
-    for k in range(30):
-        own, given = faces[owner == k], points[corners[k]]
-        spoke = given - given[0]
-        total = 0.5 * np.cross(spoke[1:-1], spoke[2:]).sum(axis=0)
-        up = area_vectors(points, own)
-        assert_allclose(up.sum(axis=0), total, atol=1e-14)
-        assert (up @ total > 0.0).all()
-        ends = [points[corners[k][(i + 1) % size]] - points[corners[k][i - 1]] for i in range(size)]
-        shortest = int(np.linalg.norm(ends, axis=1).argmin())
-        cut = corners[k][[shortest - 1, shortest, (shortest + 1) % size]]
-        assert set(cut.tolist()) in [set(face) for face in own.tolist()]
-
-
-@pytest.mark.usefixtures("either")
-@pytest.mark.parametrize("name", SHAPES)
-def test_others_than_convex_polygons_are_left_to_ear_clipping(name):
-    points = SHAPES[name] @ TURN
-    for corners in (np.arange(len(points)), np.arange(len(points))[::-1]):
-        faces = np.zeros((len(points) - 2, 3), dtype=np.int64)
-        assert not polygons._convex_cuts(faces, points, np.array([len(points)]), corners).any()
-    pentagram = 2 * np.arange(5) % 5
-    ring = 0.4 * np.pi * np.arange(5)
-    round_ = flat(*zip(np.cos(ring), np.sin(ring), strict=True))
-    faces = np.zeros((3, 3), dtype=np.int64)
-    assert polygons._convex_cuts(faces, round_, np.array([5]), np.arange(5)).all()
-    assert not polygons._convex_cuts(faces, round_, np.array([5]), pentagram).any()
-
-
 def test_the_same_corners_in_another_order_are_another_polygon():
     square = flat((0, 0), (1, 0), (1, 1), (0, 1))
     triangles, owner = cut(square, [0, 1, 3, 2], [0, 1, 2, 3])  # the first one crosses itself
     assert_allclose(area_vectors(square, triangles[owner == 1])[:, 2], 0.5)
-
-
-@pytest.mark.usefixtures("either")
-@pytest.mark.parametrize("scale", [1.0, 1e-3])
-@pytest.mark.parametrize("height", [0.0, 1.0])
-def test_quads_are_cut_as_by_vtk(monkeypatch, scale, height):
-    rng, number = np.random.default_rng(3), np.arange(84)
-    counts = np.where(number % 9 == 8, 3, np.where(number % 7 == 6, 5, 4))
-    corners = np.arange(counts.sum())
-    owner = np.repeat(number, counts)
-    points = rng.normal(size=(len(corners), 3)) * [1.0, 1.0, height]
-    points[owner % 4 == 1, 1] *= 1e-4  # corners near diagonals
-    points[owner % 4 == 2] += 3.0 * SQUARE[corners % 4][owner % 4 == 2]
-    points[owner % 4 == 3] = points[owner % 4 == 3].round()  # diagonals of equal length
-    points = scale * (points + 10.0 * owner[:, None])
-    faces, polygon = cut_into_triangles(points, counts, corners)
-    monkeypatch.setattr(polygons, "_LEAST_HEIGHT", np.inf)  # so that VTK's filter cuts all of them
-    expected, owner = cut_into_triangles(points, counts, corners)
-    assert_array_equal(polygon, owner)
-    assert_array_equal(faces, expected)
 
 
 def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():

@@ -293,12 +293,3 @@ def test_any_texts_are_read_back_or_reported(tmp_path, suffix):
         assert changed(tmp_path, suffix, surface) == []
 
     each()
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("source", MAKERS)
-def test_a_file_with_any_text_can_be_written_in_every_format(tmp_path, source):
-    for text in TEXTS:
-        raw = encoded(text).replace(b"\r", b" ").replace(b"\n", b" ").replace(b"\0", b"")
-        if raw.strip() and not raw.strip().endswith(b"\\"):
-            converted_from(tmp_path, source, raw)

@@ -40,18 +40,11 @@ from vtk_segdeform.geometry.rotations import closest_rotations
 from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
 from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import (
-    _clipped_ears,
-    _convex_cuts,
-    _failed,
-    _quad_cuts,
-    cut_into_triangles,
     triangles_of,
 )
 from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
-from vtk_segdeform.mesh.grouping import first_members
-from vtk_segdeform.mesh.shells import _boxes
 from vtk_segdeform.regions.blending import blend_weights, border_distance
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
@@ -616,74 +609,6 @@ def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype, piece
             assert quick.tobytes() == slow.tobytes()
 
 
-def test_areas_of_faces_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    quick, slow = twin(lambda: Mesh(MESH.vertices, MESH.faces).face_areas)
-    assert_array_equal(quick, slow)
-    corners = MESH.vertices[MESH.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert_allclose(quick, 0.5 * np.linalg.norm(normals, axis=1), rtol=1e-14)
-
-
-def test_boxes_of_shells_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    vertices, faces = together(icosphere(1), torus(9, 6))
-    faces = faces[RNG.permutation(len(faces))]
-    shells = (faces[:, 0] < len(icosphere(1)[0])).astype(np.int64)
-    for quick, slow in zip(*twin(lambda: _boxes(vertices, faces, shells)), strict=True):
-        assert_array_equal(quick, slow)
-    for shell in range(2):
-        corners = vertices[faces[shells == shell]].reshape(-1, 3)
-        low, high = _boxes(vertices, faces, shells)
-        assert_array_equal(low[shell], corners.min(axis=0))
-        assert_array_equal(high[shell], corners.max(axis=0))
-
-
-@pytest.mark.parametrize("kind", ["any", "flat", "whole numbers", "not finite"])
-def test_quads_are_cut_alike(twin, monkeypatch, kind):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    points = 3.0 * np.random.default_rng(4).normal(size=(800, 3))
-    if kind in ("flat", "whole numbers"):
-        points[:, 2] = 0.0
-    if kind == "whole numbers":
-        points = (0.5 * points).round()
-    if kind == "not finite":
-        points[::7] = np.nan, np.inf, 1e200
-    quads = np.arange(len(points)).reshape(-1, 4)
-    quick, slow = twin(lambda: _quad_cuts(points, quads))
-    assert_array_equal(quick, slow)
-    faces, others = twin(
-        lambda: cut_into_triangles(points, np.full(len(quads), 4), quads.ravel())[0]
-    )
-    assert_array_equal(faces, others)
-    assert set(quick.tolist()) >= ({-1, 0, 1, 2} if kind == "whole numbers" else {-1, 0, 1})
-
-
-@pytest.mark.parametrize("kind", ["flat", "bent", "whole numbers", "not finite"])
-def test_convex_polygons_are_cut_alike(twin, monkeypatch, kind):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    rng = np.random.default_rng(4)
-    counts = rng.integers(3, 9, 400)
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    angle = 2.0 * np.pi * (number + 0.9 * rng.random(len(number))) / np.repeat(counts, counts)
-    height = (0.2 if kind == "bent" else 0.0) * rng.normal(size=len(angle))
-    points = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
-    if kind == "whole numbers":
-        points = (2.0 * points).round()
-    if kind == "not finite":
-        points[::9] = np.nan, np.inf, 1e200
-
-    def cuts():
-        faces = np.full((int((counts - 2).sum()), 3), -1)
-        return faces, _convex_cuts(faces, points, counts, order)
-
-    order = np.arange(len(points))
-    (quick, some), (slow, others) = twin(cuts)
-    assert_array_equal(quick, slow)
-    assert_array_equal(some, others)
-    assert 20 < some.sum() < 380
-
-
 @pytest.mark.parametrize("density", [None, 2.0])
 @pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
 def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, density):
@@ -713,48 +638,6 @@ def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
     quick, slow = twin(lambda: _valid(surface, to))
     assert_array_equal(quick, slow)
     assert 0 < quick.sum() < len(quick)
-
-
-def test_first_members_are_equal(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    labels = np.append(RNG.permutation(7), RNG.integers(0, 7, 50))
-    for each in (labels, labels.astype(np.int32)):
-        quick, slow = twin(lambda each=each: first_members(each))
-        assert_array_equal(quick, slow)
-        assert quick.tolist() == [labels.tolist().index(k) for k in range(7)]
-
-
-@pytest.mark.parametrize("height", [0.0, 1e-8, 1.0])
-def test_wrongly_cut_polygons_are_found_alike(twin, monkeypatch, height):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    rng = np.random.default_rng(6)
-    counts = rng.integers(3, 7, 300)
-    corners = np.arange(counts.sum())
-    corners[1::29] = corners[:-1:29]  # repeated corners
-    points = rng.normal(size=(len(corners), 3)) * [1.0, 1.0, height]
-    faces, polygon = _clipped_ears(points, counts, corners)
-    left = np.arange(len(polygon)) % 11 > 0
-    faces, polygon = faces[left], polygon[left]
-    faces[::7] = faces[::7, ::-1]
-    quick, slow = twin(lambda: _failed(points, counts, corners, faces, polygon))
-    assert_array_equal(quick, slow)
-    assert 30 < len(quick) < 270
-
-
-@pytest.mark.parametrize("name", ["closed", "open", "two parts"])
-def test_neighbours_are_equal(twin, monkeypatch, name):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    parts = {"closed": [OCTAHEDRON], "open": [SHEET], "two parts": [torus(9, 6), SHEET]}
-    vertices, faces = together(*parts[name])
-
-    def call():
-        mesh = Mesh(vertices, faces)
-        near, numbers = mesh.adjacency, mesh._edge_numbers
-        return near.indptr, near.indices, near.data, numbers.data
-
-    for one, other in zip(*twin(call), strict=True):
-        assert one.dtype == other.dtype
-        assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import sys
-import tracemalloc
 
 import numpy as np
 import pytest
-from real_meshes import path_of, read_off
 from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import faults as search
-from vtk_segdeform.mesh import shells, topology
+from vtk_segdeform.mesh import shells, topology, triangles
 from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Fault, Kind
@@ -52,13 +47,6 @@ def test_a_closed_oriented_manifold_has_no_faults(name):
     assert report.ok
     assert report.faults == report.notes == ()
     assert report.n_components == 1
-
-
-def test_a_torus_and_two_bodies_have_no_faults():
-    assert find_faults(*torus()).ok
-    report = find_faults(*two_components())
-    assert report.ok
-    assert report.count(Kind.COMPONENTS) == report.n_components == 2
 
 
 def test_a_missing_face_leaves_three_open_edges_around_one_hole():
@@ -350,7 +338,7 @@ def test_faults_do_not_depend_on_the_size_of_tasks_or_the_number_of_rounds(monke
     apart = together(SPHERE, *far)  # their volumes need an origin near each
     meshes = [SPHERE, pinched, (flat, SPHERE[1]), cavity, apart, (SPHERE[0], SPHERE[1][:, ::-1])]
     before = [find_faults(*mesh) for mesh in meshes]
-    for module in (search, shells):
+    for module in (triangles, shells):
         monkeypatch.setattr(module, "_PIECE", 7)
     monkeypatch.setattr(topology, "_ROUNDS", 4)  # more faces meet at most vertices
     assert [find_faults(*mesh) for mesh in meshes] == before
@@ -375,60 +363,6 @@ def test_on_a_manifold_edges_fans_and_genus_agree():
         half_edges = HalfEdges(faces, len(vertices))
         assert len(vertices) - len(half_edges.first) + len(faces) == euler
         assert half_edges.fans(half_edges.pairs).max() + 1 == len(vertices)
-
-
-def effort(mesh):
-    """Return the number of calls in `find_faults`, and its peak memory in bytes."""
-    calls = 0
-
-    def count(_frame, event, _argument):
-        nonlocal calls
-        calls += event in ("call", "c_call")
-
-    sys.setprofile(count)
-    try:
-        find_faults(*mesh)
-    finally:
-        sys.setprofile(None)
-    tracemalloc.start()
-    try:
-        find_faults(*mesh)
-        return calls, tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
-def test_the_search_grows_no_faster_than_sorting():
-    small, large = torus(100, 50), torus(200, 100)
-    find_faults(*large)  # whatever happens only once, such as loading a kernel
-    calls, memory = effort(small)
-    more_calls, more_memory = effort(large)
-    # Four times the vertices: a comparison of all pairs needs sixteen times the memory, or, in
-    # pieces, four times the calls.  Times would depend on the load of the machine.
-    assert more_calls < 2 * calls
-    assert more_memory < 6 * memory
-
-
-@pytest.mark.parametrize(
-    "name", ["botsch-sorkine/cactus.off", "botsch-sorkine/cylinder.off", "hand.off"]
-)
-def test_benchmark_meshes_have_no_faults(name):
-    assert find_faults(*read_off(name)).ok
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param("koala.obj", marks=pytest.mark.campaign),  # large, and like the next one
-        "armadilloman.obj",
-        "armadilloman_cages_triangulated.obj",
-    ],
-)
-def test_benchmark_meshes_in_obj_files_have_no_faults(name):
-    lines = [line.split() for line in path_of(name).read_text().splitlines()]
-    vertices = np.array([w[1:4] for w in lines if w and w[0] == "v"], dtype=float)
-    faces = [[int(i.partition("/")[0]) - 1 for i in w[1:4]] for w in lines if w and w[0] == "f"]
-    assert find_faults(vertices, faces).ok
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -495,15 +429,7 @@ def test_points_far_from_most_others_are_a_fault_if_they_are_in_a_face():
     assert find_faults(np.where(np.arange(n)[:, None] == 5, 3.0, vertices), faces).ok
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range(
-    compiled, monkeypatch
-):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if compiled:
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+def test_used_points_and_repeating_faces_are_counted_unless_an_index_is_out_of_range():
     vertices, faces = CUBE
     found = search.Search(np.vstack([vertices, [[9.0, 9, 9]]]), faces)
     assert found.n_repeating == 0

@@ -9,8 +9,9 @@ from solids import OCTAHEDRON, icosphere
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
 from vtk_segdeform.mesh import Crossings, new_crossings, self_intersections
-from vtk_segdeform.mesh.intersections import flat_faces, intersections_of
+from vtk_segdeform.mesh.intersections import intersections_of
 from vtk_segdeform.mesh.near_faces import _near_centres, near_faces
+from vtk_segdeform.mesh.triangles import flat_faces
 
 
 def joined(*solids):

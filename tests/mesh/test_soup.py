@@ -12,7 +12,6 @@ from vtk_segdeform import sizes
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh import Kind, find_faults, mesh_of
-from vtk_segdeform.mesh import soup as soup_module
 
 SPHERE = icosphere(2)
 BODIES = [*SOLIDS.values(), SPHERE, torus(12, 8), two_components()]
@@ -319,41 +318,6 @@ def hostile(rng):
     elif rng.random() < 0.3:
         vertices, faces = together((vertices, faces))
     return vertices, rng.permutation(faces)
-
-
-@pytest.mark.parametrize("seed", every(2, range(4)))
-def test_seams_welded_at_once_give_the_same_mesh_as_step_by_step(seed, monkeypatch):
-    pytest.importorskip("numba")
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    rng = np.random.default_rng(seed)
-    sewn, n_at_once = soup_module.sewn, 0
-    for k in range(60):
-        body = BODIES[rng.integers(len(BODIES))]
-        kept = body[1][rng.random(len(body[1])) >= rng.choice([0.0, 0.02])]
-        vertices, faces = hostile(rng) if k % 2 else soup(body[0], kept)
-        turned = rng.random(len(faces)) < rng.choice([0.0, 0.1])
-        faces = np.where(turned[:, None], faces[:, ::-1], faces)
-        found = []
-        for way in (sewn, lambda found: None):
-            monkeypatch.setattr(soup_module, "sewn", way)
-            try:
-                found.append(mesh_of(vertices, faces))
-            except MeshError as error:
-                found.append(str(error))
-        one, other = found
-        if isinstance(one, str):
-            assert one == other
-            continue
-        valid, triangles = soup_module.as_soup(vertices, faces)
-        n_at_once += sewn(soup_module.Search(valid, triangles)) is not None
-        for name in ("vertex_of", "loose"):
-            assert_array_equal(getattr(one, name), getattr(other, name))
-        for name in ("vertices", "faces", "boundary", "components"):
-            assert_array_equal(getattr(one.mesh, name), getattr(other.mesh, name))
-        assert list(map(str, one.workarounds)) == list(map(str, other.workarounds))
-        for mine, theirs in zip(one.workarounds, other.workarounds, strict=True):
-            assert_array_equal(mine.points, theirs.points)
-    assert n_at_once > 10
 
 
 @pytest.mark.parametrize("seed", every(2, range(4)))

@@ -15,7 +15,7 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.faults import find_faults
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.mesh.report import Kind
-from vtk_segdeform.mesh_repair.lids import triangulate_loop
+from vtk_segdeform.mesh_repair.lids import triangulate_loops
 from vtk_segdeform.mesh_repair.repair import repair
 
 SPHERE = icosphere(2)
@@ -238,7 +238,7 @@ def test_a_hole_whose_diagonals_all_exist_gets_one_new_vertex():
 
 def test_the_lid_of_a_loop_has_the_least_area():
     corners = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [1, 0.5, 0], [0, 2, 0]])  # an arrowhead
-    lid = triangulate_loop(corners, np.zeros((5, 5), bool))
+    lid = triangulate_loops(corners[None], np.zeros((1, 5, 5), bool))[0][0]
     a, b, c = corners[lid].transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(2.5)  # without overlap
@@ -260,7 +260,7 @@ def test_no_other_lid_of_a_bent_loop_has_less_area():
     rng = np.random.default_rng(8)
     for n in (4, 5, 6, 7) * 5:
         corners = rng.normal(size=(n, 3))
-        lid = corners[triangulate_loop(corners, np.zeros((n, n), bool))]
+        lid = corners[triangulate_loops(corners[None], np.zeros((1, n, n), bool))[0][0]]
         found = sum(area(*triangle) for triangle in lid)
         assert found == pytest.approx(least(corners, 0, n - 1), rel=0.02)
 

@@ -19,17 +19,15 @@ from statistics import median
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..cages import scaled_cages
-from ..deformer import Deformer, PaperDeformer, PaperSolution
+from ..deformer import Deformer, PaperDeformer
 from ..geometry import distortion
 from ..mesh import inside_points
 from ..progress import Progress, tell
-from ..solver import Solution
 from .measuring import by_turns, timed
 from .peers import CONVERGED
 from .results import Cell, Scale, Section, Table
-from .tasks import Task, bent_cactus, make_regions, prepare
+from .tasks import Task, bent_cactus, make_regions
 
 _SPEED_UP, _STEPS = 0.55 / 0.2, 4  # in the paper
 _DIAGONAL, _DIAGONALS = 100.0, (1.0, 10.0, 100.0, 1000.0)  # units of length
@@ -37,7 +35,7 @@ _SCALE = 1.2  # of the cages
 _MIN_CAGE = 8  # vertices of a cage
 _TIMED, _ROUNDS = 3, 3  # steps in one measurement; measurements per repeat
 _FRAMES = 12  # of a drag
-_MOST_STEPS, _LIVE_STEPS = 500, 8  # of a bend, and of a frame as the editor solves it
+_MOST_STEPS = 500  # of a bend
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ class Drag:
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
-    """Return both tables, the influence of the unit of length, and vtk_segdeform beside them."""
+    """Return both tables, and the influence of the unit of length."""
     n, task = scale.n_cage_vertices, in_units(bent_cactus(scale.paper_size), _DIAGONAL)
     tell(progress, 0.0, "table 1")
     cases = [printed(task, n_regions, n) for n_regions in (1, 3)]
@@ -74,8 +72,6 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
     second = _table_two(task, scale)
     tell(progress, 0.6, "units of length")
     units = _table_of_units(task, n)
-    tell(progress, 0.8, "vtk_segdeform")
-    ours, ratio = _table_of_ours(task, scale)
 
     def percent(each: list[Drag]) -> list[float]:
         return [100.0 * case.volume_change for case in each]
@@ -103,12 +99,11 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         f"{steps[0] / steps[1]:.2f} times as fast as one cage ({_SPEED_UP:.2f} times in the "
         f"paper): W has {cases[0].W.nnz / cases[1].W.nnz:.2f} times fewer non-zeros, and products "
         f"with W are {products[0] / products[1]:.2f} times as fast. The times of a frame in the "
-        "paper are read as exchanged, since they contradict its text. With vtk_segdeform the drag "
-        f"with three regions takes {ratio:.2f} times as long as with one cage: its steps multiply "
-        "by few rows of W. All times are of the processor."
+        "paper are read as exchanged, since they contradict its text. All times are of the "
+        "processor."
     )
     first = Table(columns, rows, "table 1, as printed", mixed=True)
-    return Section("Tables 1 and 2 of the paper", text, [first, second, units, ours])
+    return Section("Tables 1 and 2 of the paper", text, [first, second, units])
 
 
 def in_units(task: Task, diagonal: float) -> Task:
@@ -145,13 +140,9 @@ def bend(deformer: PaperDeformer, task: Task) -> Bend:
 
 
 def drag(deformer: PaperDeformer, task: Task, max_steps: int = _MOST_STEPS) -> Drag:
-    """Drag the handle of *task* from rest, by `_dragged`."""
+    """Drag the handle of *task* from rest by 1 % of the diagonal per frame, but for the first."""
     deformer.reset()
-    return _dragged(task, partial(deformer.solve, max_steps=max_steps, tolerance=CONVERGED))
-
-
-def _dragged(task: Task, solve: Callable[[FloatArray], Solution | PaperSolution]) -> Drag:
-    """Solve for targets that move by 1 % of the diagonal per frame; the first is not counted."""
+    solve = partial(deformer.solve, max_steps=max_steps, tolerance=CONVERGED)
     aside = 0.01 * task.mesh.diagonal * np.array([0.6, 0.8, 0.0])
     solutions, seconds = [], []
     for k in range(_FRAMES):
@@ -207,27 +198,6 @@ def _table_of_units(task: Task, n_vertices: int) -> Table:
         rows.append((diagonal, bent.steps, bent.handle_error, bent.distortion))
     columns = ("diagonal, units", "steps of the bend", "handle error, diagonals", "distortion")
     return Table(columns, rows, "three regions, as printed, in other units of length", mixed=True)
-
-
-def _table_of_ours(task: Task, scale: Scale) -> tuple[Table, float]:
-    """Return vtk_segdeform on the same task, and its time per frame, three regions / one cage."""
-    cases = [prepare(task, n_regions, scale.n_cage_vertices) for n_regions in (1, 3)]
-    drags = [_dragged(task, partial(case.solve, max_steps=_LIVE_STEPS)) for case in cases]
-    poses = []
-    for case in cases:
-        case.reset()
-        poses.append(case.solve(task.targets))
-    rows: list[tuple[Cell, ...]] = [
-        ("steps of the bend", *(pose.steps for pose in poses)),
-        ("its distortion", *(distortion(task.mesh, pose.vertices) for pose in poses)),
-        ("its handle error, diagonals", *(pose.handle_error for pose in poses)),
-        ("steps per frame of the drag", *(each.steps for each in drags)),
-        ("frame, s", *(each.seconds for each in drags)),
-        ("its volume change, %", *(100.0 * each.volume_change for each in drags)),
-    ]
-    one, three = (each.seconds for each in drags)
-    columns = "quantity", "one cage", "three regions"
-    return Table(columns, rows, "vtk_segdeform", True), three / one
 
 
 def _outside(case: PaperDeformer) -> int:

@@ -5,11 +5,7 @@ The order of its parts is fixed, independent of the order of the options:
 
     M = T(translation) T(pivot) R(axis, angle) T(-pivot) M_file
 
-that is, a matrix from a file first, then a rotation about the pivot, then a translation.  R is
-Rodrigues' formula, where K is the cross-product matrix of the unit axis:
-
-    R = 1 + sin(angle) K + (1 - cos(angle)) K^2
-
+that is, a matrix from a file first, then a rotation about the pivot, then a translation.
 Angles are in degrees in the options, and in radians everywhere else.
 
 M does not tell how many turns the rotation has, and the solver turns a handle the shorter way.  So
@@ -25,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, as_points
 from ..errors import ConstraintError
@@ -111,13 +108,6 @@ def read_matrix(path: str | Path) -> FloatArray:
     return matrix
 
 
-def translation(shift: ArrayLike) -> FloatArray:
-    """Return the (4, 4) matrix of a translation by *shift* (3,)."""
-    matrix = np.eye(4)
-    matrix[:3, 3] = shift
-    return matrix
-
-
 def rotation(axis: ArrayLike, angle: float, pivot: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Return the (4, 4) matrix of a rotation.
 
@@ -136,12 +126,11 @@ def rotation(axis: ArrayLike, angle: float, pivot: ArrayLike = (0.0, 0.0, 0.0)) 
     >>> transform([[1, 0, 0]], rotation([0, 0, 2], math.pi / 2, pivot=[1, 1, 0])).round(12)
     array([[2., 1., 0.]])
     """
-    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    matrix = np.eye(4)
-    matrix[:3, :3] += math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
-    pivot = np.asarray(pivot, dtype=float)
-    return translation(pivot) @ matrix @ translation(-pivot)
+    turn = Rotation.from_rotvec(angle * np.asarray(axis, dtype=float) / np.linalg.norm(axis))
+    matrix, centre = np.eye(4), np.asarray(pivot, dtype=float)
+    matrix[:3, :3] = turn.as_matrix()
+    matrix[:3, 3] = centre - turn.apply(centre)
+    return matrix
 
 
 def transform(points: ArrayLike, matrix: FloatArray) -> FloatArray:

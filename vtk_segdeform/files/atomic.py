@@ -5,9 +5,8 @@
 
 The file at *path* is replaced when the block ends without an error; otherwise it stays unchanged
 and the draft is deleted.  A process that is killed leaves its draft behind, a file named
-``.segdeform-<16 digits>.part``; the next write to the same folder deletes it.  Writers lock their
-drafts (`lock`), so a draft that can be locked is abandoned.  On Windows, where a lock would block
-the writer itself, a draft is abandoned after a day without changes.  Nothing else is ever deleted.
+``.segdeform-<16 digits>.part``; a write to the same folder deletes it when it has not changed for a
+day.  Nothing else is ever deleted.
 """
 
 from __future__ import annotations
@@ -17,20 +16,16 @@ import os
 import re
 import secrets
 import stat
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from .lock import holds
 from .regular_file import fault_of, is_ours, name_of
 
 _DRAFT = re.compile(r"\.segdeform-[0-9a-f]{16}\.part(\.\w{1,8})?")
 _IN_FOLDER = re.compile(r"\d{4,}\.png")  # the only files written to a folder
-_LOCKS = sys.platform != "win32"  # a locked file cannot be written through another handle there
 _A_DAY = 86_400.0  # seconds
-_TRIES = 50  # a sweep may hold the lock of a new draft for a moment; five were too few under load
 
 
 @contextmanager
@@ -63,7 +58,7 @@ def replacing(
     target = require_place(path, follow=follow)
     _sweep(target.parent)
     mode = _mode_of(target)
-    draft, handle = _create_draft(target, folder, 0o666 if mode is None else 0o600)
+    draft = _create_draft(target, folder, 0o666 if mode is None else 0o600)
     try:
         yield draft
         if durable and not folder:
@@ -74,8 +69,6 @@ def replacing(
     finally:
         with suppress(OSError):  # do not hide the error that led here
             _delete(draft)
-        if handle is not None:
-            os.close(handle)
     if durable:
         with suppress(OSError):  # folders cannot be flushed on every system
             _flush(target.parent)
@@ -110,27 +103,14 @@ def is_draft(name: str) -> bool:
     return _DRAFT.fullmatch(name) is not None
 
 
-def _create_draft(target: Path, folder: bool, mode: int) -> tuple[Path, int | None]:
-    """Return a new draft and the handle that locks it; None where locks do not work."""
+def _create_draft(target: Path, folder: bool, mode: int) -> Path:
     suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
-    for last in (*[False] * (_TRIES - 1), True):
-        draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
-        handle = None
-        if not folder:
-            handle = os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode)
-        else:
-            draft.mkdir()
-            if _LOCKS:
-                with suppress(FileNotFoundError):  # swept already
-                    handle = _open(draft, os.O_RDONLY)
-        if handle is not None and _LOCKS and holds(handle, draft):
-            return draft, handle
-        if handle is not None:
-            os.close(handle)
-        if last or not _LOCKS:
-            return draft, None
-        _delete(draft)  # a sweep was faster than the lock: try another one
-    raise AssertionError  # the last attempt returns
+    draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
+    if folder:
+        draft.mkdir()
+    else:
+        os.close(os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode))
+    return draft
 
 
 def _sweep(folder: Path) -> None:
@@ -139,27 +119,10 @@ def _sweep(folder: Path) -> None:
     with suppress(OSError), os.scandir(folder) as entries:
         for draft in [folder / entry.name for entry in entries if is_draft(entry.name)]:
             with suppress(OSError):
-                _sweep_one(draft)
-
-
-def _sweep_one(draft: Path) -> None:
-    status = os.lstat(draft)
-    if not is_ours(status) or not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-        return
-    if not _LOCKS:
-        if time.time() - status.st_mtime > _A_DAY:
-            _delete(draft)
-        return
-    handle = _open(draft, os.O_RDONLY if stat.S_ISDIR(status.st_mode) else os.O_RDWR)
-    try:
-        if holds(handle, draft):
-            _delete(draft)  # while the lock is held
-    finally:
-        os.close(handle)
-
-
-def _open(draft: Path, how: int) -> int:
-    return os.open(draft, how | os.O_NONBLOCK | os.O_NOFOLLOW)
+                status = os.lstat(draft)
+                is_plain = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
+                if is_ours(status) and is_plain and time.time() - status.st_mtime > _A_DAY:
+                    _delete(draft)
 
 
 def _delete(draft: Path) -> None:

@@ -38,22 +38,14 @@ def hold(path: Path) -> int | None:
         If the file cannot be opened.
     """
     handle = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600)
-    is_held = False
-    try:
-        is_held = holds(handle, path)
-    finally:
-        if not is_held:
-            os.close(handle)
-    return handle if is_held else None
-
-
-def holds(handle: int, path: Path) -> bool:
-    """Lock an open file; return whether that worked and *path* still names this file.
-
-    The previous holder may have deleted the file since it was opened.
-    """
     try:
         _lock(handle)
-        return os.path.samestat(os.fstat(handle), os.lstat(path))
-    except OSError:
-        return False
+        if os.path.samestat(os.fstat(handle), os.lstat(path)):
+            return handle
+    except OSError:  # locked by another
+        pass
+    except BaseException:
+        os.close(handle)
+        raise
+    os.close(handle)
+    return None

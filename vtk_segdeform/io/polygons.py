@@ -3,36 +3,25 @@
 counts[k] is the number of corners of polygon k; corners has the vertex indices of one polygon after
 another.  Triangles are polygons with counts of 3.  Files also have polygons of one or two corners,
 which are kept as they are given.
-
-Long because the compiled passes that cut polygons have their equivalents in numpy beside them.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
-from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray, vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from ..freezing import read_only
-from ..kernels import compiled_checks, inputs
-from ..mesh import cross_rows, first_equal_row, normals, repeats_vertex, row_hashes
+from ..mesh import cross_rows, first_equal_row, repeats_vertex, row_hashes
 from ..mesh_repair import triangulate_long_loop
 
 _PLANAR = 1e-6  # height over size
 _DOWN = -1e-9  # cosine of the normal of a triangle that is upside down, times its share of the area
-_NO_COUNTS: IntArray = np.empty(0, dtype=np.int64)
-# Of quads: VTK's filter takes a corner so near the diagonal beside it for one on it, at 1e-6.
-_LEAST_HEIGHT = 1e-5  # in the unit of the points
-_LEAST_SINE = 1e-3  # of the corners of a convex polygon
-_MOST_CORNERS = 24
-_NOT_CUT, _OF_EQUAL_LENGTH = -1, 2
-_CORNERS_OF_CUTS = np.array([[0, 1, 2, 0, 2, 3], *[[0, 1, 3, 1, 2, 3]] * 2])
 
 
 def polydata_of(points: FloatArray, counts: IntArray, corners: IntArray) -> pv.PolyData:
@@ -162,7 +151,7 @@ def cut_into_triangles(
 ) -> tuple[IntArray, IntArray]:
     """Return triangles (m, 3), and the polygon of each, (m,) int, in the order of polygons.
 
-    Convex polygons are cut along their shortest diagonals, others by ear clipping, planar ones
+    VTK cuts quads along their shorter diagonals and clips the ears of other polygons, planar ones
     without overlaps.  Where that fails, as for one that touches or crosses itself, the
     triangulation has the least area.  A polygon that is given again, in either direction, is cut
     like the first one.  Polygons of one or two corners have no triangles.
@@ -172,179 +161,30 @@ def cut_into_triangles(
         kept = counts[enough], corners[np.repeat(enough, counts)]
         faces, polygon = cut_into_triangles(points, *kept)
         return faces, np.flatnonzero(enough)[polygon]
-    number = np.arange(len(counts))
     if (counts == 3).all():
-        return corners.reshape(-1, 3), number
-    n_triangles, starts = counts - 2, np.cumsum(counts) - counts
-    faces, first = np.empty((int(n_triangles.sum()), 3), np.int64), np.cumsum(n_triangles)
-    first -= n_triangles
-    is_cut = counts == 3
-    faces[first[is_cut]] = _rows(corners, starts[is_cut], 3)
-    quads = np.flatnonzero(counts == 4)
-    of_quads = _rows(corners, starts[quads], 4)
-    cut = _quad_cuts(points, of_quads)
-    _put_halves(faces, first[quads], of_quads, cut)
-    is_cut[quads] = cut != _NOT_CUT
-    is_cut |= _convex_cuts(faces, points, counts, corners)
-    polygon, others = np.repeat(number, n_triangles), np.flatnonzero(~is_cut)
-    if len(others):
-        clipped, owner = _clipped(points, counts[others], corners[np.repeat(~is_cut, counts)])
-        n_clipped = np.bincount(owner, minlength=len(others))
-        if (n_clipped != n_triangles[others]).any():
-            kept = faces[is_cut[polygon]]
-            n_triangles[others] = n_clipped
-            polygon = np.repeat(number, n_triangles)
-            faces = np.empty((len(polygon), 3), dtype=np.int64)
-            faces[is_cut[polygon]] = kept
-        faces[np.flatnonzero(np.repeat(~is_cut, n_triangles))] = clipped
-    is_other = counts > 3
-    is_other[quads] = (cut == _NOT_CUT) | (cut == _OF_EQUAL_LENGTH)
-    some = np.flatnonzero(is_other & (n_triangles == counts - 2))
-    if len(some):  # other quads have the same shorter diagonal in any case
-        sums = np.add.reduceat(row_hashes(points)[corners], starts)[some]
+        return corners.reshape(-1, 3), np.arange(len(counts))
+    faces, polygon = _clipped(points, counts, corners)
+    starts = np.cumsum(counts) - counts
+    n_triangles = np.bincount(polygon, minlength=len(counts))
+    some = np.flatnonzero((counts > 3) & (n_triangles == counts - 2))
+    if len(some):
+        hashes = row_hashes(points)
+        hashes *= hashes >> np.uint64(32) | np.uint64(1)  # else sums are equal where signs differ
+        sums = np.add.reduceat(hashes[corners], starts)[some]
         ordered = np.sort(sums)
-        some = some[np.isin(sums, ordered[1:][ordered[1:] == ordered[:-1]])]  # few, if any
+        repeated = ordered[1:][ordered[1:] == ordered[:-1]]
+        some = some[np.isin(sums, repeated)] if len(repeated) else some[:0]
     if len(some):
         place = first_equal_row(points)
         for size in np.unique(counts[some]):
             alike = some[counts[some] == size]
-            _cut_alike(faces, polygon, alike, _rows(corners, starts[alike], size), place)
+            rows = corners[starts[alike, None] + np.arange(size)]
+            _cut_alike(faces, polygon, alike, rows, place)
     return faces, polygon
-
-
-def _rows(corners: IntArray, starts: IntArray, size: int) -> IntArray:
-    """Return the *corners* of polygons of *size* corners, (k, size)."""
-    if len(starts) * size == len(corners):
-        return corners.reshape(-1, size)
-    rows: IntArray = corners[starts[:, None] + np.arange(size)]
-    return rows
-
-
-def _quad_cuts(points: FloatArray, quads: IntArray) -> NDArray[np.int8]:
-    """Return along which diagonal to cut each of *quads* (q, 4): 0 or 1, from that corner.
-
-    2, _OF_EQUAL_LENGTH, is 1 as well.  -1, _NOT_CUT, if a quad is not convex, which is so if the
-    normals at two corners are not on the same side, or a corner is near the diagonal beside it.
-    This is what VTK's filter does, and the same from any first corner and in both directions.
-    """
-    cut = np.empty(len(quads), dtype=np.int8)
-    if kernels := compiled_checks(len(quads)):
-        kernels.quad_cuts(cut, _LEAST_HEIGHT**2, *inputs(points, quads))
-        return cut
-    with np.errstate(invalid="ignore", over="ignore"):
-        p = [points[corner] for corner in quads.T]
-        up = [cross_rows(p[(k + 1) % 4] - p[k], p[k - 1] - p[k]) for k in range(4)]
-        first, second = (_dot(p[k] - p[k + 2], p[k] - p[k + 2]) for k in range(2))
-        least = _LEAST_HEIGHT**2 * np.maximum(first, second)
-        convex = np.ones(len(quads), dtype=bool)
-        for k in range(4):
-            convex &= _dot(up[k], up[k]) >= least
-            for j in range(k):
-                convex &= _dot(up[j], up[k]) > 0.0
-        cut[:] = np.where(first < second, 0, np.where(first == second, _OF_EQUAL_LENGTH, 1))
-    cut[~convex] = _NOT_CUT
-    return cut
-
-
-def _put_halves(faces: IntArray, first: IntArray, quads: IntArray, cut: NDArray[np.int8]) -> None:
-    """Put the two triangles of each of *quads* (q, 4) that is *cut* (q,) into *faces*."""
-    if kernels := compiled_checks(len(quads)):
-        kernels.quad_halves(faces, *inputs(first, quads, cut))
-        return
-    is_cut = cut != _NOT_CUT
-    two = np.take_along_axis(quads[is_cut], _CORNERS_OF_CUTS[cut[is_cut]], axis=1)
-    for k in range(2):
-        faces[first[is_cut] + k] = two[:, 3 * k : 3 * k + 3]
-
-
-def _dot(u: FloatArray, v: FloatArray) -> FloatArray:
-    """Return the dot products of the rows of *u* and *v*, (k,) float."""
-    x, y, z = (u * v).T
-    return np.asarray((x + y) + z)
-
-
-def _convex_cuts(
-    faces: IntArray, points: FloatArray, counts: IntArray, corners: IntArray
-) -> BoolArray:
-    """Return which polygons are convex, and put their triangles into *faces*.
-
-    Polygon q has ``counts[q] - 2`` rows there.  The ear with the shortest diagonal is cut first.
-    Quads are none, see `_quad_cuts`, and neither are polygons of many corners.
-    """
-    is_cut = np.zeros(len(counts), dtype=bool)
-    some = np.flatnonzero((counts > 4) & (counts <= _MOST_CORNERS))
-    starts, first = np.cumsum(counts) - counts, np.cumsum(counts - 2) - (counts - 2)
-    if len(some) and (kernels := compiled_checks(len(corners))):
-        found = np.zeros(len(some), dtype=bool)
-        given = inputs(points, first[some], starts[some], counts[some], corners)
-        kernels.convex_cuts(faces, found, _LEAST_SINE**2, *given)
-        is_cut[some] = found
-        return is_cut
-    for size in np.unique(counts[some]):
-        alike = np.flatnonzero(counts == size)
-        polygons = corners[starts[alike, None] + np.arange(size)]
-        with np.errstate(invalid="ignore", over="ignore"):
-            spokes = np.ascontiguousarray((points[polygons] - points[polygons[:, :1]]).T)
-            is_convex = _are_convex(spokes)
-        alike = alike[is_convex]
-        cut = _ears_of_convex(spokes[:, :, is_convex])
-        at = first[alike][:, None] + np.arange(size - 2)
-        faces[at] = np.take_along_axis(polygons[is_convex], cut, axis=1).reshape(-1, size - 2, 3)
-        is_cut[alike] = True
-    return is_cut
-
-
-def _are_convex(spokes: FloatArray) -> BoolArray:
-    """Return which polygons are convex, with no corner nearly flat.
-
-    *spokes* (3, s, q) are their corners relative to the first ones.
-    """
-    size = spokes.shape[1]
-    corner = [spokes[:, k] for k in range(size)]
-    fan = [_cross(corner[k], corner[k + 1]) for k in range(1, size - 1)]
-    up = sum(fan[1:], fan[0])
-    convex = np.ones(spokes.shape[2], dtype=bool)
-    for each in fan:
-        convex &= _inner(each, up) > 0.0
-    square = _inner(up, up)
-    for k in range(size):
-        after, before = corner[(k + 1) % size] - corner[k], corner[k - 1] - corner[k]
-        height = _inner(_cross(after, before), up)
-        lengths = _inner(after, after) * _inner(before, before)
-        convex &= (height > 0.0) & (height * height >= _LEAST_SINE**2 * (square * lengths))
-    return convex
-
-
-def _ears_of_convex(spokes: FloatArray) -> IntArray:
-    """Return the corners (q, 3 (s - 2)) of the triangles of convex polygons, 0 to s - 1."""
-    places = list(spokes.transpose(1, 0, 2))
-    ring = list(np.indices(spokes.shape[1:])[0])
-    cut = []
-    while (left := len(ring)) > 3:
-        ends = [places[(k + 1) % left] - places[k - 1] for k in range(left)]
-        ear = np.argmin([_inner(step, step) for step in ends], axis=0)
-        cut += [np.choose((ear + k) % left, ring) for k in (-1, 0, 1)]
-        for kept in range(left - 1):
-            is_after = ear <= kept
-            ring[kept] = np.where(is_after, ring[kept + 1], ring[kept])
-            places[kept] = np.where(is_after, places[kept + 1], places[kept])
-        del ring[-1], places[-1]
-    return np.column_stack([*cut, *ring])
-
-
-def _cross(u: FloatArray, v: FloatArray) -> FloatArray:
-    return np.stack([u[k - 2] * v[k - 1] - u[k - 1] * v[k - 2] for k in range(3)])
-
-
-def _inner(u: FloatArray, v: FloatArray) -> FloatArray:
-    x, y, z = u * v
-    return np.asarray((x + y) + z)
 
 
 def _clipped(points: FloatArray, counts: IntArray, corners: IntArray) -> tuple[IntArray, IntArray]:
     """Return the triangles of polygons by ear clipping, or the least area where that fails."""
-    if not len(counts):
-        return np.empty((0, 3), dtype=np.int64), _NO_COUNTS
     faces, polygon = _clipped_ears(points, counts, corners)
     failed = _failed(points, counts, corners, faces, polygon)
     if not len(failed):
@@ -416,24 +256,22 @@ def _failed(
     points: FloatArray, counts: IntArray, corners: IntArray, faces: IntArray, polygon: IntArray
 ) -> IntArray:
     """Return the polygons with too few triangles, or planar with one of them upside down, (k,)."""
+    n_triangles = np.bincount(polygon, minlength=len(counts))
+    failed = np.zeros(len(counts), dtype=bool)
     starts = np.cumsum(counts) - counts
-    if kernels := compiled_checks(len(corners)):
-        found = np.zeros(len(counts), dtype=bool)
-        given = inputs(points, starts, counts, corners, faces, polygon)
-        kernels.wrongly_cut(found, _DOWN, _PLANAR, *given)
-        return np.flatnonzero(found)
-    following = np.arange(1, len(corners) + 1)
-    following[starts + counts - 1] = starts
-    repeated = np.add.reduceat(corners == corners[following], starts)
-    failed = np.bincount(polygon, minlength=len(counts)) < counts - repeated - 2
+    for each in np.flatnonzero(n_triangles < counts - 2):
+        ring = corners[starts[each] :][: counts[each]]
+        n_repeated = np.count_nonzero(ring == np.roll(ring, 1))
+        failed[each] = n_triangles[each] < counts[each] - n_repeated - 2
     with np.errstate(invalid="ignore", over="ignore"):
-        spoke = points[corners] - np.repeat(points[corners[starts]], counts, axis=0)
-        up = np.add.reduceat(np.cross(spoke, spoke[following]), starts)
-        cosine = np.einsum("fx,fx->f", normals(points[faces]), up[polygon])
+        a, b, c = (points.take(corner, axis=0) for corner in faces.T.copy())
+        normal = cross_rows(b - a, c - a)
+        up = np.stack([np.bincount(polygon, x, len(counts)) for x in normal.T], axis=1)
+        cosine = np.einsum("fx,fx->f", normal, up[polygon])
         square = np.einsum("cx,cx->c", up, up)
-        down = np.unique(polygon[cosine < _DOWN * square[polygon]])
-        for each in down:
-            spokes = spoke[starts[each] :][: counts[each]]
+        for each in np.unique(polygon[cosine < _DOWN * square[polygon]]):
+            around = points[corners[starts[each] :][: counts[each]]]
+            spokes = around - around[0]
             height = np.abs(spokes @ up[each]).max()
             failed[each] |= height <= _PLANAR * np.sqrt(square[each]) * np.abs(spokes).max()
     return np.flatnonzero(failed)

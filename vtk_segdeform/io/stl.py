@@ -30,7 +30,6 @@ import pyvista as pv
 
 from ..arrays import IntArray
 from ..errors import MeshError
-from ..kernels import compiled_checks, inputs
 from ..mesh import first_equal_row
 from .array_names import (
     HEADER,
@@ -44,10 +43,9 @@ from .array_names import (
     warn_renamed,
 )
 from .groups import GROUP, OBJECT, groups_of, names_key, set_groups
-from .number_lines import are_numbers
+from .number_lines import are_numbers, numbers_of
 from .polygons import cells_of, cut_into_triangles, polydata_of, polygons_of
 
-_SHORTEST = len("vertex 0 0 0")
 _START, _SIZE = 84, 50  # bytes before the triangles, and per triangle
 _BLANKS = b"\0\t\n\r\x1a "  # that may fill up a file
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
@@ -58,10 +56,8 @@ _FORMAT = (
 )
 _PIECE = 10_000  # triangles that are written at a time
 _SOLID = re.compile(rb"\n[ \t]*[sS][oO][lL][iI][dD](?=\s|\Z)[ \t]*([^\n]*)")
-_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.I)
-_FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.I)
-_END = re.compile(rb"^[ \t]*endsolid\b", re.MULTILINE | re.I)
-_END_FACET = re.compile(rb"^[ \t]*endfacet\b", re.MULTILINE | re.I)
+# In lower case, which is found in half the time
+_VERTEX = re.compile(rb"\n[ \t]*vertex[ \t]+(\S+[ \t]+\S+[ \t]+\S+)")
 _log = logging.getLogger(__name__)
 
 
@@ -117,14 +113,14 @@ def _read_text(path: Path, text: bytes) -> pv.PolyData:
     names, parts, numbers = dict[str, int](), list[Any](), list[IntArray]()
     has_end = is_named = False
     for solid, name, piece in _solids(text.replace(b"\r", b"\n")):
-        rows, facets, ends, has_end = _rows_of_text(piece)
-        if len(rows) != 3 * facets or not (has_end or facets == ends):
+        corners, is_whole, has_end = _corners_of_text(piece)
+        if not is_whole:
             raise MeshError("is truncated, or has a facet without three vertices")
-        if facets:
+        if len(corners):
             with np.errstate(over="ignore"):
-                parts.append(_numbers_of(rows).reshape(-1, 3).astype(np.float32))
+                parts.append(corners.astype(np.float32))
             number = names.setdefault(name or f"solid {solid}", len(names))
-            numbers.append(np.full(facets, number))
+            numbers.append(np.full(len(corners) // 3, number))
             is_named |= bool(name) or len(names) > 1
     if not (parts or has_end):
         raise MeshError("is truncated: it has no facet")
@@ -137,14 +133,6 @@ def _read_text(path: Path, text: bytes) -> pv.PolyData:
     if is_named:
         set_groups(surface, GROUP, np.concatenate(numbers), names)
     return surface
-
-
-def _numbers_of(rows: Any) -> Any:
-    try:
-        return np.array(rows, dtype=float)
-    except ValueError:
-        wrong = decoded(b" ".join(next(row for row in rows if not are_numbers(row))))
-        raise MeshError(f"has the vertex {wrong[:60]!r}; must be 3 numbers") from None
 
 
 def _solids(text: bytes) -> Iterator[tuple[int, str, bytes]]:
@@ -229,17 +217,20 @@ def _write_text(path: Path, rows: Any, group: IntArray, names: list[str]) -> Non
             begin = end
 
 
-def _rows_of_text(data: bytes) -> tuple[Any, int, int, bool]:
-    """Return the corners, the numbers of facet and endfacet, and whether there is an endsolid."""
-    kernels = compiled_checks(len(data) // _SHORTEST)
-    if kernels is not None:
-        (text,) = inputs(np.frombuffer(data, dtype=np.uint8))
-        corners, counts = np.empty((len(data) // _SHORTEST, 3), np.float32), np.empty(4, np.int64)
-        if kernels.facet_corners(text, corners, counts):
-            n_rows, facets, ends, n_ends = counts.tolist()
-            return corners[:n_rows], facets, ends, n_ends > 0
-    rows, facets = _VERTEX.findall(data), len(_FACET.findall(data))
-    return rows, facets, len(_END_FACET.findall(data)), _END.search(data) is not None
+def _corners_of_text(data: bytes) -> tuple[Any, bool, bool]:
+    """Return the corners (k, 3) of the facets, whether all are complete, and there is an end."""
+    data = b"\n" + data.lower()
+    has_end = b"endsolid" in data
+    facets = data.partition(b"endsolid")[0]
+    n_facets = facets.count(b"endfacet")
+    rows = _VERTEX.findall(data)
+    numbers = numbers_of(b"\n".join(rows), np.float64, 3 * len(rows))
+    if rows and numbers is None:
+        wrong = decoded(next(row for row in rows if not are_numbers(row.split())))
+        raise MeshError(f"has the vertex {wrong[:60]!r}; must be 3 numbers")
+    corners = np.reshape(numbers if rows else (), (-1, 3))
+    is_whole = len(rows) == 3 * n_facets and facets.count(b"facet") == 2 * n_facets
+    return corners, is_whole, has_end
 
 
 def _merged(corners: Any) -> tuple[Any, Any]:

@@ -33,7 +33,6 @@ from .grouping import (
 from .inside import distance_to_surface, inside_nodes, inside_points, winding_number
 from .intersections import (
     Crossings,
-    flat_faces,
     intersections_of,
     new_crossings,
     self_intersections,
@@ -44,7 +43,7 @@ from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
 from .surface_point import SurfacePoint
 from .topology import HalfEdges
-from .triangles import corner_angles, cross_rows, least_angle, normals
+from .triangles import corner_angles, cross_rows, flat_faces, least_angle, normals
 
 __all__ = [
     "UNREPAIRABLE",

@@ -11,32 +11,28 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, bounds_of, plain
 from ..errors import ArgumentError
-from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
 from .shells import ShellSums, closed_shells, shell_depths, shell_faults, shell_volumes
 from .topology import HalfEdges
-from .triangles import corner_columns, cross, norm
+from .triangles import flat_faces
 
 UNREPAIRABLE = (
     Kind.EMPTY, Kind.BAD_INDEX, Kind.TOO_LARGE, Kind.TOO_SMALL, Kind.OUTLYING, Kind.FLAT,
 )  # fmt: skip
 _EXAMPLES = 4
 _FEW = 100  # faces or points that usually answer a question about all
-_PIECE = 10_000  # faces per task; their data fit into the cache
-_LARGE_PIECE = 200_000  # faces per task of compiled kernels, which take a millisecond for so many
 _LARGEST, _SMALLEST = 1e70, 1e-70  # fourth powers of lengths must neither overflow nor vanish
 _OUTLYING = 1e13  # half widths of most of the mesh: its vertices differ by rounding errors only
 _SOME = 1000  # vertices whose median is close to that of all
-_FLAT = 1e-12  # height over longest edge; a flatter face counts as one without area
 
 
 def find_faults(vertices: ArrayLike, faces: ArrayLike) -> MeshReport:
@@ -120,14 +116,9 @@ class Search:
     @cached_property
     def _corners(self) -> tuple[BoolArray, int | None]:
         used, faces = np.zeros(len(self.points), dtype=bool), self.triangles
-        if kernels := compiled_checks(len(faces)):
-            n_repeating = kernels.used_vertices(used, *inputs(faces))
-            if n_repeating >= 0:
-                return used, n_repeating
-        elif not len(faces) or (faces.min() >= 0 and faces.max() < len(used)):
+        if not len(faces) or (faces.min() >= 0 and faces.max() < len(used)):
             used[faces] = True
             return used, int(np.count_nonzero(repeats_vertex(faces)))
-        used[:] = False
         used[faces[((faces >= 0) & (faces < len(used))).all(axis=1)]] = True
         return used, None
 
@@ -282,31 +273,25 @@ def connectivity_faults(n_points: int, faces: IntArray) -> list[str]:
     """
     if len(faces) < 4:
         return [f"a closed surface needs at least 4 faces; got {len(faces)}"]
-    a, b, c = faces.T
-    repeated = np.count_nonzero((a == b) | (b == c) | (c == a))
-    if repeated:
-        return [f"{counted(int(repeated), 'face repeats', 'faces repeat')} a vertex"]
+    if repeated := int(np.count_nonzero(repeats_vertex(faces))):
+        return [f"{counted(repeated, 'face repeats', 'faces repeat')} a vertex"]
     half_edges = HalfEdges(faces, n_points)
     faults = []
     if len(half_edges.boundary):
         border = counted(len(half_edges.boundary), "edge borders", "edges border")
         faults.append(f"{border} only one face: the cage is open")
-    if len(half_edges.non_manifold):
-        edges = counted(len(half_edges.non_manifold), "edge borders", "edges border")
+    if len(half_edges.branching):
+        edges = counted(len(half_edges.branching), "edge borders", "edges border")
         faults.append(f"{edges} three or more faces")
-    inconsistent = int(np.count_nonzero(half_edges.inconsistent))
-    if inconsistent:
-        edges = counted(inconsistent, "edge has", "edges have")
+    if len(half_edges.turned):
+        edges = counted(len(half_edges.turned), "edge has", "edges have")
         faults.append(f"{edges} faces of opposite orientation")
     unused = n_points - len(np.unique(faces))
     if unused:
         faults.append(f"{counted(unused, 'vertex is', 'vertices are')} in no face")
-    if not faults:
-        fans = half_edges.fans(half_edges.pairs)
-        pinched = len(np.unique(fans)) - n_points
-        if pinched:
-            vertices = counted(pinched, "vertex joins", "vertices join")
-            faults.append(f"{vertices} several surfaces at one point")
+    if not faults and len(half_edges.pinched):
+        vertices = counted(len(half_edges.pinched), "vertex joins", "vertices join")
+        faults.append(f"{vertices} several surfaces at one point")
     return faults
 
 
@@ -376,28 +361,6 @@ def _without_repeated(
         duplicate[~degenerate] = repeated
         half_edges = HalfEdges(half_edges.faces[~repeated], half_edges.n_vertices)
     return degenerate, duplicate, half_edges
-
-
-def flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
-    """Return the faces without area, (k,) int."""
-    flat = np.zeros(len(faces), dtype=bool)
-
-    if kernels := compiled_checks(len(faces)):
-        given = inputs(points, faces)
-        in_parallel(
-            partial(kernels.flat_faces, flat, *given, _FLAT), len(faces), _LARGE_PIECE, blas=False
-        )
-        return np.flatnonzero(flat)
-
-    def work(start: int, stop: int) -> None:
-        with np.errstate(invalid="ignore", over="ignore"):
-            a, b, c = corner_columns(points, faces[start:stop])
-            area = norm(cross(b - a, c - a))
-            longest = np.max([(e * e).sum(axis=0) for e in (b - a, c - b, a - c)], axis=0)
-            flat[start:stop] = area <= _FLAT * longest
-
-    in_parallel(work, len(faces), _PIECE, blas=False)
-    return np.flatnonzero(flat)
 
 
 def _edge_notes(half_edges: HalfEdges) -> Iterator[Fault]:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
 from ..kernels import compiled_checks, inputs, scratch
@@ -32,25 +34,9 @@ def connected(n: int, one: IntArray, other: IntArray) -> IntArray:
         kernels.link(tree, *inputs(np.asarray(one, np.int64), np.asarray(other, np.int64)))
         kernels.number_trees(tree)
         return tree
-    return renumbered_by_first(_linked(n, one, other))
-
-
-def _linked(n: int, one: IntArray, other: IntArray) -> IntArray:
-    """Return the first member of the component of each item, (n,) int.
-
-    In each round, all components join their lowest neighbours, if these are lower.  For a few
-    thousand items this takes a quarter of the time of scipy's search.
-    """
-    first = np.arange(n)
-    while True:
-        a, b = first[one], first[other]
-        apart = a != b
-        if not apart.any():
-            return first
-        one, other, a, b = one[apart], other[apart], a[apart], b[apart]
-        np.minimum.at(first, np.maximum(a, b), np.minimum(a, b))
-        while (further := first[first] != first).any():
-            first[further] = first[first[further]]
+    ends = np.asarray(one, np.int32), np.asarray(other, np.int32)  # as SciPy before 1.16 requires
+    graph = sparse.coo_array((np.ones(len(one), np.int8), ends), (n, n))
+    return renumbered_by_first(csgraph.connected_components(graph, directed=False)[1])
 
 
 def renumbered_by_first(labels: NDArray[np.integer]) -> IntArray:
@@ -136,12 +122,8 @@ def first_members(labels: NDArray[np.integer]) -> IntArray:
     array([1, 0])
     """
     first = np.zeros(int(labels.max(initial=-1)) + 1, np.int64)
-    if len(first) == 1:
-        return first
-    if kernels := compiled_checks(len(labels)):
-        kernels.first_members(first, *inputs(np.asarray(labels, dtype=np.int64)))
-        return first
-    first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
+    if len(first) > 1:
+        first[labels[::-1]] = np.arange(len(labels))[::-1]  # the last write wins
     return first
 
 

@@ -28,7 +28,6 @@ from .near_faces import near_faces
 
 _TOUCH = 1e-12  # of a pair's extent: at smaller distances triangles touch and planes coincide
 _FOLD = 1e-9  # radians between two faces folded over their common edge
-_NEEDLE = 1e-10  # height over longest edge; the plane of a flatter face is undefined
 _BATCH = 200_000  # pairs tested at once
 _KNOWN = 4  # poses that are kept besides the last and the rest pose
 
@@ -129,14 +128,6 @@ def _meeting(points: FloatArray, faces: IntArray, asked: BoolArray) -> IntArray:
             pairs = near[start : start + _BATCH]
             found.append(pairs[_meet(points, faces[pairs[:, 0]], faces[pairs[:, 1]])])
     return np.concatenate(found)
-
-
-def flat_faces(vertices: FloatArray, faces: IntArray) -> IntArray:
-    """Return the indices of faces with nearly zero area, whose plane is undefined."""
-    a, b, c = vertices[faces.T]
-    twice_area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.max([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)], axis=0)
-    return np.flatnonzero(twice_area <= _NEEDLE * longest)
 
 
 def _meet(points: FloatArray, a: IntArray, b: IntArray) -> BoolArray:

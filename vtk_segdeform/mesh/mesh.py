@@ -11,7 +11,7 @@ faults, `repair` corrects them in the mesh, and `Surface` deforms any polygons w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,7 @@ from ..arrays import FloatArray, IntArray, as_ids, as_points, bounds_of, frozen
 from ..checks import Described, require, shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen, read_only
-from ..kernels import compiled_checks, in_parallel, inputs
+from ..kernels import in_parallel
 from .edges import components, edge_keys
 from .faults import Search, as_soup, find_faults
 from .grouping import begins
@@ -30,7 +30,6 @@ from .topology import HalfEdges
 from .triangles import corner_columns, cross, norm
 
 _PIECE = 20_000  # faces per task; their data fit into the cache
-_LARGE_PIECE = 200_000  # faces per task of compiled kernels
 _OF_VTK = {"vtkPolyData", "vtkUnstructuredGrid", "vtkMultiBlockDataSet"}
 _BITS = 32  # of the second vertex in the number of an edge
 
@@ -173,13 +172,9 @@ class Mesh(Described, Frozen):
         """(n, n) symmetric sparse: edge lengths between neighbouring vertices."""
         least = np.finfo(float).tiny  # csgraph reads a zero as "no edge"
         at = self._edge_numbers
-        if kernels := compiled_checks(self.n_faces):
-            length = np.empty(len(at.data))
-            kernels.edge_lengths(length, least, *inputs(at.indptr, at.indices, self.vertices))
-        else:
-            i, j = self.edges.T
-            each = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
-            length = np.maximum(each, least)[at.data - 1]
+        i, j = self.edges.T
+        each = np.linalg.norm(self.vertices[i] - self.vertices[j], axis=1)
+        length = np.maximum(each, least)[at.data - 1]
         lengths = sparse.csr_array((length, at.indices, at.indptr), at.shape)
         for array in (lengths.data, lengths.indices, lengths.indptr):
             frozen(array)
@@ -189,12 +184,6 @@ class Mesh(Described, Frozen):
     def _edge_numbers(self) -> sparse.csr_array:
         """(n, n) symmetric sparse: 1 + the edge index between neighbouring vertices."""
         i, j = self.edges.T
-        if kernels := compiled_checks(self.n_faces):
-            starts, columns, data = (
-                np.empty(k, dtype=np.int32) for k in (self.n_vertices + 1, 2 * len(i), 2 * len(i))
-            )
-            kernels.edge_rows(starts, columns, data, *inputs(self.edges))
-            return sparse.csr_array((data, columns, starts), (self.n_vertices,) * 2)
         numbers = np.arange(1, len(i) + 1, dtype=np.int32)
         # In this order the neighbours of each vertex are sorted already.
         ends = np.concatenate([j, i], dtype=np.int32), np.concatenate([i, j], dtype=np.int32)
@@ -215,13 +204,7 @@ class Mesh(Described, Frozen):
             a, b, c = corner_columns(self.vertices, self.faces[start:stop])
             areas[start:stop] = 0.5 * norm(cross(b - a, c - a))
 
-        if kernels := compiled_checks(self.n_faces):
-            given = inputs(self.vertices, self.faces)
-            in_parallel(
-                partial(kernels.face_areas, areas, *given), self.n_faces, _LARGE_PIECE, blas=False
-            )
-        else:
-            in_parallel(work, self.n_faces, _PIECE, blas=False)
+        in_parallel(work, self.n_faces, _PIECE, blas=False)
         frozen(areas)
         return areas
 

@@ -233,10 +233,6 @@ def _boxes(
     """Return the smallest and the largest coordinates of each shell, (k, 3) each."""
     n_shells = int(shells.max()) + 1
     low, high = np.full((n_shells, 3), np.inf), np.full((n_shells, 3), -np.inf)
-    if kernels := compiled_checks(len(faces)):
-        last = np.full(len(vertices), -1, dtype=np.int32)
-        kernels.shell_boxes(low, high, last, *inputs(vertices, faces, shells))
-        return low, high
     by_shell = np.argsort(shells, kind="stable")
     corners, starts = faces[by_shell].ravel(), 3 * first_members(shells[by_shell])
     for axis in range(3):  # numpy takes ten times as long for rows of three numbers

@@ -26,13 +26,14 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_points
 from ..errors import ConstraintError, MeshError
 from .edges import components, repeats_vertex
-from .faults import UNREPAIRABLE, Search, as_soup, flat_faces
+from .faults import UNREPAIRABLE, Search, as_soup
 from .grouping import connected, first_members
 from .mesh import Mesh
 from .orientation import faces_to_flip
 from .report import Fault, Kind, counted
 from .topology import HalfEdges
-from .welding import rounding, sewn, welded
+from .triangles import flat_faces
+from .welding import rounding, welded
 
 _POINT = 1e-13  # of the largest component: no cage resolves so small a one
 _NONE: IntArray = np.empty(0, dtype=np.int64)
@@ -158,14 +159,10 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
             other = points[used.argmax()] if used.any() else 0.0
             found = found.at(np.where(used[:, None], points, other))
     _require_usable(found)
-    target = np.arange(len(points))
-    if (result := sewn(found)) is not None:
-        target, found = result
-    elif found.half_edges.all_twins and found.is_closed and not _may_have_points(found):
-        return Soup(points, Mesh.of(found), target)
+    if found.half_edges.all_twins and found.is_closed and not _may_have_points(found):
+        return Soup(points, Mesh.of(found), np.arange(len(points)))
     valid = found.points
-    joined, kept, half_edges, near = welded(valid, found)
-    target = joined[target]
+    target, kept, half_edges, near = welded(valid, found)
     without_area = _without_area(found, kept, half_edges)
     flat = np.flatnonzero(kept)[without_area] if without_area.any() else _NONE
     if len(flat):
@@ -185,7 +182,7 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
         mesh = Mesh.of(Search.known(valid, flipped, sums, depth))
     else:
         number = np.cumsum(left) - 1
-        flipped = flipped.renumbered(number, int(left.sum()))
+        flipped = HalfEdges(number[flipped.faces], int(left.sum()))
         mesh = Mesh.of(Search.known(valid[left], flipped, sums, depth))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]

@@ -28,8 +28,8 @@ import numpy as np
 
 from ..arrays import BoolArray, IntArray
 from ..freezing import read_only
-from ..kernels import compiled_checks, in_parallel, inputs, scratch
-from .edges import edge_keys, flipped_faces, next_half_edge
+from ..kernels import compiled_checks, inputs, scratch
+from .edges import components, edge_keys, flipped_faces, next_half_edge
 from .grouping import (
     begins,
     connected,
@@ -39,15 +39,8 @@ from .grouping import (
     two_sides,
 )
 
-_NAMELESS = (
-    "order", "twin", "opposite", "across", "first", "counts", "boundary", "pairs", "inconsistent",
-    "repeated", "shells", "sides", "one_sided", "crowded", "is_oriented", "turned", "neighbours",
-    "_parallel", "_alone", "_paired",
-)  # fmt: skip
-_UNDIRECTED = ("first", "counts", "shells")  # the same if faces are flipped
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
 _LARGEST = 2**63  # of 64-bit integers
-_LARGE = 200_000  # faces for which another thread is worth waking
 _NONE: IntArray = np.empty(0, dtype=np.int64)
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
 
@@ -90,29 +83,11 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        links, tree, narrow = scratch(np.int64, 3 * m, n, 2 * n + 1)
+        links, narrow = scratch(np.int64, 3 * m, 2 * n + 1)
         border, starts, *after = np.split(narrow.view(np.int32), np.cumsum([n, n + 2, n]))
-        tree[:] = np.arange(n)
-        found = [0, 0]
-
-        def work(start: int, stop: int) -> None:
-            for task in range(start, stop):
-                if task == 0:
-                    found[0] = kernels.one_fan_each(border, starts, *after, links, faces)
-                elif found[0] >= 0:  # for `shells`, which are needed too
-                    found[1] = kernels.link_corners(tree, faces)
-
-        has_shells = "shells" in self.__dict__
-        in_parallel(work, 1 if has_shells else 2, 1 if m >= _LARGE else 2, blas=False)
-        count, n_trees = found
+        count = kernels.one_fan_each(border, starts, *after, links, faces)
         if count < 0:
             return None
-        n_loose = np.count_nonzero(starts[:n] == starts[1 : n + 1])  # vertices in no face
-        if not has_shells and n_trees - n_loose == 1:
-            self.__dict__["shells"] = np.broadcast_to(np.int64(0), m)  # without memory
-        elif not has_shells:
-            kernels.number_trees(tree)
-            self.__dict__["shells"] = renumbered_by_first(tree[faces[:, 0]])
         alone = np.empty(count, dtype=np.int64)
         if count:
             kernels.border_half_edges(alone, border, faces)
@@ -277,12 +252,6 @@ class HalfEdges:
         return parallel
 
     @cached_property
-    def non_manifold(self) -> list[IntArray]:
-        """The half-edges of every edge that has three or more, one array per edge."""
-        where = np.flatnonzero(self.counts > 2)
-        return [self.order[self.first[e] : self.first[e] + self.counts[e]] for e in where]
-
-    @cached_property
     def inconsistent(self) -> BoolArray:
         """(p,) bool: pairs of the same direction, whose two faces have opposite orientation."""
         one, other = self.pairs.T
@@ -319,59 +288,25 @@ class HalfEdges:
         if self._alone is not None:
             return np.zeros(len(self.faces), dtype=bool)
         repeated = np.zeros(len(self.faces), dtype=bool)
-        if self._paired is not None and (kernels := compiled_checks(len(repeated))):
-            kernels.same_across(repeated, *inputs(self.opposite))
-            some = np.flatnonzero(repeated)
-        else:
-            a, b, c = self.across.T
-            same = (a == b) | (b == c) | (c == a)
-            some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
+        a, b, c = self.across.T
+        same = (a == b) | (b == c) | (c == a)
+        some = np.flatnonzero(same & (a != -1) & (b != -1) & (c != -1))
         if len(some):
             first = first_equal_row(np.sort(self.faces[some], axis=1))
             repeated[some] = first != np.arange(len(some))
         return repeated
 
-    def renumbered(self, number: IntArray, n_vertices: int) -> HalfEdges:
-        """Return the half-edges with each vertex v called number[v], which keeps their order.
-
-        What does not depend on the names of vertices is passed on.
-        """
-        renamed = HalfEdges(number[self.faces], n_vertices)
-        for name in _NAMELESS:
-            if name in self.__dict__:
-                renamed.__dict__[name] = self.__dict__[name]
-        return renamed
-
     def flipped(self, flip: BoolArray) -> HalfEdges:
-        """Return the half-edges with the faces *flip* (m,) in the other direction.
-
-        If these are whole shells, and every vertex has one fan, that is so afterwards, too.
-        """
+        """Return the half-edges with the faces *flip* (m,) in the other direction."""
         if not flip.any():
             return self
-        if "oriented" in self.__dict__ and self.oriented is not self:
-            return self.oriented.flipped(flip ^ self.sides[1])
-        turned = HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
-        known = self.__dict__
-        turned.__dict__.update({name: known[name] for name in _UNDIRECTED if name in known})
-
-        def renamed(half_edges: IntArray) -> IntArray:
-            face, corner = np.divmod(half_edges, 3)
-            return np.where(flip[face], half_edges + 2 - 2 * corner, half_edges)
-
-        if "order" in known:
-            turned.__dict__["order"] = renamed(self.order)
-        alone = known.get("_alone")
-        if alone is not None and (flip == flip[first_members(self.shells)][self.shells]).all():
-            turned.__dict__["_alone"] = renamed(alone)
-        return turned
+        return HalfEdges(flipped_faces(self.faces, flip), self.n_vertices)
 
     @cached_property
     def shells(self) -> IntArray:
         """(m,) int: the shell of each face, numbered from 0 in the order of their first faces."""
-        if self._alone is not None:  # each vertex is in one shell, so that vertices were linked
-            shells: IntArray = self.__dict__["shells"]
-            return shells
+        if self._alone is not None:  # each vertex is in one shell
+            return renumbered_by_first(components(self.n_vertices, self.faces)[self.faces[:, 0]])
         patch, half = self.sides[0], self.crowded
         at = np.flatnonzero(~begins(self.keys_of(half)))  # on the edge of the one before
         links = (patch[half[each] // 3] for each in (at - 1, at))
@@ -383,27 +318,8 @@ class HalfEdges:
 
         A patch is connected across pairs, and its faces agree after the flips; see `two_sides`.
         """
-        m = len(self.faces)
-        if self._paired is not None and (kernels := compiled_checks(m)):
-            patch = np.empty(m, dtype=np.int64)
-            flip, one_sided = np.empty((2, m), dtype=bool)
-            given = inputs(self._paired[0], self.faces)
-            count = kernels.face_sides(patch, flip, one_sided, *scratch(np.int64, m), *given)
-            return read_only((patch, flip, one_sided[:count].copy()))
         one, other = self.neighbours.T
-        return read_only(two_sides(m, one // 3, other // 3, self._parallel))
-
-    @cached_property
-    def oriented(self) -> HalfEdges:
-        """The half-edges after the flips of `sides`."""
-        return self.flipped(self.sides[1])
-
-    @property
-    def one_fan_after_flips(self) -> bool:
-        """Whether every vertex of `oriented` has one fan; False if that is not known."""
-        if self._alone is not None or self._paired is None or self.is_oriented:
-            return self._alone is not None
-        return self.oriented._alone is not None
+        return read_only(two_sides(len(self.faces), one // 3, other // 3, self._parallel))
 
     @cached_property
     def one_sided(self) -> BoolArray:

@@ -9,6 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..kernels import in_parallel
+
+_NEEDLE = 1e-10  # height over longest edge
+_PIECE = 10_000  # faces per task; their data fit into the cache
 
 
 def least_angle(corners: FloatArray) -> FloatArray:
@@ -69,3 +73,18 @@ def cross_rows(u: FloatArray, v: FloatArray) -> FloatArray:
 def norm(u: FloatArray) -> FloatArray:
     """Return the lengths of the columns of *u*, (k,) float."""
     return np.asarray(np.sqrt((u * u).sum(axis=0)))
+
+
+def flat_faces(points: FloatArray, faces: IntArray) -> IntArray:
+    """Return the faces without area, whose plane is undefined, (k,) int."""
+    flat = np.zeros(len(faces), dtype=bool)
+
+    def work(start: int, stop: int) -> None:
+        with np.errstate(invalid="ignore", over="ignore"):
+            a, b, c = corner_columns(points, faces[start:stop])
+            area = norm(cross(b - a, c - a))
+            longest = np.max([(e * e).sum(axis=0) for e in (b - a, c - b, a - c)], axis=0)
+            flat[start:stop] = area <= _NEEDLE * longest
+
+    in_parallel(work, len(faces), _PIECE, blas=False)
+    return np.flatnonzero(flat)

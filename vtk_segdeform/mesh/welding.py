@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from .edges import repeats_vertex
 from .faults import Search, distinct_faces
 from .grouping import connected, first_equal_row, first_members
 from .topology import HalfEdges
@@ -20,31 +19,6 @@ from .topology import HalfEdges
 _ROUNDINGS = 4.0  # of the largest coordinate, in the precision of all: the same position
 _NEARLY = 1e-2  # of the shortest edge at both points
 _NEAREST = 3  # other points of borders that are looked at
-
-
-def sewn(found: Search) -> tuple[IntArray, Search] | None:
-    """Weld all points of equal position: return the vertex of each (p,), and the search after that.
-
-    None if `welded` might weld fewer points.  It welds the same ones if the faces at each vertex
-    are one fan: a point inside a surface has a complete fan, so all welded points were on borders.
-    """
-    may_have_seams = 2 * len(found.points) > len(found.triangles) + 4  # than a closed surface has
-    if not may_have_seams or found.n_repeating != 0 or not found.used.all():
-        return None
-    is_first = found.first_at == np.arange(len(found.points))
-    if is_first.all():
-        return None
-    target = (np.cumsum(is_first) - 1)[found.first_at]
-    faces = target.take(found.triangles)
-    vertices = found.points.take(np.flatnonzero(is_first), axis=0)
-    if repeats_vertex(faces).any():
-        return None
-    half_edges = HalfEdges(faces, len(vertices))
-    if not half_edges.one_fan_after_flips:
-        return None
-    after = Search.known(vertices, half_edges)
-    after.__dict__["first_at"] = np.arange(len(vertices))
-    return target, after
 
 
 def welded(points: FloatArray, found: Search) -> tuple[IntArray, BoolArray, HalfEdges, IntArray]:

@@ -7,8 +7,6 @@ surrounding surface is built again from other triangulations of its loop, and th
     least area       by dynamic programming; cuts off bays and follows a curved border
     clipped ears     of the projected loop; for planar borders of any shape, and others with a
                      simple projection
-    least bending    minimises the largest angle between neighbours first; continues the surface
-                     smoothly
 
 All holes are processed together, so that a mesh with thousands of them takes seconds.
 """
@@ -21,7 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..mesh import HalfEdges, counted, edge_keys, intersections_of, least_angle, normals
+from ..mesh import HalfEdges, counted, edge_keys, intersections_of, least_angle
 from ..progress import Progress, part, tell
 from .hole_borders import border_loops
 from .lid_refining import Lids, harmonic, joined_twice, refine, split_edges
@@ -125,8 +123,6 @@ class _Holes:
         triangles = vertices[half_edges.faces[self.border // 3]]
         angles = np.split(least_angle(triangles), self.start[1:])
         self.sufficient = np.minimum(_ROUND, [float(np.median(some)) for some in angles])
-        up = normals(triangles)
-        self.outer = up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-300)
 
     def of(self, loop: int) -> slice:
         """Return the slice of the corners of a loop."""
@@ -152,8 +148,8 @@ def _best_lids(holes: _Holes, progress: Progress | None) -> tuple[Lids, _Scores]
     narrow = _least(holes, lids) < holes.sufficient
     scores = _scores(holes, lids, lids, ~narrow)  # others count as worse than any refined lid
     again = narrow | (scores.crossings > 0)
-    for k, attempt in enumerate((_refined, _clipped, _least_bending, _unrefined)):
-        tell(progress, 0.5 + 0.125 * k, "Refining the lids of holes")
+    for k, attempt in enumerate((_refined, _clipped, _unrefined)):
+        tell(progress, 0.5 + k / 6, "Refining the lids of holes")
         retried = again & (holes.length > 3)
         if not retried.any():
             break
@@ -259,21 +255,6 @@ def _clipped(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
     points[:k] = lid.points
     points[k:] = np.einsum("kyx,ky->kx", views[flat.owner[k:]], points[k:])
     return replace(flat, points=points)
-
-
-def _least_bending(holes: _Holes, lids: Lids, some: IntArray) -> Lids:
-    del lids
-    found: list[IntArray] = []
-    for n in np.unique(holes.length[some]):
-        loops = some[holes.length[some] == n]
-        at = holes.start[loops][:, None] + np.arange(n)
-        if n > _CUBIC:
-            found += [loop[triangulate_long_loop(holes.points[loop])] for loop in at]
-            continue
-        free = np.zeros((len(loops), n, n), dtype=bool)
-        lid, _ = triangulate_loops(holes.points[at], free, holes.outer[at])
-        found += list(lid + at[:, :1, None])
-    return refine(_of_corners(holes, found), holes.known, len(holes.vertices))
 
 
 def _of_corners(holes: _Holes, faces: list[IntArray]) -> Lids:

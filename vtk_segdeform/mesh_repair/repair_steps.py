@@ -60,6 +60,11 @@ class Draft:
         """The half-edges of the faces."""
         return HalfEdges(self.faces, len(self.vertices))
 
+    @property
+    def is_oriented(self) -> bool:
+        """Whether at most two faces meet at every edge, and agree there."""
+        return self.half_edges.is_oriented and not len(self.half_edges.crowded)
+
     def keep_faces(self, keep: BoolArray) -> Draft:
         """Return the draft with only the faces *keep* (m,), in their order."""
         return replace(
@@ -198,9 +203,9 @@ def split(draft: Draft) -> tuple[Draft, str]:
     faces, copied = split_fans(draft.vertices, draft.half_edges)
     if not len(copied):
         return draft, ""
-    edges = draft.half_edges.non_manifold
+    edges = draft.half_edges.branching
     sentence = f"split {_n(np.unique(copied), 'vertex', 'vertices')}"
-    sentence += f" and {_n(edges, 'edge')}" if edges else ""
+    sentence += f" and {_n(edges, 'edge')}" if len(edges) else ""
     sentence += f" where surfaces touch, adding {_n(copied, 'copy', 'copies')}"
     return (
         replace(
@@ -224,14 +229,14 @@ def orient(draft: Draft) -> tuple[Draft, str]:
     n_other = np.bincount(side, other_side, minlength=2 * m)
     is_minority = n_other > np.bincount(side, minlength=2 * m) - n_other
     flip = other_side != is_minority[side]
-    if not flip.any() or len(half_edges.non_manifold):
+    if not flip.any() or len(half_edges.crowded):
         return draft, ""
     return draft.flip(flip), f"flip {_n(flip, 'face')} to agree with the neighbours"
 
 
 def fill(draft: Draft, largest: int, progress: Progress | None = None) -> tuple[Draft, str]:
     """Fill holes of up to *largest* edges."""
-    if len(draft.half_edges.non_manifold) or draft.half_edges.inconsistent.any():
+    if not draft.is_oriented:
         return draft, ""
     closing = close_holes(draft.vertices, draft.half_edges, largest, progress)
     sizes, new = closing.sizes, len(closing.vertices)
@@ -281,7 +286,7 @@ def close_flat(draft: Draft) -> tuple[Draft, str]:
 
 def remaining_holes(draft: Draft, largest: int) -> tuple[int, ...]:
     """Return the number of edges of each hole that `fill` leaves open only because of its size."""
-    if len(draft.half_edges.non_manifold) or draft.half_edges.inconsistent.any():
+    if not draft.is_oriented:
         return ()
     loops = border_loops(draft.vertices, draft.half_edges, len(draft.half_edges.boundary))
     return tuple(sorted(len(loop) for loop in loops if len(loop) > largest))
@@ -290,7 +295,7 @@ def remaining_holes(draft: Draft, largest: int) -> tuple[int, ...]:
 def orient_outward(draft: Draft) -> tuple[Draft, str]:
     """Flip inside-out closed shells; shells without volume remain unchanged."""
     half_edges = draft.half_edges
-    if len(half_edges.non_manifold) or half_edges.inconsistent.any():
+    if not draft.is_oriented:
         return draft, ""
     wrong = misoriented_shells(draft.vertices, half_edges)
     flipped = draft.flip(wrong[half_edges.shells])

@@ -41,7 +41,10 @@ def split_fans(vertices: FloatArray, half_edges: HalfEdges) -> tuple[IntArray, I
     copied : (c,) int
         The original of each copy; the first fan at a vertex keeps the original.
     """
-    wedges = [_wedges(vertices, half_edges, around) for around in half_edges.non_manifold]
+    crowded = half_edges.crowded
+    begin = np.flatnonzero(np.diff(half_edges.keys_of(crowded)))
+    edges = np.split(crowded, begin + 1) if len(crowded) else []
+    wedges = [_wedges(vertices, half_edges, around) for around in edges]
     if any(not len(pairs) for pairs in wedges):
         return half_edges.faces, np.empty(0, dtype=np.int64)
     fans = half_edges.fans(np.concatenate([half_edges.pairs, *wedges]))

@@ -27,7 +27,6 @@ from .buffers import Document, numbers, object_, objects, whole
 
 COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_PIECE = 10_000  # rows whose products fit into the cache
 _PRIMITIVE = 1000  # cost of a primitive, as a number of elements
 
 
@@ -70,17 +69,8 @@ def products(matrices: Any, vectors: Any) -> FloatArray:
     >>> products(np.diag([2.0, 1.0, 1.0]), np.array([[1.0, 2.0, 3.0]]))
     array([[2., 2., 3.]])
     """
-    if np.array_equal(matrices, np.eye(3)):
-        return np.asarray(vectors, dtype=np.float64)
-    result, each = np.empty(vectors.shape), np.broadcast_to(matrices, (len(vectors), 3, 3))
-    for start in range(0, len(vectors), _PIECE):
-        rows = slice(start, start + _PIECE)
-        # By columns: numpy takes five times as long for rows of three numbers.
-        x, y, z = vectors[rows].T.astype(np.float64)
-        for i in range(3):
-            a, b, c = each[rows, i].T
-            result[rows, i] = (a * x + b * y) + c * z
-    return result
+    x = np.asarray(vectors, dtype=np.float64)
+    return np.asarray(np.einsum("...ij,...j->...i", matrices, x))
 
 
 def scene_of(document: Document) -> tuple[list[Block], list[Piece]]:

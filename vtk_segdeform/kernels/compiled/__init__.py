@@ -10,16 +10,12 @@
     cells           `cell_energy.CellEnergy`
     factor          `hessian.Factor`, `finish.factor.factored`
     collapses       `simplify.simplify`
-    half_edges      `topology.HalfEdges`, `grouping.connected`,
-                    `grouping.first_members`, `Mesh.adjacency`
+    half_edges      `topology.HalfEdges`, `grouping.connected`, `grouping.first_equal_row`
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
     paths           `blending.border_distance`
     shells          `shells.shell_volumes`, `shells.shell_depths`
-    triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`,
-                    `polygons.cut_into_triangles`
-    text            `number_lines.numbers_of`, `number_lines.Lines`, `stl.read_stl`,
-                    `ply_tables.tables_of`
+    text            `number_lines.numbers_of`, `number_lines.Lines`, `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -31,17 +27,11 @@ from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import add_upper, solve_factored, solve_sparse
 from .half_edges import (
     border_half_edges,
-    edge_lengths,
-    edge_rows,
-    face_sides,
-    first_members,
+    first_equal_points,
     link,
-    link_corners,
     number_trees,
     one_fan_each,
     pair_half_edges,
-    same_across,
-    used_vertices,
 )
 from .interpolated import add_interpolated, add_interpolated_adjoint, interpolated_rows
 from .mean_value import weights
@@ -50,22 +40,12 @@ from .pairs import facing_pairs, opposite_pairs
 from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
-from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
+from .shells import shell_extremes, shell_sums, shells_around
 from .text import (
     corners_of_lines,
-    facet_corners,
     numbers_of_lines,
     plain_numbers,
     rows_of_lists,
-)
-from .triangles import (
-    convex_cuts,
-    face_areas,
-    first_equal_points,
-    flat_faces,
-    quad_cuts,
-    quad_halves,
-    wrongly_cut,
 )
 from .volumes import (
     determinants,
@@ -86,24 +66,15 @@ __all__ = [
     "cell_forces",
     "cell_sums",
     "collapse_costs",
-    "convex_cuts",
     "corners_of_lines",
     "determinants",
     "distances_inside",
-    "edge_lengths",
-    "edge_rows",
-    "face_areas",
-    "face_sides",
-    "facet_corners",
     "facing_pairs",
     "first_equal_points",
-    "first_members",
-    "flat_faces",
     "grow_tree",
     "independent_edges",
     "interpolated_rows",
     "link",
-    "link_corners",
     "map_packed",
     "may_meet",
     "number_trees",
@@ -113,14 +84,10 @@ __all__ = [
     "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",
-    "quad_cuts",
-    "quad_halves",
     "ring_normals",
     "rings",
     "rotations",
     "rows_of_lists",
-    "same_across",
-    "shell_boxes",
     "shell_extremes",
     "shell_sums",
     "shells_around",
@@ -129,11 +96,9 @@ __all__ = [
     "sorted_edges",
     "spread_cells",
     "touching_boxes",
-    "used_vertices",
     "valid_collapses",
     "volume_along_sums",
     "volume_gradient",
     "volume_sums",
     "weights",
-    "wrongly_cut",
 ]

@@ -140,56 +140,6 @@ def pair_half_edges(opposite, starts, edges, bucket, faces):
     return n_alone, n_several, n_parallel
 
 
-@_compile("b1[:], const i8[:]")
-def same_across(same, opposite):
-    """Mark the faces without an edge alone that have one face, or several, across two edges.
-
-    *opposite* (3m,) is as of `pair_half_edges`; *same* is (m,) bool.
-    """
-    for f in range(len(same)):
-        a, b, c = opposite[3 * f], opposite[3 * f + 1], opposite[3 * f + 2]
-        a = a // 3 if a >= 0 else a
-        b = b // 3 if b >= 0 else b
-        c = c // 3 if c >= 0 else c
-        same[f] = (a == b or b == c or c == a) and a != -1 and b != -1 and c != -1
-
-
-@_compile("i8[:], b1[:], b1[:], i8[:], const i8[:], const i8[:,:]")
-def face_sides(patch, flip, one_sided, pending, opposite, faces):
-    """Put the patch of each face into *patch* (m,), and whether to flip it into *flip* (m,) bool.
-
-    Return the number of patches.  *opposite* (3m,) is as of `pair_half_edges`; a patch is connected
-    across pairs, and no face of a patch with one side is flipped.  *one_sided* (m,) bool gets
-    whether each patch has one side; *pending* (m,) int64 is of any values.
-    """
-    count = 0
-    patch[:] = -1
-    for first in range(len(faces)):
-        if patch[first] >= 0:
-            continue
-        patch[first], flip[first], one_sided[count] = count, False, False
-        pending[0], left = first, 1
-        while left:
-            left -= 1
-            f = pending[left]
-            for c in range(3):
-                h = opposite[3 * f + c]
-                if h < 0:
-                    continue
-                g = h // 3
-                turned = flip[f] ^ (faces[f, c] == faces[g, h - 3 * g])
-                if patch[g] < 0:
-                    patch[g], flip[g] = count, turned
-                    pending[left] = g
-                    left += 1
-                elif flip[g] != turned:
-                    one_sided[count] = True
-        count += 1
-    for f in range(len(faces)):
-        flip[f] &= not one_sided[patch[f]]
-    return count
-
-
 @_compile("i8[:], const i8[:], const i8[:]")
 def link(parent, one, other):
     """Join the trees of items one[i] and other[i]; *parent* (n,) of each is at most itself."""
@@ -207,37 +157,6 @@ def link(parent, one, other):
             parent[a] = b
 
 
-@_compile("i8[:], const i8[:,:]")
-def link_corners(parent, faces):
-    """Join the trees of the vertices of each face; see `link`.  Return how many trees are left."""
-    for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        lowest = min(a, b, c)
-        parent[a] = min(parent[a], lowest)
-        parent[b] = min(parent[b], lowest)
-        parent[c] = min(parent[c], lowest)
-    left = 0
-    for v in range(len(parent)):
-        parent[v] = parent[parent[v]]
-        left += parent[v] == v
-    for f in range(len(faces)):
-        a = parent[faces[f, 0]]
-        for c in range(1, 3):
-            b = parent[faces[f, c]]
-            if a == b:
-                continue
-            while parent[a] != a:
-                parent[a] = parent[parent[a]]
-                a = parent[a]
-            while parent[b] != b:
-                parent[b] = parent[parent[b]]
-                b = parent[b]
-            left -= a != b
-            a, b = min(a, b), max(a, b)
-            parent[b] = parent[faces[f, 0]] = parent[faces[f, c]] = a
-    return left
-
-
 @_compile("i8[:]")
 def number_trees(parent):
     """Replace the *parent* (n,) of each item by the number of its tree, by first members."""
@@ -250,63 +169,31 @@ def number_trees(parent):
             parent[i] = parent[parent[i]]  # which has its number already
 
 
-@_compile("i8[:], const i8[:]")
-def first_members(first, labels):
-    """Put the first item with each of *labels* (n,) into *first* (k,)."""
-    for i in range(len(labels) - 1, -1, -1):
-        first[labels[i]] = i
+@_compile("i8[:], const f8[:,:], i4[:]")
+def first_equal_points(first, points, table):
+    """Put the first row equal to each of *points* (n, 3) into *first* (n,); NaN equals nothing.
 
-
-@_compile("b1[:], const i8[:,:]")
-def used_vertices(used, faces):
-    """Mark the vertices of faces in *used* (n,) and return how many faces repeat a vertex.
-
-    Return -1 if a face has a vertex outside of 0..n-1.
+    *table* (a power of two above n,) must be filled with -1.
     """
-    n, n_repeating = len(used), 0
-    for f in range(len(faces)):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if min(a, b, c) < 0 or max(a, b, c) >= n:
-            return -1
-        n_repeating += (a == b) | (b == c) | (c == a)
-        used[a] = used[b] = used[c] = True
-    return n_repeating
-
-
-@_compile("i4[:], i4[:], i4[:], const i8[:,:]")
-def edge_rows(starts, ends, numbers, edges):
-    """Put the neighbours of each vertex into *ends* (2e,), and 1 + the edge to each into *numbers*.
-
-    Those of vertex v are from starts[v] to starts[v + 1], in ascending order; *starts* is (n + 1,).
-    *edges* (e, 2) have the smaller vertex first, and are in lexicographic order.
-    """
-    starts[:] = 0
-    for e in range(len(edges)):
-        starts[edges[e, 0]] += 1
-        starts[edges[e, 1]] += 1
-    total = 0
-    for v in range(len(starts)):
-        starts[v], total = total, total + starts[v]
-    for e in range(len(edges)):
-        i, j = edges[e, 0], edges[e, 1]
-        k = starts[i]
-        starts[i], ends[k], numbers[k] = k + 1, j, e + 1
-        k = starts[j]
-        starts[j], ends[k], numbers[k] = k + 1, i, e + 1
-    for v in range(len(starts) - 1, 0, -1):
-        starts[v] = starts[v - 1]
-    starts[0] = 0
-
-
-@_compile("f8[:], f8, const i4[:], const i4[:], const f8[:,:]")
-def edge_lengths(lengths, least, starts, ends, points):
-    """Put the lengths of these edges, at least *least*, into *lengths* (2e,); see `edge_rows`."""
-    for i in range(len(starts) - 1):
-        for k in range(starts[i], starts[i + 1]):
-            j = ends[k]
-            x, y, z = (
-                points[i, 0] - points[j, 0],
-                points[i, 1] - points[j, 1],
-                points[i, 2] - points[j, 2],
-            )
-            lengths[k] = max(np.sqrt((x * x + y * y) + z * z), least)
+    mask = np.uint64(len(table) - 1)
+    bits = np.zeros(3, np.float64)
+    as_bits = bits.view(np.uint64)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] + 0.0, points[i, 1] + 0.0, points[i, 2] + 0.0  # 0 and -0 are equal
+        bits[0], bits[1], bits[2] = x, y, z
+        mixed = np.uint64(0)
+        for c in range(3):
+            mixed = (mixed ^ as_bits[c]) * np.uint64(0x9E3779B97F4A7C15)
+            mixed ^= mixed >> np.uint64(29)
+        first[i] = i
+        if x != x or y != y or z != z:
+            continue
+        slot = mixed & mask
+        while table[slot] >= 0:
+            j = table[slot]
+            if points[j, 0] == x and points[j, 1] == y and points[j, 2] == z:
+                first[i] = j
+                break
+            slot = (slot + np.uint64(1)) & mask
+        else:
+            table[slot] = i

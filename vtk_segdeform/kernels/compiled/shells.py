@@ -38,27 +38,6 @@ def shell_sums(volume, area, size, origins, points, faces, shells):
         size[s] = max(size[s], np.sqrt((ax * ax + ay * ay) + az * az))
 
 
-@_compile("f8[:,:], f8[:,:], i4[:], const f8[:,:], const i8[:,:], const i8[:]")
-def shell_boxes(low, high, last, points, faces, shells):
-    """Lower *low* and raise *high* (k, 3) of each shell to the coordinates of its vertices.
-
-    *last* (n,) must be filled with -1.
-    """
-    for f in range(len(faces)):
-        s = shells[f]
-        for c in range(3):
-            v = faces[f, c]
-            if last[v] == s:
-                continue
-            last[v] = s
-            for axis in range(3):
-                x = points[v, axis]
-                if x < low[s, axis]:
-                    low[s, axis] = x
-                if x > high[s, axis]:
-                    high[s, axis] = x
-
-
 @_compile("i8[:,:], const i8[:], const f8[:,:], const i8[:,:], const i8[:], const i8[:]")
 def shell_extremes(extremes, some, points, faces, starts, stops):
     """Put the vertices with the least and the largest x, y, z of *some* shells into their rows.

@@ -28,8 +28,6 @@ _PLUS, _MINUS, _POINT, _SLASH, _ZERO, _NINE, _E = b"+-./09e"
 _MOST_DIGITS = 17  # of an index
 _LETTER_CASE = 0x20
 _FLOAT, _INTEGER = b"fi"
-_VERTEX, _FACET = np.frombuffer(b"vertex", "u1"), np.frombuffer(b"facet", "u1")
-_END_FACET, _END_SOLID = np.frombuffer(b"endfacet", "u1"), np.frombuffer(b"endsolid", "u1")
 
 
 @_compile()
@@ -198,57 +196,6 @@ def corners_of_lines(text, starts, lines, skip, counts, corners):
             count += 1
         counts[row] = count - first
     return count
-
-
-@_compile()
-def _after_word(text, at, word):
-    """Return the index after *word* in letters of any case at text[at]; -1 if it is not there."""
-    if at + len(word) > len(text):
-        return -1
-    for k in range(len(word)):
-        if (text[at + k] | _LETTER_CASE) != word[k]:
-            return -1
-    end = at + len(word)
-    if end < len(text) and text[end] != _SPACE and not _TAB <= text[end] <= _RETURN:
-        return -1
-    return end
-
-
-@_compile("const u1[:], f4[:,:], i8[:]")
-def facet_corners(text, corners, counts):
-    """Put the numbers after each "vertex" of an STL *text* (b,) uint8 into *corners* (k, 3).
-
-    Put into *counts* (4,) the numbers of lines that begin with vertex, facet, endfacet and
-    endsolid.  Return False if a vertex has anything else than three plain numbers, or if there are
-    over k of them.
-    """
-    counts[:] = 0
-    at = 0
-    while at < len(text):
-        while at < len(text) and (text[at] == _SPACE or text[at] == _TAB):
-            at += 1
-        end = _after_word(text, at, _VERTEX)
-        if end >= 0:
-            if counts[0] == len(corners):
-                return False
-            for axis in range(3):
-                while end < len(text) and (text[end] == _SPACE or text[end] == _TAB):
-                    end += 1
-                corners[counts[0], axis], end = _number(text, end, np.bool_(False))
-                if end < 0:
-                    return False
-            counts[0] += 1
-            at = end
-        elif _after_word(text, at, _FACET) >= 0:
-            counts[1] += 1
-        elif _after_word(text, at, _END_FACET) >= 0:
-            counts[2] += 1
-        elif _after_word(text, at, _END_SOLID) >= 0:
-            counts[3] += 1
-        while at < len(text) and text[at] != _LINE_FEED:
-            at += 1
-        at += 1
-    return True
 
 
 @_compile(
