@@ -52,7 +52,6 @@ from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
 from vtk_segdeform.mesh.grouping import first_members
 from vtk_segdeform.mesh.shells import _boxes
-from vtk_segdeform.regions.blending import blend_weights, border_distance
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 from vtk_segdeform.widgets.picking.line_of_sight import faces_in_beam
@@ -528,22 +527,6 @@ def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions):
     columns, w = subspace.nonzeros(some)
     assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
     assert_array_equal(w, dense[np.ix_(some, columns)])
-
-
-def test_distances_to_borders_agree(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
-    angle = np.arctan2(MESH.vertices[:, 1], MESH.vertices[:, 0])
-    masks = Regions.from_labels(MESH, np.floor(angle).astype(int), 3).membership.copy()
-    masks[0] |= RNG.random(MESH.n_vertices) < 0.3  # many pieces, holes and isolated vertices
-    masks = np.concatenate([masks, np.ones((1, MESH.n_vertices), dtype=bool)])  # has no border
-    quick, plain = twin(lambda: border_distance(MESH, masks))
-    assert_array_equal(quick, plain)
-    some = np.flatnonzero(angle > 2.5)
-    for found in twin(lambda: border_distance(MESH, masks, some)):
-        assert_array_equal(found[:, some], plain[:, some])
-    masks[-1] = angle > 3.0
-    for weights in twin(lambda: Regions.from_masks(MESH, masks).weights):
-        assert_array_equal(weights, blend_weights(masks, border_distance(MESH, masks)))
 
 
 def test_kernels_are_compiled_without_a_cache_folder(monkeypatch):

@@ -22,13 +22,8 @@ from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from ..checks import Described, shown
 from ..errors import RegionError
 from ..freezing import Frozen
-from ..mesh import Mesh, counted, require_mesh
-from .blending import (
-    blend_weights,
-    border_distance,
-    distance_to_triangles,
-    overlap_weights,
-)
+from ..mesh import Mesh, counted, distance_to_surface, require_mesh
+from .blending import blend_weights, border_distance, overlap_weights
 
 _EQUAL_WEIGHT = 1e-9  # weights that differ by rounding only
 
@@ -265,7 +260,7 @@ def cage_distance_weights(regions: Regions, cages: Sequence[CageSurface]) -> Flo
     for r, cage in enumerate(cages):
         inside = regions.members(r)
         points = regions.mesh.vertices[inside]
-        distance[r, inside] = distance_to_triangles(points, cage.vertices, cage.faces)
+        distance[r, inside] = distance_to_surface(points, cage.vertices, cage.faces)
     return blend_weights(regions.membership, distance)
 
 

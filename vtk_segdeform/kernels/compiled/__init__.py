@@ -14,7 +14,6 @@
                     `grouping.first_members`, `Mesh.adjacency`
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
-    paths           `blending.border_distance`
     beams           `line_of_sight.faces_in_beam`
     shells          `shells.shell_volumes`, `shells.shell_depths`
     triangles       `faults.Search`, `grouping.first_equal_row`, `Mesh.face_areas`,
@@ -49,7 +48,6 @@ from .interpolated import add_interpolated, add_interpolated_adjoint, interpolat
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .pairs import facing_pairs, opposite_pairs
-from .paths import distances_inside
 from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
 from .rotations import rotations
 from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
@@ -90,7 +88,6 @@ __all__ = [
     "convex_cuts",
     "corners_of_lines",
     "determinants",
-    "distances_inside",
     "edge_lengths",
     "edge_rows",
     "face_areas",
