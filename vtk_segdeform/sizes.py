@@ -35,12 +35,6 @@ PARALLEL_SEARCH = 1_000
 
 1,000 searches take 0.4 to 0.9 ms, waking another thread 0.1 ms."""
 
-ONE_CALL = 1 << 20
-"""Numbers in W~ up to which one call of a kernel multiplies by all of it, in one thread.
-
-Eight megabytes stay in the cache between a map and its transpose, and waking other threads takes
-longer than the product: 0.10 ms instead of 0.13 for a map and its transpose of 386,000 numbers."""
-
 COARSE_VOLUME = 3_000
 """Vertices beyond which the solver's steps compute the volume over a coarse surface.
 

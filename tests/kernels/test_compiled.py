@@ -460,50 +460,24 @@ def test_the_faces_in_a_beam_agree(twin, width):
         assert len(quick) < len(MESH.faces)
 
 
-@pytest.mark.parametrize("columns", [3, 6, 9])
-def test_a_small_subspace_multiplied_in_one_call_is_the_sum_over_its_regions(twin, columns):
-    rows = [np.sort(RNG.permutation(4001)[:count]) for count in (3000, 1801, 0, 7)]
-    blocks = [RNG.normal(size=(len(own), m)) for own, m in zip(rows, (50, 33, 20, 12), strict=True)]
-    subspace = Subspace(4001, tuple(rows), tuple(blocks))
-    reached = subspace.sets_by_cages()
-    assert 5 <= len(reached) <= 8  # by none, by one, by two, by three
-    assert_array_equal(np.sort(np.concatenate(reached)), np.arange(4001))
-    p, start, y = (RNG.normal(size=(k, c)) for k, c in ((115, columns), (4001, 3), (4001, 3)))
-    for call in (
-        lambda: subspace.map(p),
-        lambda: subspace.map(p, start),
-        lambda: subspace.adjoint(y),
-        lambda: subspace.adjoints([y]),
-        lambda: subspace.adjoints([y, y[::-1]]),
-        lambda: subspace.adjoints([y, 2.0 * y, -y]),
-    ):
-        quick, plain = twin(call)
-        assert subspace._is_packed
-        assert_allclose(quick, plain, rtol=1e-12, atol=1e-11)
-    assert subspace.adjoints([]) == []
-
-
 def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
     pytest.importorskip("numba")
-    from vtk_segdeform.kernels.compiled import add_packed_adjoint, map_packed, solve_factored
+    from vtk_segdeform.kernels.compiled import add_adjoint, solve_factored
     from vtk_segdeform.kernels.compiled.text import _number
 
     rows = np.arange(2500), np.arange(1500, 4000)
     subspace = Subspace(4000, rows, tuple(RNG.random((2, 2500, 40))))
     p, y = RNG.normal(size=(80, 3)), RNG.normal(size=(4000, 3))
-    (kept,) = dispatch.inputs(y)
-    subspace.map(p)
     for one in (subspace, copy.deepcopy(subspace)):
         one.map(p)
         one.map(*dispatch.inputs(p, y))
-        for ys in ([y], [y, kept], [kept, y]):
-            one.adjoints(ys)
-        assert one._is_packed
+        for each in (y, *dispatch.inputs(y)):
+            one.adjoint(each)
     for coupled in (True, False):
         Factor(np.eye(180), coupled).solve(np.ones((60 if coupled else 180, 3)))
     closest_rotations(SHAPES["any"])
     numbers_of(1000 * b"1.5 2\n", float)
-    for kernel in (map_packed, add_packed_adjoint, solve_factored, _number):
+    for kernel in (add_adjoint, solve_factored, _number):
         assert len(kernel.signatures) <= 1, kernel  # none if in the cache with its caller
 
 

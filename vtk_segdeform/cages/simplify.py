@@ -35,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import compiled_checks, inputs, scratch
+from ..kernels import compiled_checks, inputs
 from ..mesh import cross_rows
 from ..progress import Progress, tell
 
@@ -166,7 +166,8 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
     kernels = compiled_checks(len(s.faces))
     if kernels:
         ends = np.empty((m, 2), dtype=np.int64)
-        kernels.sorted_edges(i, j, ends, *scratch(np.int64, n + 2, 2 * m, 2 * m), *inputs(s.faces))
+        room = (np.empty(size, dtype=np.int64) for size in (n + 2, 2 * m, 2 * m))
+        kernels.sorted_edges(i, j, ends, *room, *inputs(s.faces))
         read = inputs(i, j, known.i, known.j, known.cost, known.place, is_moved)
         kernels.collapse_costs(
             cost, place, *read, _MIDPOINT_WEIGHT, _LENGTH_WEIGHT, *inputs(s.points, s.sums)
@@ -224,7 +225,7 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]
     if kernels := compiled_checks(len(cost)):
         found = np.empty(len(cheapest), dtype=np.int64)
-        room = (*scratch(np.int64, n, n), *np.empty((2, n), dtype=bool))
+        room = (*np.empty((2, n), dtype=np.int64), *np.empty((2, n), dtype=bool))
         count = kernels.independent_edges(found, cheapest, _PASSES, *room, *inputs(i, j))
         return np.asarray(found[:count])
     chosen = [cheapest[:0]]

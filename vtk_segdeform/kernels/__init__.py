@@ -17,7 +17,6 @@ from .dispatch import (
     load_early,
     load_for,
     load_late,
-    scratch,
     wait_until_compiled,
     writable,
 )
@@ -37,7 +36,6 @@ __all__ = [
     "nearest",
     "one_blas_thread",
     "quick_turns",
-    "scratch",
     "wait_until_compiled",
     "writable",
 ]

@@ -28,7 +28,7 @@ import numpy as np
 
 from ..arrays import BoolArray, IntArray
 from ..freezing import read_only
-from ..kernels import compiled_checks, in_parallel, inputs, scratch
+from ..kernels import compiled_checks, in_parallel, inputs
 from .edges import edge_keys, flipped_faces, next_half_edge
 from .grouping import (
     begins,
@@ -90,9 +90,9 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        links, tree, narrow = scratch(np.int64, 3 * m, n, 2 * n + 1)
-        border, starts, *after = np.split(narrow.view(np.int32), np.cumsum([n, n + 2, n]))
-        tree[:] = np.arange(n)
+        links, tree = np.empty(3 * m, dtype=np.int64), np.arange(n)
+        narrow = np.empty(4 * n + 2, dtype=np.int32)
+        border, starts, *after = np.split(narrow, np.cumsum([n, n + 2, n]))
         found = [0, 0]
 
         def work(start: int, stop: int) -> None:
@@ -125,7 +125,7 @@ class HalfEdges:
         kernels = compiled_checks(m) if m < _MOST else None
         if kernels is None:
             return None
-        opposite, others = np.empty(3 * m, dtype=np.int64), scratch(np.int64, n + 2, n, 3 * m)
+        opposite, *others = (np.empty(size, dtype=np.int64) for size in (3 * m, n + 2, n, 3 * m))
         return opposite, kernels.pair_half_edges(opposite, *others, *inputs(self.faces))
 
     @cached_property
@@ -388,7 +388,7 @@ class HalfEdges:
             patch = np.empty(m, dtype=np.int64)
             flip, one_sided = np.empty((2, m), dtype=bool)
             given = inputs(self._paired[0], self.faces)
-            count = kernels.face_sides(patch, flip, one_sided, *scratch(np.int64, m), *given)
+            count = kernels.face_sides(patch, flip, one_sided, np.empty(m, dtype=np.int64), *given)
             return read_only((patch, flip, one_sided[:count].copy()))
         one, other = self.neighbours.T
         return read_only(two_sides(m, one // 3, other // 3, self._parallel))

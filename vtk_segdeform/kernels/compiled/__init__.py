@@ -48,7 +48,7 @@ from .interpolated import add_interpolated, add_interpolated_adjoint, interpolat
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .pairs import facing_pairs, opposite_pairs
-from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
+from .products import add_adjoint, add_product
 from .rotations import rotations
 from .shells import shell_boxes, shell_extremes, shell_sums, shells_around
 from .text import (
@@ -79,7 +79,6 @@ __all__ = [
     "add_adjoint",
     "add_interpolated",
     "add_interpolated_adjoint",
-    "add_packed_adjoint",
     "add_product",
     "border_half_edges",
     "cell_forces",
@@ -103,7 +102,6 @@ __all__ = [
     "interpolated_rows",
     "link",
     "link_corners",
-    "map_packed",
     "may_meet",
     "number_trees",
     "numbers_of_lines",
