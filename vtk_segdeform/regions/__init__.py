@@ -11,6 +11,7 @@ The files, in reading order:
     borders         smoothing of the borders between parts on the mesh
 """
 
+from .borders import within_rings
 from .regions import CageSurface, Regions, cage_distance_weights, require_region, require_regions
 from .segmentation import segment
 
@@ -21,4 +22,5 @@ __all__ = [
     "require_region",
     "require_regions",
     "segment",
+    "within_rings",
 ]

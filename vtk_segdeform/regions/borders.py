@@ -26,6 +26,19 @@ _ROUNDS = 3  # of diffusion
 _MOST_STEPS = 60  # of diffusion, per round
 
 
+def within_rings(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
+    """Return the vertices up to *rings* edges away from *ids*, sorted."""
+    reached = np.zeros(graph.shape[0], dtype=bool)
+    reached[ids] = True
+    for _ in range(rings):
+        others = graph[ids].indices
+        ids = np.unique(others[~reached[others]])
+        if not len(ids):
+            break
+        reached[ids] = True
+    return np.flatnonzero(reached)
+
+
 def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     """Return labels with short borders along creases; no part shrinks by half in a round.
 
@@ -37,14 +50,14 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     steps = int(np.clip(np.ceil(4.0 * area / _SCALE_POINTS / edge**2), 4, _MOST_STEPS))
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
-    zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
+    zone = within_rings(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
     diffusion = _diffusion(mesh, zone, edge)
     far = np.bincount(np.delete(labels, zone), minlength=labels.max() + 1)
     label = labels[zone]
     for _ in range(_ROUNDS):
         most, smooth = np.zeros(len(zone)), label.copy()
         for part in np.unique(label):
-            near = _within(diffusion, np.flatnonzero(label == part), rings)
+            near = within_rings(diffusion, np.flatnonzero(label == part), rings)
             step = diffusion[near][:, near]
             amount = (label[near] == part).astype(float)
             for _ in range(steps):
@@ -57,17 +70,6 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     labels = labels.copy()
     labels[zone] = label
     return labels
-
-
-def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
-    """Return the vertices up to *rings* edges away from *ids*, sorted."""
-    reached = np.zeros(graph.shape[0], dtype=bool)
-    reached[ids] = True
-    for _ in range(rings):
-        others = graph[ids].indices
-        ids = np.unique(others[~reached[others]])
-        reached[ids] = True
-    return np.flatnonzero(reached)
 
 
 def _diffusion(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
@@ -109,7 +111,7 @@ def connected_parts(mesh: Mesh, labels: IntArray) -> IntArray:
     _, largest = np.unique(label[order], return_index=True)
     stray = np.ones(len(label), dtype=bool)
     stray[order[largest]] = False
-    near = _within(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
+    near = within_rings(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
     settled = np.flatnonzero(~stray[piece[near]])
     labels = labels.copy()
     labels[near] = labels[near[nearest_source(distinct_lengths(mesh)[near][:, near], settled)]]

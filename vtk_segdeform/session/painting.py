@@ -18,7 +18,7 @@ from ..cages import Cage
 from ..checks import as_flag, require_sequence, shown
 from ..errors import RegionError
 from ..mesh import Mesh
-from ..regions import Regions, require_region
+from ..regions import Regions, require_region, within_rings
 from . import naming
 from .state import State
 
@@ -172,9 +172,10 @@ def split(
     elif not is_whole(overlap, 0):
         raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
     membership = regions.membership.copy()
-    membership[region] = _grown(mesh, first, overlap) & whole
-    second = _grown(mesh, second, overlap) & whole
-    return Regions(mesh, np.vstack([membership, second]), regions.smoothness)
+    for part in (first, second):
+        part[within_rings(mesh.adjacency, np.flatnonzero(part), int(overlap))] = True
+    membership[region] = first & whole
+    return Regions(mesh, np.vstack([membership, second & whole]), regions.smoothness)
 
 
 def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
@@ -194,18 +195,6 @@ def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
     from_other_end = distance_from(int(np.argmax(from_one_end)))
     second[ids[from_other_end < from_one_end]] = True
     return second
-
-
-def _grown(mesh: Mesh, mask: BoolArray, rings: int) -> BoolArray:
-    """Return *mask* extended by a number of edge rings."""
-    mask = mask.copy()
-    i, j = mesh.edges.T
-    for _ in range(int(rings)):
-        touched = mask[i] != mask[j]
-        if not touched.any():
-            break
-        mask[i[touched]] = mask[j[touched]] = True
-    return mask
 
 
 def _mask(mesh: Mesh, vertices: ArrayLike) -> BoolArray:
