@@ -12,7 +12,7 @@ The files, in reading order:
     mean_value      mean value coordinates, eqs. (15) to (19)
 """
 
-from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
+from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, require_enclosed
 from .fit import fit_cages, require_cage_vertices, suggested_size
 from .mean_value import mean_value_coordinates
 from .scaling import scaled_cages
@@ -21,10 +21,10 @@ __all__ = [
     "MOST_CAGE_VERTICES",
     "Cage",
     "cage_faults",
-    "encloses_region",
     "fit_cages",
     "mean_value_coordinates",
     "require_cage_vertices",
+    "require_enclosed",
     "scaled_cages",
     "suggested_size",
 ]

@@ -135,6 +135,13 @@ def encloses_region(cage: Cage, regions: Regions, r: int) -> bool:
     return known[r]
 
 
+def require_enclosed(cage: Cage, regions: Regions, r: int, name: str) -> None:
+    """Raise a CageError unless *cage* encloses region *r*, which the message calls *name*."""
+    if not encloses_region(cage, regions, r):
+        members = regions.mesh.vertices[regions.membership[r]]
+        cage.require_encloses(members, f"vertices of {name}")
+
+
 def _inside_of_many(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:
     """Return what `inside_points` does, testing one point in boxes that no face reaches."""
     low = vertices.min(axis=0)

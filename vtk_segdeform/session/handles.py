@@ -49,9 +49,7 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
                 f"{len(both)} vertices (the first is {both[0]}) are already in {other!r}; "
                 "remove them from one of the two handles"
             )
-    own = ids.copy()
-    own.flags.writeable = False
-    return MappingProxyType({**state.handles, name: own})
+    return MappingProxyType({**state.handles, name: frozen(ids.copy())})
 
 
 def without_handle(state: State, name: str) -> State:
@@ -70,17 +68,15 @@ def with_fixed(mesh: Mesh, state: State, fixed: IntArray, vertices: FloatArray) 
 
     Vertices that are already fixed keep theirs.  Without a pose they are fixed at rest.
     """
-    own = fixed.copy()
-    frozen(own)
+    own = frozen(fixed.copy())
     if state.pose is None:
         return replace(state, fixed=own, fixed_at=None)
     places = vertices[own]
     _, new, old = np.intersect1d(own, state.fixed, return_indices=True)
     kept = mesh.vertices[state.fixed] if state.fixed_at is None else state.fixed_at
     places[new] = kept[old]
-    frozen(places)
     at_rest = np.array_equal(places, mesh.vertices[own])
-    return replace(state, fixed=own, fixed_at=None if at_rest else places)
+    return replace(state, fixed=own, fixed_at=None if at_rest else frozen(places))
 
 
 def renamed(state: State, name: str, new_name: str) -> State:
@@ -120,10 +116,7 @@ def require_handle(handles: Handles, name: str) -> None:
 
 def targets_at(handles: Handles, vertices: FloatArray) -> Targets:
     """Return the positions of the handles among *vertices* (n, 3)."""
-    places = {name: vertices[ids] for name, ids in handles.items()}
-    for points in places.values():
-        frozen(points)
-    return MappingProxyType(places)
+    return MappingProxyType({name: frozen(vertices[ids]) for name, ids in handles.items()})
 
 
 def stacked(targets: Targets) -> FloatArray:
@@ -164,8 +157,7 @@ def with_pivot(mesh: Mesh, state: State, name: str, point: ArrayLike | None) -> 
         place = checked_point(point, "point")
         require_near(mesh, place, "coordinates of point")
         R, shift = rigid_fit(mesh.vertices[state.handles[name]], targets_of(mesh, state)[name])
-        pivots[name] = (place - shift) @ R
-        frozen(pivots[name])
+        pivots[name] = frozen((place - shift) @ R)
     return replace(state, pivots=MappingProxyType(pivots))
 
 
@@ -194,11 +186,11 @@ def checked_targets(
         lengths = [len(ids) for ids in handles.values()]
         points = _checked_points(mesh, targets, sum(lengths), "all handles")
         pairs = zip(handles, split_rows(points, lengths), strict=True)
-        return {name: _frozen_copy(piece) for name, piece in pairs}
+        return {name: frozen(piece.copy()) for name, piece in pairs}
     for name in targets:
         require_handle(handles, name)
     return {
-        name: _frozen_copy(_checked_points(mesh, points, len(handles[name]), name))
+        name: frozen(_checked_points(mesh, points, len(handles[name]), name).copy())
         for name, points in targets.items()
     }
 
@@ -265,12 +257,5 @@ def _checked_points(mesh: Mesh, targets: ArrayLike, count: int, name: str) -> Fl
 
 
 def _check_name(name: str) -> None:
-    fault = fault_of(name)
-    if fault:
+    if fault := fault_of(name):
         raise ConstraintError(f"a handle{fault}")
-
-
-def _frozen_copy(points: FloatArray) -> FloatArray:
-    own = points.copy()
-    own.flags.writeable = False
-    return own

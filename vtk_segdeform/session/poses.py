@@ -258,9 +258,7 @@ class Poses:
         return self.memo.get("surface", (state.regions, state.cages, cages), mapped, _MAX_SURFACES)
 
     def _mapped(self, state: State, cages: Cages) -> FloatArray:
-        x = self.bind(state).surface(cages)
-        frozen(x)
-        return x
+        return frozen(self.bind(state).surface(cages))
 
     def rotations(self, state: State, cages: Cages) -> FloatArray:
         """Return `Deformer.rotations`, (n, 3, 3) float."""

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import deformer
-from ..arrays import FloatArray, IntArray, frozen, plain
+from ..arrays import FloatArray, IntArray, plain
 from ..deformer import (
     SPREAD,
     Deformer,
@@ -330,6 +330,4 @@ def _patch(mesh: Mesh, vertex: int, radius: float) -> IntArray:
         near = np.unique(mesh.adjacency[front].indices)
         front = np.setdiff1d(near[inside[near]], found, assume_unique=True)
         found = np.concatenate([found, front])
-    own = np.sort(found)
-    frozen(own)
-    return own
+    return np.sort(found)

@@ -31,7 +31,7 @@ from scipy import sparse
 
 from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers
-from ..cages import MOST_CAGE_VERTICES, Cage, encloses_region, mean_value_coordinates
+from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates, require_enclosed
 from ..errors import CageError, RegionError
 from ..freezing import Frozen
 from ..kernels import compiled_kernels, in_parallel, inputs, writable
@@ -386,6 +386,4 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
                 f"the cage of region {r} is more than {_LARGEST_CAGE:.0f} times as large as the "
                 "mesh and hardly moves it; fit it more tightly"
             )
-        if not encloses_region(cage, regions, r):
-            members = mesh.vertices[regions.membership[r]]
-            cage.require_encloses(members, f"vertices of region {r}")
+        require_enclosed(cage, regions, r, f"region {r}")
