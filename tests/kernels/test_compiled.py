@@ -656,16 +656,14 @@ def test_convex_polygons_are_cut_alike(twin, monkeypatch, kind):
     assert 20 < some.sum() < 380
 
 
-@pytest.mark.parametrize("density", [None, 2.0])
 @pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
-def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, density):
+def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
     ball, ball_faces = icosphere(2)
     vertices, faces = together(torus(24, 12), (ball + [4.0, 0.0, 0.0], ball_faces))
     vertices = vertices * [1.0, 1.0, length]
     vertices += 0.05 * np.random.default_rng(3).normal(size=vertices.shape)
-    weights = None if density is None else density ** vertices[:, 0]
-    quick, slow = twin(lambda: simplify(vertices, faces, n, density=weights))
+    quick, slow = twin(lambda: simplify(vertices, faces, n))
     for one, other in zip(quick, slow, strict=True):
         assert_array_equal(one, other)
     assert len(quick[0]) == n if n > 20 else 8 < len(quick[0]) < 40
@@ -674,7 +672,7 @@ def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length, densit
 def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
     vertices, faces = icosphere(3)
-    surface = _accumulated(vertices, faces, None)
+    surface = _accumulated(vertices, faces)
     edges, cost = _costs(surface, _NO_EDGES, np.ones(len(vertices), dtype=bool))
     chosen = edges.taken(_independent(edges, cost, len(vertices)))
     last = dict(zip(faces.ravel().tolist(), np.arange(faces.size), strict=True))

@@ -359,7 +359,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "cages": cages,
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
-    "density": lambda: np.ones(mesh().n_vertices),
     "divisions": lambda: (2, 2, 4),
     "event": lambda: "ModifiedEvent",
     "events": lambda: 1000,

@@ -4,7 +4,6 @@ The files, in reading order:
 
     cage            `Cage`: a closed surface, checked and immutable
     fit             `fit_cages`: automatic cages
-    spacing         how far apart cage vertices are where the shape can bend, and where it is fixed
     region_solid    the distance field of a region as a solid
     contour         level set of a field on a grid
     simplify        simplification by edge collapses

@@ -185,43 +185,21 @@ class SolidField:
     offset: float
     members: FloatArray  # the vertices of the region
     n_shells: int  # components of the surface smooth = offset
-    stretch: FloatArray | None = None  # of the offset at every node; distances are divided by it
-
-    def stretch_at(self, x: FloatArray) -> FloatArray:
-        """Return the stretch of the offset at points *x* (k, 3) of the grid, (k,)."""
-        if self.stretch is None:
-            return np.ones(len(x))
-        return np.asarray(ndimage.map_coordinates(self.stretch, x.T, order=1, mode="nearest"))
 
 
-def solid_field(
-    patch: Patch,
-    offset: float,
-    step: float,
-    *,
-    most_nodes: float,
-    stretch: FloatArray | None = None,
-) -> SolidField:
+def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) -> SolidField:
     """Return the distance to the solid of the region, on a grid that extends beyond *offset*.
 
     *step* is increased if the grid would have more than *most_nodes* nodes, and decreased if the
     offset would have too few steps; if both, the offset is increased.
-
-    With *stretch* (n,), at least 1, the offset at a vertex is that many times *offset*: distances
-    are divided by the stretch at the nearest vertex, smoothed.  Where *offset* is increased, only
-    smaller offsets are: otherwise the grid would grow with the largest one.
     """
     surface, members = patch.surface, patch.members
     low, high = patch.box
-    asked, largest = offset, offset if stretch is None else offset * float(stretch[members].max())
     step = min(step, offset / _STEPS_PER_OFFSET)
-    while np.prod((high - low + 2 * largest) / step + 2 * _MARGIN + 2) > most_nodes:
+    while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > most_nodes:
         step *= 1.1
         offset = max(offset, step * _STEPS_PER_OFFSET)
-        largest = max(largest, offset)
-    if stretch is not None:
-        stretch = np.maximum(stretch * (asked / offset), 1.0)
-    pad = largest + _MARGIN * step
+    pad = offset + _MARGIN * step
     nx, ny, nz = (int(k) for k in np.ceil((high - low + 2 * pad) / step) + 1)
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 
@@ -237,24 +215,8 @@ def solid_field(
         inside = inside[members[surface.tree.query(grid.to_points(inside))[1]]]
     distance = _distance(samples, inside, grid.shape)
     smooth = ndimage.gaussian_filter(distance, _BLUR * offset / step, mode="nearest")
-    if stretch is not None:
-        stretch = _spread(nodes[members], stretch[members], grid.shape, offset / step)
-        smooth, distance = smooth / stretch, distance / stretch
     smooth, n_shells = _filled(smooth, offset / step, nodes[members])
-    return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells, stretch)
-
-
-def _spread(
-    members: FloatArray, values: FloatArray, shape: tuple[int, int, int], blur: float
-) -> FloatArray:
-    """Return *values* of the *members* at every node: of the nearest node with any, smoothed."""
-    node = np.ravel_multi_index(tuple(np.rint(members).astype(np.int64).T), shape)
-    count = np.bincount(node, minlength=int(np.prod(shape)))
-    total = np.bincount(node, values, minlength=len(count))
-    without = (count == 0).reshape(shape)
-    mean = (total / np.maximum(count, 1)).reshape(shape)
-    nearest = ndimage.distance_transform_edt(without, return_distances=False, return_indices=True)
-    return ndimage.gaussian_filter(mean[tuple(nearest)], 2.0 * blur, mode="nearest")
+    return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells)
 
 
 def _distance(samples: FloatArray, inside: IntArray, shape: tuple[int, int, int]) -> FloatArray:

@@ -9,9 +9,6 @@ Collapsing edge (i, j) to a point p costs
     a       accumulated area; the second term favours edges of equal length, which matter more
             for a cage that bends than a sharp outline
 
-With a density rho of vertices per area, costs are multiplied by rho^2, its mean over the
-accumulated area: edges of equal cost then have lengths proportional to rho^(-1/2).
-
 A collapse is valid if it preserves the topology (the link condition of [DEGN99]: i and j have
 exactly two common neighbours), inverts no face and creates no needle.  Each round collapses many of
 the cheapest edges at once, chosen so that they do not affect each other; all operations are on
@@ -51,8 +48,8 @@ _LEAST_COSINE = 0.3  # between the normals of a face before and after
 class _Surface:
     points: FloatArray
     faces: IntArray
-    # (n, 12), accumulated in each vertex: xx, xy, xz, yy, yz, zz of A, then b and c of
-    # Q(p) = p'A p - 2 b'p + c, the area a, and the integral of the relative density over it
+    # (n, 11), accumulated in each vertex: xx, xy, xz, yy, yz, zz of A, then b and c of
+    # Q(p) = p'A p - 2 b'p + c, and the area a
     sums: FloatArray
 
 
@@ -79,7 +76,6 @@ def simplify(
     faces: IntArray,
     n_vertices: int,
     *,
-    density: FloatArray | None = None,
     progress: Progress | None = None,
     message: str = "simplifying",
 ) -> tuple[FloatArray, IntArray]:
@@ -93,8 +89,6 @@ def simplify(
         Closed and oriented; each component keeps at least four vertices.
     n_vertices : int
         Target number of vertices.
-    density : (n,) float, optional
-        Positive; the result has as many more vertices per area where it is larger.
     progress : Progress, optional
         Called between rounds; may cancel.
     message : str
@@ -105,7 +99,7 @@ def simplify(
     vertices, faces : (n', 3) float, (m', 3) int
         Closed, oriented, of the same topology; n' >= *n_vertices*.
     """
-    surface = _accumulated(vertices, faces, density)
+    surface = _accumulated(vertices, faces)
     left = len(vertices)
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     rejected = np.empty(0, dtype=np.int64)
@@ -138,7 +132,7 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return _normals(vertices[faces])[1]
 
 
-def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | None) -> _Surface:
+def _accumulated(vertices: FloatArray, faces: IntArray) -> _Surface:
     """Return the surface with a third of the quadric and area of each face at its corners."""
     corners = vertices[faces]
     normal = cross_rows(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -147,10 +141,9 @@ def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | No
     (x, y, z), d = normal.T, _dot(normal, corners[:, 0])
     terms = x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d, np.ones_like(d)
     share, at = np.repeat(twice_area / 6.0, 3), faces.ravel()
-    sums = np.empty((len(vertices), 12))
+    sums = np.empty((len(vertices), 11))
     for k, term in enumerate(terms):
         sums[:, k] = np.bincount(at, share * np.repeat(term, 3), minlength=len(vertices))
-    sums[:, 11] = sums[:, 10] if density is None else sums[:, 10] * density
     return _Surface(vertices.copy(), faces.copy(), sums)
 
 
@@ -190,7 +183,7 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
 
 def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
-    xx, xy, xz, yy, yz, zz, bx, by, bz, c, area, need = (s.sums[i] + s.sums[j]).T
+    xx, xy, xz, yy, yz, zz, bx, by, bz, c, area = (s.sums[i] + s.sums[j]).T
     x, y, z = (0.5 * (s.points[i] + s.points[j])).T
     more = _MIDPOINT_WEIGHT * ((xx + yy) + zz)
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
@@ -208,8 +201,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     quadratic += ((xz * x + yz * y) + zz * z) * z
     error = (quadratic - 2.0 * ((bx * x + by * y) + bz * z)) + c
     d = s.points[i] - s.points[j]
-    cost = (error + _LENGTH_WEIGHT * area * _dot(d, d)) * (need / area) ** 2
-    return cost, np.stack([x, y, z], axis=1)
+    return error + _LENGTH_WEIGHT * area * _dot(d, d), np.stack([x, y, z], axis=1)
 
 
 def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
