@@ -57,15 +57,6 @@ PLACES = 500
 A set depends on a few dozen cage vertices, which 500 places determine many times over.  With
 20,000 fixed and as many handle vertices a frame takes 14 ms instead of 33."""
 
-FIRST_CLUSTERS = 2_000
-"""Rotation clusters of position, at least, that are joined to as many clusters as requested.
-
-Their rows of K are computed, not those of all vertices: a mesh of 22,000 vertices is bound in 1.9 s
-instead of 5.8."""
-
-FIRST_CLUSTERS_EACH = 6
-"""First clusters for each one requested, if these are more."""
-
 DECIMATED = 20_000
 """Vertices beyond which regions are detected, and cages fitted, on a decimated mesh.
 

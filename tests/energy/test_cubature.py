@@ -164,9 +164,6 @@ def test_the_sample_is_the_same_in_every_frame_even_of_a_regular_mesh(sample_siz
 def test_the_pose_is_that_of_the_whole_energy_and_its_volume_exact(sample_size, monkeypatch):
     targets = SCENE.turned(60)
     sample_size(800)
-    # Otherwise every vertex of a small mesh is a first cluster.
-    monkeypatch.setattr(sizes, "FIRST_CLUSTERS", 0)
-    monkeypatch.setattr(sizes, "FIRST_CLUSTERS_EACH", 1)
     few = SCENE.deformer(rotation_groups=30).solve(targets)
     monkeypatch.setattr(sizes, "CUBATURE_FACTOR", 10**6)
     whole = SCENE.deformer(rotation_groups=30).solve(targets)

@@ -93,7 +93,7 @@ def test_the_number_of_clusters_within_parts_is_whole_and_positive():
     for wrong in (0, -1, 1.5):
         with pytest.raises(ArgumentError, match="must be a whole number, 1 or more"):
             cluster_within_parts(somewhere(), np.zeros(50, dtype=int), wrong)
-    clusters = cluster_within_parts(somewhere(), np.zeros(50, dtype=int), 10, quick=True)
+    clusters = cluster_within_parts(somewhere(), np.zeros(50, dtype=int), 10)
     assert set(clusters) == set(range(10))
     every = cluster_within_parts(somewhere(), np.arange(50) % 3, 1000)
     assert len(set(every)) == 50
