@@ -247,19 +247,6 @@ def test_sparse_factors_solve_their_matrix(twin, monkeypatch, n, spread):
 
 
 @pytest.mark.parametrize("far", [0.0, 1e3])
-def test_volumes_agree(twin, far):
-    x, faces = MESH.vertices + far, MESH.faces
-    size = abs(signed_volume(MESH.vertices, faces))
-    for call in (
-        lambda: signed_volume(x, faces),
-        lambda: volume_along(x, MOVE, SHORT),
-        lambda: volume_gradient(x, faces),
-    ):
-        quick, plain = twin(call)
-        assert_allclose(quick, plain, rtol=1e-12, atol=(1e-14 + 1e-15 * far) * size)
-
-
-@pytest.mark.parametrize("far", [0.0, 1e3])
 def test_local_volumes_agree(twin, far):
     local = LocalVolume(MESH.with_vertices(MESH.vertices + far))
     quick, plain = twin(lambda: local.change(MESH.vertices + 0.01 * MOVE + far))

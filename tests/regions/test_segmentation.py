@@ -239,12 +239,12 @@ def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
     labels = (x > np.quantile(x, 0.7)).astype(int)
     near = borders.smooth_borders(mesh, labels)
     everything = np.arange(mesh.n_vertices)
-    within = borders._within
+    within = borders.within_rings
 
     def wide(graph, ids, rings):
         return everything if graph is mesh.adjacency else within(graph, ids, rings)
 
-    monkeypatch.setattr(borders, "_within", wide)
+    monkeypatch.setattr(borders, "within_rings", wide)
     np.testing.assert_array_equal(near, borders.smooth_borders(mesh, labels))
     assert (near != labels).any()
 

@@ -182,19 +182,6 @@ def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit
     assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
 
 
-def test_the_same_drag_from_the_same_state_has_the_same_end():
-    session = ready()
-    session.drag(SCENE.turned(60), max_steps=5)
-    first = session.vertices
-    session.commit()
-    session.drag(SCENE.turned(-20), max_steps=5)
-    session.commit()
-    session.undo()
-    session.undo()
-    session.drag(SCENE.turned(60), max_steps=5)
-    assert_array_equal(session.vertices, first)
-
-
 def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
     session = ready()
     for degrees in (30, -30):

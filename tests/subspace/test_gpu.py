@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import CUBE, TETRAHEDRON, icosphere, rotation, torus
+from solids import icosphere, rotation, torus
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 
 from vtk_segdeform import models
-from vtk_segdeform.geometry.volume import signed_volume, volume_gradient
+from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.solver import exact_volume
@@ -81,13 +81,6 @@ def test_without_motion_the_rest_shape_is_exact(arrays):
     assert_array_equal(surface.host(surface.map(0.0 * MOVES)), SCENE.mesh.vertices)
 
 
-def test_known_solids_have_their_known_volumes(arrays):
-    for (points, faces), volume in ((CUBE, 1.0), (TETRAHEDRON, 8.0 / 3.0)):
-        points, faces = np.array(points, dtype=float), np.array(faces)
-        x = arrays.asarray(points)
-        assert still(points, faces, arrays).volume(x) == pytest.approx(volume, rel=1e-15)
-
-
 @pytest.mark.parametrize("far", [0.0, 1e4])
 def test_the_volume_is_exact_and_reproducible(arrays, far):
     points, faces = RING[0] + far, RING[1]
@@ -136,13 +129,6 @@ def test_normals_agree_with_those_of_vtk(arrays, body):
     assert_allclose(normals_of(mesh.vertices, mesh.faces, arrays), theirs, rtol=0, atol=1e-6)
 
 
-def test_normals_are_directions_of_the_volume_gradient(arrays):
-    points, faces = cactus().vertices, cactus().faces
-    slope = volume_gradient(points, faces)
-    slope /= np.linalg.norm(slope, axis=1, keepdims=True)
-    assert_allclose(normals_of(points, faces, arrays), slope, rtol=0, atol=1e-13)
-
-
 @pytest.mark.parametrize("unit", [1e-150, 1e-6, 1e100])
 def test_normals_rotate_with_the_mesh_in_any_unit(arrays, unit):
     points, faces = RING
@@ -150,17 +136,6 @@ def test_normals_rotate_with_the_mesh_in_any_unit(arrays, unit):
     before = normals_of(points, faces, arrays)
     after = normals_of(unit * points @ turn.T, faces, arrays)
     assert_allclose(after, before @ turn.T, rtol=0, atol=1e-12)
-
-
-def test_a_vertex_with_a_thousand_faces_has_a_normal(arrays):
-    angle = np.linspace(0.0, 2.0 * np.pi, 1001)[:-1]
-    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(1000)], axis=1)
-    points = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    i, j = np.arange(1000), np.roll(np.arange(1000), -1)
-    top, bottom = np.full(1000, 1000), np.full(1000, 1001)
-    faces = np.concatenate([np.stack([i, j, top], axis=1), np.stack([j, i, bottom], axis=1)])
-    expected = np.vstack([ring, [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]])
-    assert_allclose(normals_of(points, faces, arrays), expected, atol=1e-12)
 
 
 def test_a_fan_that_has_shrunk_to_a_point_has_a_zero_normal(arrays):

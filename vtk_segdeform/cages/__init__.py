@@ -13,10 +13,11 @@ The files, in reading order:
 
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, require_enclosed
 from .fit import fit_cages, require_cage_vertices, suggested_size
-from .mean_value import mean_value_coordinates
+from .mean_value import FARTHEST_POINT, mean_value_coordinates
 from .scaling import scaled_cages
 
 __all__ = [
+    "FARTHEST_POINT",
     "MOST_CAGE_VERTICES",
     "Cage",
     "cage_faults",

@@ -37,22 +37,14 @@ from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
 from .contour import contour_surface
-from .region_solid import Patch, SolidField, Surface, solid_field
+from .region_solid import STEPS_PER_OFFSET, Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
 
 _OFFSET_SHARE = 0.4  # of sqrt(area of the region / vertices of its cage)
-_STEP_SHARE = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
-_OFFSET_GROWTH = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offset:
-_ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
+_ATTEMPTS = 8  # attempt k has 1.25^(k (k + 1) / 2) times the offset: 1, 1.25, 2, 4 ... 517
 _GOOD_QUALITY = 0.2  # least roundness of faces, and least distance in offsets, of a good cage
-_MOST_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
 _FEWEST = 8  # vertices of a cage, and of each component of a cage with several
-_FLOOR = 12  # vertices of each cage before the rest is distributed
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each part; half alone
-_LEAST_WIDTH = 1e-3  # width over length that a region counts with, at least
-_LEAST_CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
-_PUSHES = 30  # rounds of moving faces away
-_MEASURED_VERTICES = 200  # nearest ones, whose exact distance is computed
 _LEAST_OFFSET, _MOST_OFFSET = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 # Barycentric coordinates of samples of a face.
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
@@ -207,9 +199,9 @@ def _distributed(patches: list[Patch], n_vertices: int) -> IntArray:
     area = np.array([patch.area for patch in patches])
     spread = np.array([patch.spread for patch in patches])
     length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
-    width = np.maximum(spread[:, 1:].sum(axis=1), _LEAST_WIDTH * length)
+    width = np.maximum(spread[:, 1:].sum(axis=1), 1e-3 * length)
     need = np.sqrt(area * length / width)
-    floor = min(_FLOOR, n_vertices // len(patches))
+    floor = min(3 * _FEWEST // 2, n_vertices // len(patches))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
     ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
     return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
@@ -223,9 +215,8 @@ def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) 
     for attempt in range(_ATTEMPTS):
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
-        larger = _OFFSET_GROWTH ** (attempt * (attempt + 1) / 2)
-        nodes = max(_MOST_NODES, _NODES_PER_VERTEX * n)
-        step = _STEP_SHARE * length * larger
+        larger = 1.25 ** (attempt * (attempt + 1) / 2)
+        step, nodes = _OFFSET_SHARE * length * larger / STEPS_PER_OFFSET, max(3e5, 1e3 * n)
         field = solid_field(patch, offset * larger, step, most_nodes=nodes)
         tell(progress, (attempt + 0.5) / _ATTEMPTS, message)
         if _FEWEST * field.n_shells > n:
@@ -271,8 +262,8 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
     """
     vertices = vertices.copy()
     slope = [np.gradient(field.smooth, axis=axis) for axis in range(3)]
-    least = _LEAST_CLEARANCE * field.offset
-    for _ in range(_PUSHES):
+    least = 0.5 * field.offset
+    for _ in range(30):
         at = (_SAMPLES @ vertices[faces]).reshape(-1, 3).T
         distance = ndimage.map_coordinates(field.distance, at, order=1)
         near = np.flatnonzero(distance < least)
@@ -294,6 +285,6 @@ def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     """Return the quality of a cage, 1 or more if no face is a needle or close to the surface."""
     tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
     gap = nearest(tree, field.members)[0][:, 0]
-    closest = field.members[np.argsort(gap, kind="stable")[:_MEASURED_VERTICES]]
+    closest = field.members[np.argsort(gap, kind="stable")[:200]]
     clearance = distance_to_surface(closest, vertices, faces).min() / field.offset
     return float(min(roundness(vertices, faces).min(), clearance) / _GOOD_QUALITY)

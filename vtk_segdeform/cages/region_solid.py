@@ -31,16 +31,11 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import lids_of, principal_axes
-from ..kernels import in_parallel
+from ..kernels import ROWS_AT_ONCE, in_parallel
 from ..mesh import Mesh, inside_nodes, ragged_arange
 
-_STEPS_PER_OFFSET = 1.5  # at least, so that every point of S has a node inside the offset surface
+STEPS_PER_OFFSET = 1.5  # at least, so that every point of S has a node inside the offset surface
 _MARGIN = 3.7183  # steps around the offset surface; uneven, so that no extreme is on a node
-_BLUR = 0.5  # standard deviation, relative to the offset
-_FIRST_OF_EQUALS = 1.0 - 1e-6 * np.arange(3)  # breaks ties between equal edges
-_FACES_AT_ONCE = 50_000  # of a task
-_FLAT_AREA = 1e-12  # area of faces relative to the square of their length
-_LEAST_LENGTH = 1e-2  # length of a face without any, relative to the mesh
 _SAMPLE_SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 
@@ -78,7 +73,7 @@ class Surface:
             square = ((x - x[:, [1, 2, 0]]) ** 2).sum(axis=2).max(axis=1)
             longest[start:stop] = np.sqrt(square)
 
-        in_parallel(work, mesh.n_faces, _FACES_AT_ONCE)
+        in_parallel(work, mesh.n_faces, ROWS_AT_ONCE)
         points = mesh.vertices - centre
         walls = points, mesh.faces
         if not mesh.is_closed:
@@ -107,10 +102,8 @@ class Patch:
         touching = members[surface.faces].any(axis=1)
         corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
         length = surface.longest[touching]
-        least = _LEAST_LENGTH * np.ptp(surface.points, axis=0).max()
-        if thirds.sum() <= _FLAT_AREA * (
-            length @ length
-        ):  # count flat faces by their length instead
+        least = 1e-2 * np.ptp(surface.points, axis=0).max()
+        if thirds.sum() <= 1e-12 * (length @ length):  # count flat faces by their length instead
             thirds = np.maximum(length, least) ** 2 / 12.0
         weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
@@ -195,10 +188,10 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     """
     surface, members = patch.surface, patch.members
     low, high = patch.box
-    step = min(step, offset / _STEPS_PER_OFFSET)
+    step = min(step, offset / STEPS_PER_OFFSET)
     while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > most_nodes:
         step *= 1.1
-        offset = max(offset, step * _STEPS_PER_OFFSET)
+        offset = max(offset, step * STEPS_PER_OFFSET)
     pad = offset + _MARGIN * step
     nx, ny, nz = (int(k) for k in np.ceil((high - low + 2 * pad) / step) + 1)
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
@@ -214,7 +207,7 @@ def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) 
     if not members.all():
         inside = inside[members[surface.tree.query(grid.to_points(inside))[1]]]
     distance = _distance(samples, inside, grid.shape)
-    smooth = ndimage.gaussian_filter(distance, _BLUR * offset / step, mode="nearest")
+    smooth = ndimage.gaussian_filter(distance, 0.5 * offset / step, mode="nearest")
     smooth, n_shells = _filled(smooth, offset / step, nodes[members])
     return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells)
 
@@ -258,7 +251,7 @@ def _samples(triangles: FloatArray) -> FloatArray:
     """Return points at most a step apart on the *triangles* (m, 3, 3) that are larger."""
     length = np.linalg.norm(triangles - triangles[:, [1, 2, 0]], axis=2)
     large = np.flatnonzero(length.max(axis=1) > _SAMPLE_SPACING)
-    longest = (length[large] * _FIRST_OF_EQUALS).argmax(axis=1)
+    longest = (length[large] * [1.0, 1.0 - 1e-6, 1.0 - 2e-6]).argmax(axis=1)  # the first of equals
     order = (longest[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles[large], order[..., None], axis=1).transpose(1, 0, 2)
     base = length[large, longest]

@@ -37,9 +37,7 @@ from ..mesh import cross_rows
 from ..progress import Progress, tell
 
 _LEAST_ROUNDNESS = 0.01  # least `roundness` of a changed face
-_LENGTH_WEIGHT = 0.05  # k
-_MIDPOINT_WEIGHT = 0.05  # attracts p to the midpoint of the edge, relative to the trace of Q
-_SHARE_OF_ROUND = 0.3  # of the edges, that are considered in one round
+_EVENNESS = 0.05  # k; also attracts p to the midpoint of its edge, relative to the trace of Q
 _PASSES = 2  # of the search for independent edges
 _LEAST_COSINE = 0.3  # between the normals of a face before and after
 
@@ -162,9 +160,7 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
         room = (np.empty(size, dtype=np.int64) for size in (n + 2, 2 * m, 2 * m))
         kernels.sorted_edges(i, j, ends, *room, *inputs(s.faces))
         read = inputs(i, j, known.i, known.j, known.cost, known.place, is_moved)
-        kernels.collapse_costs(
-            cost, place, *read, _MIDPOINT_WEIGHT, _LENGTH_WEIGHT, *inputs(s.points, s.sums)
-        )
+        kernels.collapse_costs(cost, place, *read, _EVENNESS, _EVENNESS, *inputs(s.points, s.sums))
     else:
         tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
         up = tail < head
@@ -185,7 +181,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
     xx, xy, xz, yy, yz, zz, bx, by, bz, c, area = (s.sums[i] + s.sums[j]).T
     x, y, z = (0.5 * (s.points[i] + s.points[j])).T
-    more = _MIDPOINT_WEIGHT * ((xx + yy) + zz)
+    more = _EVENNESS * ((xx + yy) + zz)
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
     pull_x = bx - ((xx * x + xy * y) + xz * z)
     pull_y = by - ((xy * x + yy * y) + yz * z)
@@ -201,7 +197,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     quadratic += ((xz * x + yz * y) + zz * z) * z
     error = (quadratic - 2.0 * ((bx * x + by * y) + bz * z)) + c
     d = s.points[i] - s.points[j]
-    return error + _LENGTH_WEIGHT * area * _dot(d, d), np.stack([x, y, z], axis=1)
+    return error + _EVENNESS * area * _dot(d, d), np.stack([x, y, z], axis=1)
 
 
 def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
@@ -211,7 +207,7 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     with its own; a second pass considers the edges that overlap with no chosen one.
     """
     i, j = edges.i, edges.j
-    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(_SHARE_OF_ROUND * len(cost))
+    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(0.3 * len(cost))
     if len(cheapest) > most:
         cheapest = cheapest[cost[cheapest] <= np.partition(cost[cheapest], most - 1)[most - 1]]
     cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]

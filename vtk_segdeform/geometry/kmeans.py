@@ -22,9 +22,6 @@ from ..errors import ArgumentError
 from ..kernels import nearest
 from .ties import tie_breakers
 
-_SAMPLE, _SAMPLE_PER_CLUSTER = 8000, 10  # points that centres are computed from, whichever is more
-_COMPARED = 4  # nearest centres that are compared for ties
-
 
 def cluster_positions(
     positions: FloatArray, n_clusters: int, *, rounds: int = 5, seeded: bool = True
@@ -38,7 +35,7 @@ def cluster_positions(
     rng = np.random.default_rng(0)
     favour = tie_breakers(len(positions))
     sample = positions
-    enough = max(_SAMPLE, _SAMPLE_PER_CLUSTER * n_clusters)
+    enough = max(8000, 10 * n_clusters)  # to compute centres from
     if len(positions) > enough:
         sample = positions[np.sort(rng.permutation(len(positions))[:enough])]
     if seeded:
@@ -110,7 +107,7 @@ def _numbered(labels: IntArray) -> IntArray:
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     """Return the nearest of the *centres* to each position, (n,)."""
-    few = min(_COMPARED, len(centres))
+    few = min(4, len(centres))  # that are compared for ties
     distance, which = nearest(cKDTree(centres), positions, range(1, few + 1))
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)

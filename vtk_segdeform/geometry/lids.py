@@ -50,15 +50,9 @@ from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
 from .volume import corner_and_edges, signed_volume
 
 _LEAST_WINDING, _MOST_WINDING = 0.48, 1.3  # abs(q) of an open component that encloses a volume
-_VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
 _SEEN_POINTS = 10  # points y for each of them
-_FEWEST_VIEWPOINTS, _MOST_PAIRS = (
-    12,
-    2e8,
-)  # points x, and pairs of x and y, if there are many components
 _SUMMED_FACES = 8  # faces of a component, up to which q is summed over pairs of faces
 _INNER_POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0  # points x of a face
-_LEAST_DISTANCE = 0.3  # |y - x| at least, in distances of neighbouring points y
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
 _known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
@@ -249,11 +243,11 @@ def mean_winding(points: FloatArray, faces: IntArray, *, most: int = 400) -> flo
         y = corner[own] + u[:, None] * e[own] + v[:, None] * f[own]
         return y, normals[own] / np.maximum(twice[own, None], np.finfo(float).tiny)
 
-    count = min(int(np.clip(len(faces), *_VIEWPOINTS)), max(most, _FEWEST_VIEWPOINTS))
+    count = min(int(np.clip(len(faces), 50, 400)), max(most, 12))
     y, n = sample(_SEEN_POINTS * count)
     x, _ = sample(count)
     area = 0.5 * float(ends[-1]) / len(y)
-    nearest = _LEAST_DISTANCE * np.sqrt(area)
+    nearest = 0.3 * np.sqrt(area)  # |y - x| at least, in distances of neighbouring points y
     heights = np.einsum("ij,ij->i", y, n) - x @ n.T
     square = np.square(x)[:, None].sum(axis=2) - 2.0 * x @ y.T + np.square(y).sum(axis=1)
     np.maximum(square, nearest**2, out=square)
@@ -303,7 +297,7 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
         q = np.zeros(count)
         few = sizes[asked] <= _SUMMED_FACES
         q[asked[few]] = _winding_of_few(mesh, order, starts[asked[few]], sizes[asked[few]])
-        at_once = np.sqrt(_MOST_PAIRS / (_SEEN_POINTS * max(len(asked), 1)))
+        at_once = np.sqrt(2e8 / (_SEEN_POINTS * max(len(asked), 1)))  # of all pairs of x and y
         for c in asked[~few]:
             used, faces = np.unique(
                 mesh.faces[order[starts[c] : starts[c] + sizes[c]]], return_inverse=True

@@ -20,9 +20,17 @@ from .dispatch import (
     wait_until_compiled,
     writable,
 )
-from .threads import in_parallel, n_threads, nearest, one_blas_thread, quick_turns
+from .threads import (
+    ROWS_AT_ONCE,
+    in_parallel,
+    n_threads,
+    nearest,
+    one_blas_thread,
+    quick_turns,
+)
 
 __all__ = [
+    "ROWS_AT_ONCE",
     "advice",
     "compiled_checks",
     "compiled_kernels",

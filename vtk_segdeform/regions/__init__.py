@@ -12,7 +12,14 @@ The files, in reading order:
 """
 
 from .borders import within_rings
-from .regions import CageSurface, Regions, cage_distance_weights, require_region, require_regions
+from .regions import (
+    CageSurface,
+    Regions,
+    cage_distance_weights,
+    require_region,
+    require_regions,
+    usual_overlap,
+)
 from .segmentation import segment
 
 __all__ = [
@@ -22,5 +29,6 @@ __all__ = [
     "require_region",
     "require_regions",
     "segment",
+    "usual_overlap",
     "within_rings",
 ]

@@ -21,9 +21,7 @@ from ..mesh import Mesh, connected
 from .coarse import symmetric
 
 _CREASE_RADIUS = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
-_SCALE_POINTS = 3000  # diffusion acts at the scale of an edge in a mesh of so many vertices
 _ROUNDS = 3  # of diffusion
-_MOST_STEPS = 60  # of diffusion, per round
 
 
 def within_rings(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
@@ -47,7 +45,8 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     """
     area = mesh.face_areas.sum()
     edge = np.median(mesh.adjacency.data)
-    steps = int(np.clip(np.ceil(4.0 * area / _SCALE_POINTS / edge**2), 4, _MOST_STEPS))
+    # At the scale of an edge in a mesh of 3,000 vertices.
+    steps = int(np.clip(np.ceil(4.0 * area / 3000 / edge**2), 4, 60))
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
     zone = within_rings(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)

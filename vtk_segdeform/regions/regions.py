@@ -206,6 +206,14 @@ class Regions(Described, Frozen):
         return Regions(self.mesh, membership, self.smoothness)
 
 
+def usual_overlap(n_vertices: float) -> int:
+    """Return edge rings by which a region of *n_vertices* grows: a tenth of its width, at least 2.
+
+    So overlaps are equally wide on coarse and fine meshes.
+    """
+    return max(2, round(0.1 * float(np.sqrt(n_vertices))))
+
+
 def require_regions(regions: object, mesh: Mesh) -> None:
     """Raise a RegionError unless *regions* are `Regions` with as many vertices as *mesh*."""
     if not isinstance(regions, Regions):

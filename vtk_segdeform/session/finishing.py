@@ -41,14 +41,12 @@ from ..mesh import Mesh, new_crossings
 from ..progress import Progress
 from ..solver import Solution, Status, VolumeConstraint, errors_at, moved_along, steps_to_volume
 from .handles import stacked
-from .poses import Poses
+from .poses import VOLUME_TOLERANCE, Poses
 from .pulls import localised
 from .state import Cages, Finished, Pose, State
 
-_EDGES = 20_000  # along which bending is compared, at most
 _ALIKE = 0.6, 0.85  # cosines between ways of bending for f = 0 and 1
 _GIVES = 0.02  # mesh sizes by which the correction of the volume moves vertices, at most
-_VOLUME_KEPT = 1e-9  # relative
 _TURNED = 3e-5  # mesh sizes by which shifts must turn before the targets of the cages follow
 
 
@@ -207,7 +205,7 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
             tried.append(_on_volumes(moved, constraints, stays))
-            if max(abs(each.relative(tried[-1])) for each in constraints) <= _VOLUME_KEPT:
+            if max(abs(each.relative(tried[-1])) for each in constraints) <= VOLUME_TOLERANCE:
                 exact.append(tried[-1])
                 if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
                     exact = exact[-1:]
@@ -251,7 +249,7 @@ def _offset(poses: Poses, state: State, cages: Cages, *, fades: bool) -> FloatAr
 def _some_edges(mesh: Mesh) -> IntArray:
     """Return edges (k, 2) all over *mesh*."""
     graph = mesh.adjacency
-    some = np.arange(0, graph.nnz, 1 + graph.nnz // _EDGES)
+    some = np.arange(0, graph.nnz, 1 + graph.nnz // 20_000)
     rows = np.searchsorted(graph.indptr, some, side="right") - 1
     return np.asarray(np.stack([rows, graph.indices[some]], axis=1), dtype=np.int64)
 

@@ -18,11 +18,9 @@ from ..cages import Cage
 from ..checks import as_flag, require_sequence, shown
 from ..errors import RegionError
 from ..mesh import Mesh
-from ..regions import Regions, require_region, within_rings
+from ..regions import Regions, require_region, usual_overlap, within_rings
 from . import naming
 from .state import State
-
-_OVERLAP = 0.1  # edge rings, as a fraction of the width of a new region in edges
 
 
 def with_regions(state: State, regions: Regions, names: naming.Names = ()) -> State:
@@ -168,7 +166,7 @@ def split(
             "of its vertices would be in the second part; choose some of them"
         )
     if overlap is None:
-        overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))
+        overlap = usual_overlap(np.count_nonzero(whole) / 2)
     elif not is_whole(overlap, 0):
         raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
     membership = regions.membership.copy()

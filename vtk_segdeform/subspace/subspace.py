@@ -34,19 +34,16 @@ from ..arrays import FloatArray, IntArray, as_numbers
 from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates, require_enclosed
 from ..errors import CageError, RegionError
 from ..freezing import Frozen
-from ..kernels import compiled_kernels, in_parallel, inputs, writable
+from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
 from .interpolated import InterpolatedBlock
 
 _LARGEST_CAGE = 1e3  # diagonals of the mesh
-_VERTICES_AT_ONCE = 1 << 15  # vertices whose mean value coordinates are computed together
 _REGION_BITS = 32  # regions that are encoded in one integer
 NUMBERS_PER_FACE = 16  # numbers whose product takes about as long as a face of a volume
 _CACHED_NUMBERS = 1 << 17  # of a block, that are multiplied together: a megabyte
-_MOST_TASKS = 16  # of a block at most, for compiled kernels: each call takes some microseconds
 _DENSE_NUMBERS = 1 << 22  # of a dense piece: 32 megabytes
-_SAMPLED = 16  # interpolated rows for each one whose squares are summed
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,7 +187,7 @@ class Subspace(Frozen):
         out = np.zeros((int(clusters.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             if isinstance(block, InterpolatedBlock):
-                rows, block = rows[::_SAMPLED], block[::_SAMPLED]
+                rows, block = rows[::16], block[::16]
             for piece in row_pieces(len(rows), block.shape[1]):
                 size = piece.stop - piece.start
                 places = (clusters[rows[piece]], np.arange(size))
@@ -217,7 +214,7 @@ def _add_product(
     size = max(_CACHED_NUMBERS // block.shape[1], 1)
     if kernels:
         arguments = *inputs(rows, block), writable(p.T)
-        size = max(8 * size, -(-len(rows) // _MOST_TASKS))
+        size = max(8 * size, -(-len(rows) // 16))  # a call takes some microseconds
 
     def add(start: int, stop: int) -> None:
         _begin_rows(x, rows, base, start, stop)
@@ -253,9 +250,9 @@ def _add_interpolated(
     in_parallel(
         move,
         len(at_nodes),
-        max(_CACHED_NUMBERS // block.shape[1], -(-len(at_nodes) // _MOST_TASKS)),
+        max(_CACHED_NUMBERS // block.shape[1], -(-len(at_nodes) // 16)),
     )
-    in_parallel(add, len(rows), max(_CACHED_NUMBERS // 27, -(-len(rows) // _MOST_TASKS)))
+    in_parallel(add, len(rows), max(_CACHED_NUMBERS // 27, -(-len(rows) // 16)))
 
 
 def _begin_rows(
@@ -346,8 +343,8 @@ def cage_subspace(
             continue
         is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
-        for start in range(0, len(members), _VERTICES_AT_ONCE):
-            piece = slice(start, min(start + _VERTICES_AT_ONCE, len(members)))
+        for start in range(0, len(members), ROWS_AT_ONCE):
+            piece = slice(start, min(start + ROWS_AT_ONCE, len(members)))
             ways = part(share, start / len(members), piece.stop / len(members))
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]
