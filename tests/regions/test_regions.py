@@ -79,15 +79,6 @@ def test_a_region_that_covers_a_component_has_no_border_there():
     assert_allclose(regions.weights[0, first], 1.0)
 
 
-def test_the_distance_changes_by_at_most_the_length_of_an_edge_along_it():
-    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 4)
-    i, j = SPHERE.edges.T
-    length = np.linalg.norm(SPHERE.vertices[i] - SPHERE.vertices[j], axis=1)
-    d = regions.border_distance
-    both = regions.membership[:, i] & regions.membership[:, j]
-    assert (np.abs(d[:, i] - d[:, j]) <= length + 1e-12)[both].all()
-
-
 def test_distances_and_weights_of_any_regions_are_shortest_paths_and_their_ratios():
     mesh = Mesh(*two_components())
     masks = np.random.default_rng(3).random((9, mesh.n_vertices)) < 0.7

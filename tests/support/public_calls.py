@@ -30,7 +30,7 @@ import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.faults import Search, as_soup
-from vtk_segdeform.session.groups import Handles, Painting
+from vtk_segdeform.session import Handles, Painting
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.films.film import Film

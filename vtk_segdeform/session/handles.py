@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..checks import shown
-from ..deformer import FARTHEST_APART, checked_constraints, checked_point
+from ..deformer import FARTHEST_APART, checked_constraints
 from ..errors import CageError, ConstraintError
-from ..geometry import rigid_fit
 from ..mesh import Mesh
 from .naming import fault_of
 from .state import State, split_rows
@@ -50,17 +49,6 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
                 "remove them from one of the two handles"
             )
     return MappingProxyType({**state.handles, name: frozen(ids.copy())})
-
-
-def without_handle(state: State, name: str) -> State:
-    """Return *state* without handle *name*; ConstraintError if there is no such handle."""
-    require_handle(state.handles, name)
-    others = {other: ids for other, ids in state.handles.items() if other != name}
-    state = replace(state, handles=MappingProxyType(others))
-    if name not in state.pivots:
-        return state
-    pivots = {other: point for other, point in state.pivots.items() if other != name}
-    return replace(state, pivots=MappingProxyType(pivots))
 
 
 def with_fixed(mesh: Mesh, state: State, fixed: IntArray, vertices: FloatArray) -> State:
@@ -128,37 +116,6 @@ def targets_of(mesh: Mesh, state: State) -> Targets:
     """Return the targets of all handles of *state*: of its pose, or at rest."""
     pose = state.pose
     return targets_at(state.handles, mesh.vertices) if pose is None else pose.targets
-
-
-def with_targets(before: State, after: State, vertices: FloatArray) -> State:
-    """Return *after*, which has a pose, with targets for its handles.
-
-    Handles that are also in *before* keep their targets; the targets of others are their positions
-    among *vertices* (n, 3).
-    """
-    assert before.pose is not None
-    assert after.pose is not None
-    here = targets_at(after.handles, vertices)
-    kept = {
-        name: before.pose.targets[name] if before.handles.get(name) is ids else here[name]
-        for name, ids in after.handles.items()
-    }
-    return replace(after, pose=replace(after.pose, targets=MappingProxyType(kept)))
-
-
-def with_pivot(mesh: Mesh, state: State, name: str, point: ArrayLike | None) -> State:
-    """Return *state* with the pivot of a handle at *point* (3,); None is the handle's centre.
-
-    ConstraintError if there is no such handle, or *point* is not a point or too far away.
-    """
-    require_handle(state.handles, name)
-    pivots = {other: at for other, at in state.pivots.items() if other != name}
-    if point is not None:
-        place = checked_point(point, "point")
-        require_near(mesh, place, "coordinates of point")
-        R, shift = rigid_fit(mesh.vertices[state.handles[name]], targets_of(mesh, state)[name])
-        pivots[name] = frozen((place - shift) @ R)
-    return replace(state, pivots=MappingProxyType(pivots))
 
 
 def checked_targets(

@@ -54,8 +54,9 @@ from ..regions import Regions, segment
 from ..solver import Solution, Status
 from . import finishing, handles, naming, output, painting, preparing, pulls, solving
 from .finishing import FinishedPose
-from .groups import Handles, Painting
+from .handle_edits import Handles
 from .listeners import Listener
+from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .state import (
