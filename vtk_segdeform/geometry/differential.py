@@ -94,17 +94,6 @@ def inner_vertices(mesh: Mesh) -> BoolArray:
     return np.asarray(inner | is_strip[mesh.components])
 
 
-def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return delta of eq. (5), (n, 3), in 1/length; on a sphere, outward and of length 1/r.
-
-    Only at `inner_vertices` is it a curvature.
-    """
-    x = surface.vertices
-    areas = with_least_areas(mixed_voronoi_areas(surface), surface.faces)
-    laplacian = cotangent_laplacian(surface.faces, surface.cotangents, len(x))
-    return (laplacian @ x) / (2.0 * areas)[:, None]
-
-
 def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
     """Return the face area times the gradient of the hat function of each corner, (m, 3, 3).
 

@@ -33,7 +33,7 @@ from scipy.spatial import cKDTree
 
 from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs, nearest
+from ..kernels import ROWS_AT_ONCE, in_parallel, nearest
 from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
@@ -135,17 +135,13 @@ class _Volumes:
 
     def smoothed(self, x: FloatArray) -> FloatArray:
         """Return sum_j k_ij L_j(x), (k,)."""
-        if kernels := compiled_kernels(len(self._faces)):
-            volumes = np.zeros(len(x))
-            kernels.opposite_volumes(*inputs(x, self._faces, self._opposite), volumes)
-        else:
-            x = x - x.mean(axis=0)
-            a, e, f = corner_and_edges(x, self._faces)
-            normals = cross_rows(e, f)
-            heights = np.einsum("ij,ij->i", a, normals)
-            sums = self._around @ np.column_stack([normals, heights])  # over the faces at a vertex
-            apex = x[self._opposite]
-            volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
+        x = x - x.mean(axis=0)
+        a, e, f = corner_and_edges(x, self._faces)
+        normals = cross_rows(e, f)
+        heights = np.einsum("ij,ij->i", a, normals)
+        sums = self._around @ np.column_stack([normals, heights])  # over the faces at a vertex
+        apex = x[self._opposite]
+        volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
         for _ in range(self._rounds):
             volumes = np.asarray(self._average @ volumes)
         return np.asarray(volumes)

@@ -10,13 +10,11 @@ follows from how the surface bends along its edges ij,
 
     k_ij = axial(R_i^T R_j),    f = clip(<k, k'> / <k, k>, 0, 1) smoothstep(cos(k, k'))
 
-1 when the pose moves rigidly or is bent further, 0 when it is back at rest or bent otherwise.  A
-hand finished at -40 degrees and bent to +40 has distortion 0.118, as without an offset, which alone
-makes it 0.148; bent back by half it has 0.034 instead of 0.043.  The cages are solved for as
-if nothing had been finished, so the next move of a handle continues from where the cages are, and
-nothing jumps.  The volume is restored along the normals of the free vertices, by far less than the
-offset.  If too few vertices are free for that, handles are moved as well, and finally fixed
-vertices: as in the solve for the cages, the volume takes precedence.
+1 when the pose moves rigidly or is bent further, 0 when it is back at rest or bent otherwise.  The
+cages are solved for as if nothing had been finished, so the next move of a handle continues from
+where the cages are, and nothing jumps.  The volume is restored along the normals of the free
+vertices.  If too few are free for that, handles are moved as well, and finally fixed vertices: as
+in the solve for the cages, the volume takes precedence.
 
 The finish of a pull starts from the mesh that is shown, because it keeps the surface beyond the
 reach, and so does that of a pose that is finished further; any other starts from W~ p, so that the

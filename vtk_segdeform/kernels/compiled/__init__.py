@@ -1,7 +1,6 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
-    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`,
-                    `local_volume.LocalVolume`
+    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -69,7 +68,6 @@ from .triangles import (
 )
 from .volumes import (
     determinants,
-    opposite_volumes,
     volume_along_sums,
     volume_gradient,
     volume_sums,
@@ -107,7 +105,6 @@ __all__ = [
     "numbers_of_lines",
     "one_fan_each",
     "opposite_pairs",
-    "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",
     "quad_cuts",
