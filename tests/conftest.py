@@ -111,15 +111,15 @@ def fitted_once() -> Iterator[Any]:
 
     fitting, known = fit._fit, {}
 
-    def fitted(patch: Any, n: int, offset: Any, progress: Any = None, spacing: Any = None) -> Any:
+    def fitted(patch: Any, n: int, offset: Any, progress: Any = None) -> Any:
         if progress is not None:  # which a test may count, or cancel by
-            return fitting(patch, n, offset, progress, spacing)
+            return fitting(patch, n, offset, progress)
         inputs = hashlib.blake2b(repr((n, offset)).encode())
-        for array in (patch.surface.points, patch.surface.faces, patch.members, spacing):
-            inputs.update(b"" if array is None else np.ascontiguousarray(array))
+        for array in (patch.surface.points, patch.surface.faces, patch.members):
+            inputs.update(np.ascontiguousarray(array))
         key = inputs.digest()
         if key not in known:
-            known[key] = fitting(patch, n, offset, None, spacing)
+            known[key] = fitting(patch, n, offset, None)
         return known[key]
 
     with pytest.MonkeyPatch.context() as patch:

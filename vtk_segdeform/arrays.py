@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sized
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from .errors import ArgumentError
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+_Array = TypeVar("_Array", bound=NDArray[Any])
 
 _DEEPEST = 4  # nesting levels; numpy recurses infinitely into a list that contains itself
 _LONGEST = 10**8  # entries of a sequence that is converted to an array
@@ -95,7 +96,7 @@ def is_whole(value: object, least: float, most: float = np.inf) -> bool:
     return is_number(value, least) and value <= most and value % 1 == 0  # type: ignore[operator]
 
 
-def frozen(array: NDArray[np.generic]) -> NDArray[np.generic]:
+def frozen(array: _Array) -> _Array:
     """Mark *array* as read-only, so that it can be shared, and return it."""
     array.flags.writeable = False
     return array

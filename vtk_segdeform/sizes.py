@@ -7,6 +7,9 @@ table in ``docs/speed.rst`` has the measurements.  Read a size as an attribute o
 
 from __future__ import annotations
 
+LARGE = 20_000
+"""Vertices of a mesh beyond which most of these ways pay."""
+
 COMPILED = 2_000
 """Faces, or work as long as that of so many faces, for which compiled kernels are worth a call.
 
@@ -35,12 +38,6 @@ PARALLEL_SEARCH = 1_000
 
 1,000 searches take 0.4 to 0.9 ms, waking another thread 0.1 ms."""
 
-ONE_CALL = 1 << 20
-"""Numbers in W~ up to which one call of a kernel multiplies by all of it, in one thread.
-
-Eight megabytes stay in the cache between a map and its transpose, and waking other threads takes
-longer than the product: 0.10 ms instead of 0.13 for a map and its transpose of 386,000 numbers."""
-
 COARSE_VOLUME = 3_000
 """Vertices beyond which the solver's steps compute the volume over a coarse surface.
 
@@ -54,25 +51,16 @@ VOLUME_HESSIAN_POINTS = 300
 
 The cost is quadratic in the cage vertices at every point, and more points save no steps."""
 
-SHARED_PLACES = 1_000
-"""Vertices of a fixed patch or handle beyond which neighbours share a place."""
-
 PLACES = 500
-"""Places that the vertices of such a set share.
+"""Places that the vertices of a large fixed patch or handle share.
 
-A set depends on a few dozen cage vertices, which 500 places determine many times over.  With
+It depends on a few dozen cage vertices, which 500 places determine many times over.  With
 20,000 fixed and as many handle vertices a frame takes 14 ms instead of 33."""
 
-FIRST_CLUSTERS = 2_000
-"""Rotation clusters of position, at least, that are joined to as many clusters as requested.
+SHARED_PLACES = 2 * PLACES
+"""Vertices of such a set beyond which neighbours share a place."""
 
-Their rows of K are computed, not those of all vertices: a mesh of 22,000 vertices is bound in 1.9 s
-instead of 5.8."""
-
-FIRST_CLUSTERS_EACH = 6
-"""First clusters for each one requested, if these are more."""
-
-DECIMATED = 20_000
+DECIMATED = LARGE
 """Vertices beyond which regions are detected, and cages fitted, on a decimated mesh.
 
 Both depend on the shape only: for a million vertices they take 2.7 s of processor time."""
@@ -85,7 +73,7 @@ STAND_IN_POINTS = 800
 
 It is bound in 0.1 s."""
 
-DRAFT = 20_000
+DRAFT = LARGE
 """Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.
 
 In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
@@ -98,18 +86,18 @@ A finish takes 0.2 s of processor time for 5,000 vertices and 6 s for 100,000 if
 bends, the rest of `deform` 5 s.  Beyond, the factor of the Laplacian grows faster: 16 s for 200,000
 vertices."""
 
-SCALED_VOLUME = 20_000
+SCALED_VOLUME = LARGE
 """Vertices beyond which a pose is scaled to its exact volume instead of moved along a direction.
 
 A frame then maps the vertices once, not the direction of the volume as well: 32 ms instead of 37
 for 87,000 vertices."""
 
-CACHED_BINDING = 20_000
+CACHED_BINDING = LARGE
 """Vertices from which a session keeps a binding on disk.
 
 A mesh of 22,000 vertices is bound in 1.1 s, and read in 0.05 s."""
 
-LOCAL_VOLUME_CELLS = 20_000
+LOCAL_VOLUME_CELLS = LARGE
 """Vertices beyond which local volume change is computed for cells of vertices.
 
 It is smooth, and an overlay needs it in every frame: 1 ms instead of 12 for 22,000 vertices."""
@@ -124,9 +112,6 @@ There are about 90,000 nodes, whatever the mesh: W~ of a million vertices takes 
 
 CUBATURE_SAMPLE = 36_000
 """Vertices in the weighted sample from which the energy of a large mesh is computed."""
-
-CUBATURE_SAMPLE_EACH = 18
-"""Sampled vertices for each rotation cluster, if these are more."""
 
 CUBATURE_FACTOR = 8
 """Vertices for each sampled one from which the sample is used: 8 x 36,000 = 288,000 vertices.

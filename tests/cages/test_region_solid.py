@@ -41,7 +41,6 @@ def test_the_distance_to_a_ball_is_known_at_every_node(scale):
     for beyond in (-along.min(axis=0), along.max(axis=0)):  # the offset surface and 3.7 steps
         assert_allclose(beyond, 1.3 + 0.37, atol=0.11)
     assert_allclose(field.members, field.grid.to_nodes(mesh.vertices), atol=1e-9)
-    assert_array_equal(field.stretch_at(field.members), np.ones(mesh.n_vertices))
 
 
 def test_the_distance_to_a_part_of_a_ball_is_that_to_its_own_half():
@@ -67,21 +66,6 @@ def test_the_step_follows_the_number_of_nodes_and_the_offset():
     coarse = field_of(BALL, offset=0.01, step=0.1, most_nodes=2e4)
     assert coarse.offset == pytest.approx(1.5)
     assert coarse.grid.step * coarse.offset > 0.1
-
-
-def test_a_stretch_divides_the_distance():
-    z = BALL.vertices[:, 2]
-    stretch = np.where(z > 0.0, 2.0, 1.0)
-    plain, field = field_of(BALL, offset=0.2), field_of(BALL, offset=0.2, stretch=stretch)
-    assert_allclose(field.stretch_at(field.members[z > 0.6]), 2.0, atol=0.1)
-    assert_allclose(field.stretch_at(field.members[z < -0.6]), 1.0, atol=0.1)
-    for sign, factor in ((1.0, 2.0), (-1.0, 1.0)):
-        at = np.array([[0.0, 0.0, sign * 1.25]])
-        distance = [
-            each.distance[tuple(np.rint(each.grid.to_nodes(at)[0]).astype(int))]
-            for each in (field, plain)
-        ]
-        assert distance[0] * factor == pytest.approx(distance[1], abs=0.8)
 
 
 @pytest.mark.parametrize("scale", [0.3, 2.0, 9.0])

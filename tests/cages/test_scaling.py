@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import torus
 
-from vtk_segdeform.cages import Cage, encloses_region, scaled_cages
+from vtk_segdeform.cages import Cage, scaled_cages
+from vtk_segdeform.cages.cage import encloses_region
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh

@@ -7,12 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, icosphere, rotation, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.cages.cage import cage_faults
 from vtk_segdeform.cages.simplify import roundness, simplify
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.kernels import dispatch
 
 TURN = rotation([1.0, 2.0, -0.5], 1.234)
 
@@ -79,24 +77,8 @@ def test_a_simplified_cube_is_nearly_the_same_cube():
 
 
 @pytest.mark.usefixtures("either")
-@pytest.mark.parametrize("ratio", [4.0, 1.0, 0.25])
-def test_vertices_per_area_are_proportional_to_the_density(ratio):
-    ball, faces = icosphere(4)
-    upper = ball[:, 2] > 0.0
-    vertices, found = simplify(ball, faces, 150, density=np.where(upper, ratio, 1.0))
-    assert cage_faults(vertices, found) == ()
-    above = np.count_nonzero(vertices[:, 2] > 0.1)
-    below = np.count_nonzero(vertices[:, 2] < -0.1)
-    assert above / below == pytest.approx(ratio, rel=0.35)
-
-
-@pytest.mark.usefixtures("either")
-def test_a_uniform_density_changes_nothing_and_a_surface_with_few_vertices_is_returned():
+def test_a_surface_with_few_vertices_is_returned():
     ball, faces = icosphere(3)
-    plain = simplify(ball, faces, 70)
-    uniform = simplify(ball, faces, 70, density=np.ones(len(ball)))
-    assert_array_equal(uniform[1], plain[1])
-    assert_allclose(uniform[0], plain[0], atol=1e-12)
     for n in (len(ball), len(ball) + 5):
         vertices, same = simplify(ball, faces, n)
         assert_array_equal(vertices, ball)
@@ -111,19 +93,6 @@ def test_a_simplified_surface_moves_with_the_surface():
     moved, same = simplify(10.0 * bumpy @ TURN.T, faces, 90)
     assert_array_equal(same, found)
     assert_allclose(moved, 10.0 * vertices @ TURN.T, atol=1e-9)
-
-
-def test_compiled_kernels_simplify_to_the_same_surface(monkeypatch):
-    pytest.importorskip("numba")
-    ball, faces = icosphere(4)
-    rough = ball * np.random.default_rng(0).uniform(0.8, 1.2, (len(ball), 1))
-    density = 1.0 + ball[:, 0] ** 2
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    vertices, found = simplify(rough, faces, 200, density=density)
-    monkeypatch.setattr(dispatch, "_kernels", lambda: None)
-    others, same = simplify(rough, faces, 200, density=density)
-    assert_array_equal(same, found)
-    assert_allclose(others, vertices, rtol=1e-9, atol=1e-12)
 
 
 def test_roundness_is_one_for_equilateral_triangles_and_zero_for_needles():

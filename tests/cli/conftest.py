@@ -17,10 +17,8 @@ def computed_once(fitted_once: Any, bound_once: None) -> Iterator[None]:
     known: dict[Any, Any] = {}
     fitted, segment = fit._fit, commands.segment
 
-    def fit_once(
-        patch: Any, n: int, offset: Any, _progress: Any = None, spacing: Any = None
-    ) -> Any:
-        return fitted(patch, n, offset, None, spacing)
+    def fit_once(patch: Any, n: int, offset: Any, _progress: Any = None) -> Any:
+        return fitted(patch, n, offset, None)
 
     def segment_once(mesh: Any, n_regions: Any = None, **options: Any) -> Any:
         key = mesh.vertices.tobytes(), mesh.faces.tobytes(), n_regions

@@ -147,18 +147,6 @@ def test_check_says_each_thing_once(tmp_path, capsys):
     ]
 
 
-def test_check_tells_a_flattened_body_from_a_sheet(tmp_path, capsys):
-    path = tmp_path / "flat.vtp"
-    flat = holed()
-    flat.points[:, 1] *= 1e-3
-    write_mesh(path, flat)
-    assert main(["check", str(path)]) == 0
-    printed = capsys.readouterr().out
-    assert "Flattened body with 4 holes: too thin to preserve the volume." in printed
-    assert "--lids on preserves the volume of a flattened body" in printed
-    assert checked(path, capsys)["flattened"] == [True]
-
-
 @pytest.mark.parametrize("away", [0.0, 1e4, 4e6])
 def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys):
     ball, path = sphere(2000), tmp_path / "ball.ply"

@@ -278,10 +278,7 @@ def test_shares_of_clusters_follow_the_cage_vertices_of_regions_in_each_componen
         assert inputs.shares[k] == pytest.approx((20, 60)[region] * within)
 
 
-def test_no_rotation_cluster_spans_two_bodies_or_regions(monkeypatch):
-    """Neither the first ones nor those to which they are joined."""
-    monkeypatch.setattr(sizes, "FIRST_CLUSTERS", 60)
-    monkeypatch.setattr(sizes, "FIRST_CLUSTERS_EACH", 1)
+def test_no_rotation_cluster_spans_two_bodies_or_regions():
     mesh = Mesh(*together(icosphere(2), (icosphere(2)[0] * 0.9 + [1.2, 0.0, 2.1], icosphere(2)[1])))
     regions = Regions.from_labels(mesh, (mesh.vertices[:, 2] > 2.0).astype(int), overlap=2)
     ball, cage_faces = icosphere(1)
@@ -291,21 +288,10 @@ def test_no_rotation_cluster_spans_two_bodies_or_regions(monkeypatch):
     rest_cages = np.concatenate([cage.vertices for cage in cages])
     inputs = binding.BindingInputs(mesh, regions, cages, rest_cages, 1.0, 8)
     assert len(np.unique(inputs.parts)) == 3
-    first = binding._first_clusters(inputs)
-    joined, join = [], binding.join_rotations
-
-    def joining(*arguments, **options):
-        found = join(*arguments, **options)
-        joined.append(found[1])
-        return found
-
-    monkeypatch.setattr(binding, "join_rotations", joining)
-    binding.Binding.compute(inputs)
-    assert len(joined[0]) == first.max() + 1 > 40
-    assert len(np.unique(joined[0])) == 8
-    for clusters in (first, joined[0][first]):
-        for k in range(clusters.max() + 1):
-            assert len(np.unique(inputs.parts[clusters == k])) == 1
+    clusters = binding._clusters(inputs)
+    assert len(np.unique(clusters)) == 8
+    for k in range(8):
+        assert len(np.unique(inputs.parts[clusters == k])) == 1
 
 
 class Trap:

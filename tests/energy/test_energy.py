@@ -24,33 +24,11 @@ def wobble(seed=0, size=0.05):
     return REST + size * np.random.default_rng(seed).normal(size=REST.shape)
 
 
-def value_and_slope(energy, p):
-    return energy.value_and_slope(p)
-
-
-def test_cage_stiffness_is_zero_under_rigid_motion():
-    for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
-        value, slope = value_and_slope(ENERGY, p)
-        assert abs(value) < 1e-9 * ENERGY.constant
-        assert np.abs(slope).max() < 1e-9 * np.abs(ENERGY.quadratic).max()
-
-
 def test_cage_stiffness_resists_motion_that_hardly_moves_the_mesh():
     step = np.random.default_rng(3).normal(size=REST.shape)
     weak = np.linalg.eigh(WITHOUT.quadratic)[1][:, 3:6]  # the softest except translations
     p = REST + 0.3 * weak @ (weak.T @ step)
-    assert value_and_slope(ENERGY, p)[0] > 5.0 * value_and_slope(WITHOUT, p)[0]
-
-
-def test_with_cage_stiffness_the_slope_is_half_the_gradient():
-    rng = np.random.default_rng(0)
-    p, direction = REST + 0.05 * rng.normal(size=REST.shape), rng.normal(size=REST.shape)
-    value, slope = value_and_slope(ENERGY, p)
-    errors = []
-    for t in (2e-4, 1e-4):
-        ahead, _ = value_and_slope(ENERGY, p + t * direction)
-        errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
-    assert 3.5 < errors[0] / errors[1] < 4.5
+    assert ENERGY.value_and_slope(p)[0] > 5.0 * WITHOUT.value_and_slope(p)[0]
 
 
 @pytest.mark.parametrize("n_regions", [1, 2])
@@ -61,9 +39,6 @@ def test_loose_cages_stay_near_the_mesh(n_regions):
     for vertices, cage in zip(solution.cage_vertices, scene.cages, strict=True):
         reach = np.linalg.norm(cage.vertices - scene.mesh.vertices.mean(axis=0), axis=1).max()
         assert np.linalg.norm(vertices - middle, axis=1).max() < 3.0 * reach
-
-
-BOTH = pytest.mark.parametrize("n_clusters", [None, 40], ids=["per vertex", "clusters"])
 
 
 def test_cages_that_share_no_vertex_do_not_couple():
@@ -79,31 +54,6 @@ def shape(stretch, n_clusters):
     n = SCENE.mesh.n_vertices
     clusters = np.arange(n) % (n_clusters or n)
     return shape_energy(SCENE.mesh, SUBSPACE, stretch, clusters)
-
-
-@BOTH
-@pytest.mark.parametrize("stretch", [0.0, 1.0, 10.0])
-def test_it_is_zero_with_no_gradient_under_rigid_motion(stretch, n_clusters):
-    energy = shape(stretch, n_clusters)
-    for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
-        value, slope = energy.value_and_slope(p)
-        assert abs(value) < 1e-9 * energy.constant
-        assert np.abs(slope).max() < 1e-9 * np.abs(energy.quadratic).max()
-    value, _ = energy.value_and_slope(wobble())
-    assert value > 1e-5 * energy.constant  # bending is not free
-
-
-@BOTH
-@pytest.mark.parametrize("stretch", [1.0, 10.0])
-def test_the_slope_is_half_the_gradient(stretch, n_clusters):
-    energy = shape(stretch, n_clusters)
-    p, direction = wobble(), wobble(1, 1.0) - REST
-    value, slope = energy.value_and_slope(p)
-    errors = []
-    for t in (2e-4, 1e-4):
-        ahead, _ = energy.value_and_slope(p + t * direction)
-        errors.append(abs(ahead - value - 2.0 * t * np.vdot(slope, direction)))
-    assert 3.5 < errors[0] / errors[1] < 4.5
 
 
 def with_arms(weight=50.0):
@@ -127,8 +77,28 @@ def test_rotating_rows_resist_growth_but_no_rigid_motion():
         assert more == pytest.approx(50.0 * (growth - 1.0) ** 2 * (arms**2).sum(), rel=1e-6)
 
 
-def test_with_rotating_rows_the_slope_is_half_the_gradient():
-    _, energy, _ = with_arms()
+ENERGIES = {
+    "per vertex": lambda: shape(10.0, None),
+    "no stretch": lambda: shape(0.0, None),
+    "clusters": lambda: shape(1.0, 40),
+    "cage stiffness": lambda: ENERGY,
+    "rotating rows": lambda: with_arms()[1],
+}
+
+
+@pytest.mark.parametrize("name", ENERGIES)
+def test_it_is_zero_with_no_gradient_under_rigid_motion(name):
+    energy = ENERGIES[name]()
+    for p in (REST, REST @ rotation([1, 2, 3], 2.0).T + [3.0, 2.0, 1.0]):
+        value, slope = energy.value_and_slope(p)
+        assert abs(value) < 1e-9 * energy.constant
+        assert np.abs(slope).max() < 1e-9 * np.abs(energy.quadratic).max()
+    assert value_at(energy, wobble()) > 1e-5 * energy.constant  # bending is not free
+
+
+@pytest.mark.parametrize("name", ENERGIES)
+def test_the_slope_is_half_the_gradient(name):
+    energy = ENERGIES[name]()
     p, direction = wobble(), wobble(1, 1.0) - REST
     value, slope = energy.value_and_slope(p)
     errors = []

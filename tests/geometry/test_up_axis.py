@@ -13,10 +13,8 @@ from vtk_segdeform.geometry import guess_up_axis
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
-@pytest.mark.parametrize("enough", [500, 100_000])
 @pytest.mark.parametrize("name", ["cactus", "dinosaur"])
-def test_a_cactus_and_a_dinosaur_stand_on_their_feet(name, enough, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.geometry.up_axis._MOST_VERTICES", enough)
+def test_a_cactus_and_a_dinosaur_stand_on_their_feet(name):
     vertices = getattr(models, name)(1000).vertices
     for scale, shift in (1.0, 0.0), (1e-7, 0.0), (1e6, 1e12):
         x = vertices * scale + shift

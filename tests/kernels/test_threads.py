@@ -131,6 +131,20 @@ def test_blas_threads_are_restored_after_an_error(blas):
         assert blas.threads == 8
 
 
+def test_blas_threads_are_restored_though_that_is_interrupted(blas, monkeypatch):
+    restore, once = Limiter.restore_original_limits, iter([True])
+
+    def interrupted(limiter):
+        if limiter.library is blas and next(once, False):
+            raise KeyboardInterrupt
+        restore(limiter)
+
+    monkeypatch.setattr(Limiter, "restore_original_limits", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        threads.one_blas_thread()(lambda: None)()
+    assert blas.threads == 8
+
+
 def test_without_threadpoolctl_nothing_is_limited(monkeypatch):
     monkeypatch.setattr(threads, "_blas_limit", lambda: None)
     with threads.one_blas_thread():

@@ -2,18 +2,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.sparse import csgraph
-from solids import CUBE, SOLIDS, icosphere, somewhere, torus, two_components
+from solids import CUBE, SOLIDS, icosphere, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import RegionError
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.regions.blending import (
-    blend_weights,
-    border_distance,
-    borders,
-    distance_to_triangles,
-)
+from vtk_segdeform.regions.blending import blend_weights, borders
 from vtk_segdeform.regions.regions import Regions, cage_distance_weights
 
 SPHERE = Mesh(*icosphere(4))
@@ -86,26 +79,6 @@ def test_a_region_that_covers_a_component_has_no_border_there():
     assert_allclose(regions.weights[0, first], 1.0)
 
 
-def test_the_distance_changes_by_at_most_the_length_of_an_edge_along_it():
-    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 4)
-    i, j = SPHERE.edges.T
-    length = np.linalg.norm(SPHERE.vertices[i] - SPHERE.vertices[j], axis=1)
-    d = regions.border_distance
-    both = regions.membership[:, i] & regions.membership[:, j]
-    assert (np.abs(d[:, i] - d[:, j]) <= length + 1e-12)[both].all()
-
-
-@pytest.fixture(params=["numba", "numpy"])
-def either(request, monkeypatch):
-    """Run with and without compiled kernels, whatever the size."""
-    if request.param == "numba":
-        pytest.importorskip("numba")
-        monkeypatch.setattr(sizes, "COMPILED", 0)
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
-
-
-@pytest.mark.usefixtures("either")
 def test_distances_and_weights_of_any_regions_are_shortest_paths_and_their_ratios():
     mesh = Mesh(*two_components())
     masks = np.random.default_rng(3).random((9, mesh.n_vertices)) < 0.7
@@ -117,9 +90,6 @@ def test_distances_and_weights_of_any_regions_are_shortest_paths_and_their_ratio
         found = regions.border_distance[r]
         assert_allclose(found, np.where(members, expected, 0.0), rtol=1e-12)
     assert np.isinf(regions.border_distance[8]).any()
-    wanted = np.arange(0, mesh.n_vertices, 7)
-    some = border_distance(mesh, masks, wanted)
-    assert_allclose(some[:, wanted], regions.border_distance[:, wanted])
     assert_allclose(regions.weights, blend_weights(masks, regions.border_distance), atol=1e-14)
 
 
@@ -160,14 +130,6 @@ def test_the_label_of_a_vertex_is_the_region_of_largest_weight_and_the_first_of_
             regions.members(wrong)
     with pytest.raises(RegionError, match="rings must be a whole number"):
         regions.grow(-1)
-
-
-def test_distance_is_the_shortest_path_over_the_whole_mesh_to_the_border():
-    regions = Regions.from_labels(SPHERE, thirds(SPHERE), 3)
-    start = np.flatnonzero(borders(SPHERE, regions.membership)[1])
-    whole = csgraph.dijkstra(SPHERE.adjacency, indices=start).min(axis=0)
-    members = regions.members(1)
-    assert_allclose(regions.border_distance[1, members], whole[members], atol=1e-12)
 
 
 def test_refining_the_mesh_makes_the_weights_continuous_and_the_printed_formula_not():
@@ -230,32 +192,6 @@ def test_weights_are_invariant_under_rotation_and_scaling():
     scaled = Regions.from_labels(SPHERE.with_vertices(1e3 * SPHERE.vertices), thirds(SPHERE), 3)
     assert_allclose(scaled.border_distance, 1e3 * regions.border_distance, rtol=1e-9)
     assert_allclose(scaled.weights, regions.weights, atol=1e-12)
-
-
-def test_distance_to_a_cube_is_known():
-    x = somewhere(400, seed=1, size=2.0)
-    outside = np.linalg.norm(np.maximum(np.maximum(-x, x - 1.0), 0.0), axis=1)
-    depth = np.minimum(x, 1.0 - x).min(axis=1)
-    expected = np.where(depth > 0, depth, outside)
-    assert_allclose(distance_to_triangles(x, *CUBE), expected, atol=1e-12)
-    for scale in (0.25, 3.0):
-        found = distance_to_triangles(scale * x + 2.0, scale * CUBE[0] + 2.0, CUBE[1])
-        assert_allclose(found, scale * expected, atol=1e-12)
-
-
-def test_the_distance_to_a_needle_is_that_to_its_longest_side():
-    needle = np.array([[0.0, 0, 0], [2, 0, 0], [0.5, 0, 0]])
-    points = np.array([[1.0, 3, 4], [-3, 0, 4], [5, 4, 0], [0.5, 0, 0]])
-    found = distance_to_triangles(points, needle, np.array([[0, 1, 2], [2, 2, 2]]))
-    assert_allclose(found, [5.0, 5.0, 5.0, 0.0], atol=1e-15)
-    assert distance_to_triangles(points[:0], needle, np.array([[0, 1, 2]])).shape == (0,)
-
-
-def test_distance_to_triangles_does_not_depend_on_chunks(monkeypatch):
-    x, (vertices, faces) = somewhere(60, seed=2), torus(12, 6)
-    whole = distance_to_triangles(x, vertices, faces)
-    monkeypatch.setattr("vtk_segdeform.regions.blending._PAIRS_AT_ONCE", 1000)
-    assert_allclose(distance_to_triangles(x, vertices, faces), whole)
 
 
 @pytest.mark.parametrize(

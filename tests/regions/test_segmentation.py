@@ -9,7 +9,6 @@ from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.errors import ArgumentError, Cancelled, RegionError
-from vtk_segdeform.geometry import sampling
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import borders
 from vtk_segdeform.regions.coarse import coarsen
@@ -209,29 +208,6 @@ def test_the_coarse_copy_keeps_the_area_and_connected_cells():
     assert all(pieces(mesh, cell == k) == 1 for k in range(0, len(surface.areas), 7))
 
 
-def test_the_independent_set_is_that_of_a_greedy_pass_in_random_order():
-    mesh = Mesh(*icosphere(3))
-    chosen: set[int] = set()
-    for i in np.random.default_rng(4).permutation(mesh.n_vertices):
-        if not chosen.intersection(mesh.adjacency[[i]].indices):
-            chosen.add(i)
-    found = sampling._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(4))
-    np.testing.assert_array_equal(found, sorted(chosen))
-
-
-def test_a_removed_vertex_joins_its_nearest_chosen_neighbour():
-    mesh = limbed()
-    stay = sampling._independent(mesh.edges, mesh.n_vertices, np.random.default_rng(0))
-    length = np.linalg.norm(np.subtract(*mesh.vertices[mesh.edges.T]), axis=1)
-    joined = stay[sampling._nearest_neighbour(mesh.edges, length, stay, mesh.n_vertices)]
-    assert set(joined) == set(stay)
-    for i in range(0, mesh.n_vertices, 17):
-        row = mesh.adjacency[[i]]
-        there = np.isin(row.indices, stay)
-        wanted = row.data[there].min() if there.any() else 0.0
-        assert np.linalg.norm(mesh.vertices[i] - mesh.vertices[joined[i]]) == pytest.approx(wanted)
-
-
 def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
     mesh = limbed(48, 150)
     x, y, z = mesh.vertices.T
@@ -239,12 +215,12 @@ def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
     labels = (x > np.quantile(x, 0.7)).astype(int)
     near = borders.smooth_borders(mesh, labels)
     everything = np.arange(mesh.n_vertices)
-    within = borders._within
+    within = borders.within_rings
 
     def wide(graph, ids, rings):
         return everything if graph is mesh.adjacency else within(graph, ids, rings)
 
-    monkeypatch.setattr(borders, "_within", wide)
+    monkeypatch.setattr(borders, "within_rings", wide)
     np.testing.assert_array_equal(near, borders.smooth_borders(mesh, labels))
     assert (near != labels).any()
 

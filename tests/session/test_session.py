@@ -150,12 +150,6 @@ def test_the_volume_is_exact_at_every_move_and_after_undo_and_redo():
         assert volume_error(session) < 1e-13
 
 
-def test_region_volumes_are_held_if_asked_for():
-    session = ready(preserve_region_volumes=True)
-    solution = session.drag(SCENE.turned(40))
-    assert np.abs(solution.region_volume_change).max() < 1e-12
-
-
 def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
     session = ready()
     solution = session.drag(SCENE.turned(50))
@@ -188,19 +182,6 @@ def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit
     assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
 
 
-def test_the_same_drag_from_the_same_state_has_the_same_end():
-    session = ready()
-    session.drag(SCENE.turned(60), max_steps=5)
-    first = session.vertices
-    session.commit()
-    session.drag(SCENE.turned(-20), max_steps=5)
-    session.commit()
-    session.undo()
-    session.undo()
-    session.drag(SCENE.turned(60), max_steps=5)
-    assert_array_equal(session.vertices, first)
-
-
 def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
     session = ready()
     for degrees in (30, -30):
@@ -211,14 +192,6 @@ def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
     for each in (session, fresh):
         each.drag(SCENE.turned(35), max_steps=1)
     assert_array_equal(session.vertices, fresh.vertices)
-
-
-def test_a_new_step_after_undo_leaves_nothing_to_redo():
-    session = ready()
-    session.undo()
-    assert session.history.can_redo
-    session.set_fixed([1])
-    assert not session.history.can_redo
 
 
 def test_history_holds_no_vertices_of_the_mesh():
@@ -476,24 +449,6 @@ def test_binding_takes_hold_of_what_is_fixed_and_dragged_so_that_the_first_move_
     assert_array_equal(session.vertices, other.vertices)
 
 
-def test_cages_just_fitted_are_taken_as_they_are_but_not_for_other_regions(monkeypatch):
-    session = ready()
-    cages = session.fitted_cages()
-    asked = []
-    enclose = Cage.require_encloses
-    monkeypatch.setattr(
-        Cage, "require_encloses", lambda *args: (asked.append(args), enclose(*args))[1]
-    )
-    session.set_cages(cages)
-    assert not asked
-    assert session.cages == cages
-    session.set_cages(list(cages))
-    assert len(asked) == len(cages)
-    session.set_regions(Regions.single(session.mesh))
-    with pytest.raises(CageError, match="1 regions need"):
-        session.set_cages(cages)
-
-
 @pytest.mark.parametrize("by_pull", [False, True])
 def test_other_cages_are_carried_to_the_pose(by_pull):
     """A pull that was carried is refined about its own pose, not towards that of the whole body."""
@@ -708,53 +663,6 @@ def test_listeners_hear_after_the_change_in_their_order_until_they_stop():
     ]
 
 
-def test_a_listener_that_raises_harms_neither_the_session_nor_the_others():
-    session = ready()
-    heard = []
-
-    def fail(_):
-        raise RuntimeError("my own fault")
-
-    session.on_change(lambda _: heard.append("before"))
-    session.on_change(fail)
-    session.on_change(lambda _: heard.append("after"))
-    with pytest.raises(RuntimeError, match="my own fault"):
-        session.set_fixed([1])
-    assert heard == ["before", "after"]
-    assert session.fixed.tolist() == [1]
-    with pytest.raises(RuntimeError, match="my own fault"):
-        session.undo()
-    assert_array_equal(session.fixed, SCENE.fixed)
-
-
-def test_a_change_made_by_a_listener_is_told_when_all_have_heard_of_the_first():
-    session = ready()
-    heard = []
-
-    def at_once(change):
-        heard.append(("a", change))
-        if Change.CONSTRAINTS in change:
-            session.change_options(stretch=3.0)
-
-    session.on_change(at_once)
-    session.on_change(lambda change: heard.append(("b", change)))
-    session.set_fixed([1])
-    one, two = Change.CONSTRAINTS | Change.HISTORY, Change.OPTIONS | Change.HISTORY
-    assert heard == [("a", one), ("b", one), ("a", two), ("b", two)]
-
-
-def test_nothing_handed_out_can_be_written_to():
-    session = ready()
-    session.drag(SCENE.turned(10), max_steps=2)
-    arrays = [session.vertices, session.fixed, *session.handles.values()]
-    arrays += [*session.targets.values(), *session.cage_vertices, session.regions.membership]
-    for array in arrays:
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
-    with pytest.raises(TypeError):
-        session.handles["x"] = np.arange(3)
-
-
 def test_what_is_handed_in_can_be_written_to_afterwards():
     session = ready()
     ids, targets = SCENE.handle[:5].copy(), VERTICES[SCENE.handle[:5]] + [0, 0, 0.1]
@@ -781,33 +689,27 @@ WRONG = [
     (lambda s: s.set_fixed(SCENE.handle), ConstraintError, "both fixed and handle"),
     (lambda s: s.handles.add(SCENE.handle[:3]), ConstraintError, "already in 'tip'"),
     (lambda s: s.handles.add([]), ConstraintError, "at least one vertex"),
-    (lambda s: s.handles.add([0.5]), ConstraintError, "vertex numbers or be a mask"),
     (lambda s: s.handles.add(np.abs(X) < 0.1, " "), ConstraintError, "printable"),
     (lambda s: s.handles.rename("tip", "x" * 81), ConstraintError, "80 characters"),
     (lambda s: s.handles.remove("nose"), ConstraintError, "no handle 'nose'"),
     (lambda s: s.painting.paint(0, X < -2.0, subtract=True), RegionError, "add them to another"),
     (lambda s: s.painting.paint(3, X < -2.0), RegionError, r"one of 0\.\.1"),
-    (lambda s: s.painting.paint(0, [-1]), RegionError, "vertices must index"),
     (lambda s: s.painting.merge([1]), RegionError, "two or more regions"),
     (
         lambda s: s.painting.rename(2, "arm"),
         RegionError,
         "no region 2; there are 2, numbered from 0",
     ),
-    (lambda s: s.painting.rename(0, "x" * 81), RegionError, "at most 80 characters; got 81"),
-    (lambda s: s.painting.rename(0, "two\nlines"), RegionError, "printable"),
     (
         lambda s: s.painting.rename(0, "\u202egnp.exe"),
         RegionError,
         "printable",
     ),  # turns what follows
-    (lambda s: s.painting.rename(0, "half a \ud83d"), RegionError, "printable"),
     (
         lambda s: s.painting.rename(0, "region 2"),
         RegionError,
         "reserved for a region of this number",
     ),
-    (lambda s: s.painting.rename(0, None), RegionError, "printable text; got None"),
     (lambda s: s.painting.split(0, X < 9.0), RegionError, "cannot be split: all"),
     (lambda s: s.set_regions(Regions.single(Mesh(*icosphere(2)))), RegionError, "another mesh"),
     (lambda s: s.set_cages(SCENE.cages[:1]), CageError, "2 regions need as many cages; got 1"),
@@ -817,7 +719,6 @@ WRONG = [
         SessionError,
         "stretch must be a number of at least",
     ),
-    (lambda s: s.change_options(offset=0.0), SessionError, "offset must be a number above 0"),
     (lambda s: s.change_options(rotation_groups=2.5), SessionError, "a whole number of at least 1"),
     (lambda s: s.change_options(preserve_volume="no"), SessionError, "True or False"),
     (lambda s: s.change_options(colour=1), SessionError, "no option colour; there are n_cage"),
@@ -882,16 +783,6 @@ def test_a_state_of_another_mesh_or_against_itself_is_refused():
     ):
         with pytest.raises(error):
             Session(SCENE.mesh, state=bad)
-
-
-def test_far_from_the_origin_a_pose_keeps_its_volume():
-    shift = 1e4 * SCENE.mesh.diagonal * np.array([0.6, -0.8, 0.0])
-    scene = SCENE.transformed(shift=shift)
-    session = scene.session()
-    for degrees in (10, 20, 30):
-        session.drag(scene.turned(degrees, about=shift), max_steps=3)
-        assert abs(session.volume_change) < 1e-10
-        session.commit()
 
 
 @pytest.mark.parametrize("diagonals", [0.0, 1e5])
@@ -1019,20 +910,6 @@ def test_halves_of_a_region_are_connected_overlap_and_cover_it():
     session.painting.merge([2, 0, 1])
     assert session.regions.n_regions == 1
     assert session.regions.membership.all()
-
-
-def test_letting_the_volume_go_binds_nothing_anew_and_it_comes_back_exactly():
-    session = ready()
-    session.move_handle("tip", up(0.5))
-    assert volume_error(session) < 1e-12
-    session.change_options(preserve_volume=False)
-    assert session.is_bound
-    session.move_handle("tip", up(0.6))
-    assert volume_error(session) > 1e-4
-    session.change_options(preserve_volume=True)
-    assert session.is_bound
-    session.move_handle("tip", up(0.1))
-    assert volume_error(session) < 1e-12
 
 
 def test_a_pivot_moves_with_its_handle_is_undone_and_saved(tmp_path):

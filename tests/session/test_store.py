@@ -8,8 +8,6 @@ import io
 import json
 import os
 import re
-import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +19,7 @@ from scenes import sausage
 from solids import OCTAHEDRON, TETRAHEDRON
 
 from vtk_segdeform.cages.cage import Cage
-from vtk_segdeform.errors import ArgumentError, SegDeformError, SessionError
+from vtk_segdeform.errors import SegDeformError, SessionError
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session.session import Session
@@ -136,43 +134,6 @@ def test_a_session_with_nothing_in_it_is_saved_too(tmp_path):
     assert_array_equal(loaded.vertices, SCENE.mesh.vertices)
 
 
-# Loads a session, and then saves two others in turn, once it is told to.
-_OTHER_PROCESS = """
-import itertools, sys
-import vtk_segdeform as sd
-from vtk_segdeform.session.store import load_session
-print(load_session(sys.argv[1]).vertices.tobytes().hex(), flush=True)
-vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
-tiny = sd.Session(sd.Mesh(vertices, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
-sessions = tiny, sd.Session(sd.models.sphere(642))
-path = sys.stdin.readline().rstrip()
-sd.save_session(path, tiny)
-print("begun", flush=True)
-for turn in itertools.count():
-    sd.save_session(path, sessions[turn % 2])
-"""
-
-
-@pytest.fixture(scope="module")
-def other_process(tmp_path_factory):
-    """Return a process that has loaded `posed`, and the bytes of its vertices there."""
-    folder = tmp_path_factory.mktemp("loaded")
-    saved(shared(posed), folder)
-    process = subprocess.Popen(
-        [sys.executable, "-c", _OTHER_PROCESS, folder / "saved.npz"],
-        cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        yield process, bytes.fromhex(process.stdout.readline())
-    finally:
-        process.kill()
-        process.communicate()
-
-
-def test_another_process_loads_the_same_pose_bit_for_bit(other_process):
-    assert other_process[1] == shared(posed).vertices.tobytes()
-
-
 def test_a_loaded_session_goes_on_as_the_saved_one_would(tmp_path):
     session = posed()
     saved(session, tmp_path)
@@ -210,20 +171,6 @@ def test_numpy_alone_can_read_the_arrays(tmp_path):
         assert json.loads(arrays["header.json"])["version"] == 1
 
 
-@pytest.mark.parametrize("call", ["replace", "fsync"])
-def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(call, tmp_path, monkeypatch):
-    before = saved(shared(tiny), tmp_path)
-
-    def full(*_):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(os, call, full)
-    with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(No space left"):
-        save_session(tmp_path / "saved.npz", shared(posed))
-    assert (tmp_path / "saved.npz").read_bytes() == before
-    assert os.listdir(tmp_path) == ["saved.npz"]
-
-
 @pytest.mark.parametrize("fault", [OSError(errno.ENOSPC, "full"), KeyboardInterrupt()])
 def test_a_write_that_stops_half_way_leaves_the_old_file(fault, tmp_path, monkeypatch):
     before = saved(shared(tiny), tmp_path)
@@ -239,25 +186,6 @@ def test_a_write_that_stops_half_way_leaves_the_old_file(fault, tmp_path, monkey
         save_session(tmp_path / "saved.npz", shared(posed))
     assert (tmp_path / "saved.npz").read_bytes() == before
     assert os.listdir(tmp_path) == ["saved.npz"]
-
-
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is full")
-def test_a_full_disk_is_told_and_nothing_is_left(tmp_path, monkeypatch):
-    def on_full_disk(path, mode):
-        Path(path).touch()
-        return real("/dev/full", mode.replace("x", "w"))
-
-    real = open
-    monkeypatch.setattr("builtins.open", on_full_disk)
-    with pytest.raises(SessionError, match="No space left on device"):
-        save_session(tmp_path / "saved.npz", shared(posed))
-    assert os.listdir(tmp_path) == []
-
-
-def test_no_such_folder_is_told(tmp_path):
-    with pytest.raises(SessionError, match="cannot be written"):
-        save_session(tmp_path / "nowhere" / "a.npz", shared(tiny))
-    assert os.listdir(tmp_path) == []
 
 
 @pytest.mark.skipif(os.name != "posix", reason="modes and links of files")
@@ -331,12 +259,6 @@ def test_what_is_no_file_is_never_replaced(tmp_path):
     assert sorted(tmp_path.iterdir()) == [folder, pipe]
 
 
-@pytest.mark.parametrize("name", ["x" * 300, "a\0b"])
-def test_an_impossible_name_is_told(name, tmp_path):
-    with pytest.raises((SessionError, ArgumentError)):
-        save_session(tmp_path / name, shared(tiny))
-
-
 def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
     """Return the archive with the members in *changes* replaced; header entries are a dict."""
     written = io.BytesIO()
@@ -359,72 +281,34 @@ HUGE = 1 << 61
 WRONG = [
     ({"header": {"version": 3}}, "version 3 is newer than 2; update vtk_segdeform"),
     ({"header": {"version": 0}}, "version must be at least 1; got 0"),
-    ({"header": {"version": "1"}}, "version must be a whole number"),
     ({"header": {"format": "something else"}}, "does not contain the format"),
-    ({"header": {"n_vertices": HUGE}}, "mesh_vertices must be float64 of shape"),
     ({"header": {"n_vertices": 10**30}}, "mesh_vertices must be float64 of shape"),
-    ({"header": {"n_vertices": -6}}, "n_vertices must be a whole number"),
     ({"header": {"n_regions": 10**12}}, "membership must be bool of shape"),
     ({"header": {"cages": [[HUGE, HUGE]]}}, "cage_vertices must be"),
-    ({"header": {"cages": [[2, 4], [2, 0]]}}, "faces must index 0..1"),
     ({"header": {"cages": [4, 4]}}, r"cages\[0\] must be a list of 2"),
-    ({"header": {"cages": {}}}, "cages must be a list"),
-    ({"header": {"handles": [["h", 2]]}}, "handle must be int64 of shape"),
     ({"header": {"handles": [["h", 1], ["h", 0]]}}, "two handles have the same name"),
     ({"header": {"handles": [["h", 1], ["i", 0]]}}, "each handle must have at least one vertex"),
-    ({"header": {"smoothness": "much"}}, "smoothness must be a number"),
     ({"header": {"smoothness": -1}}, "smoothness must be a number above 0"),
     ({"header": {"options": {"stretch": -1.0}}}, "stretch must be a number of at least 0"),
     ({"header": {"options": {"colour": 1}}}, "colour"),
-    ({"header": {"options": 3}}, r"options must be an object"),
     ({"mesh_vertices": np.full((6, 3), np.nan)}, "NaN|non-finite|not finite"),
     ({"mesh_vertices": OCTAHEDRON[0].astype(np.float32)}, "must be float64 of shape"),
-    ({"mesh_vertices": np.array([[None] * 3] * 6)}, "must be float64 of shape"),
-    ({"mesh_faces": OCTAHEDRON[1] + 1}, "out of range"),
     ({"mesh_faces": OCTAHEDRON[1][:, ::-1]}, "inside-out"),
     ({"membership": np.zeros((1, 6), bool)}, "no vertices"),
     ({"membership": np.full((1, 6), 7, np.uint8).view(bool)}, "neither true nor false"),
     ({"cage_vertices": 0.1 * TETRAHEDRON[0]}, "outside the cage"),
-    ({"fixed": np.array([99])}, "fixed must index"),
     ({"fixed": np.array([0])}, "both fixed and handle"),
-    ({"pose": np.full((4, 3), np.inf)}, "NaN or infinite"),
     ({"pose": np.full((4, 3), 1e300)}, "the pose is damaged: it is .* away"),
-    ({"targets": np.full((1, 3), 1e9)}, "the pose is damaged"),
-    ({"header": {"region_names": "arm"}}, "region_names must be a list"),
     ({"header": {"region_names": ["arm", "leg"]}}, "2 names for 1 regions"),
-    ({"header": {"region_names": [7]}}, r"region_names\[0\] must be text"),
     ({"header": {"region_names": ["a\0b"]}}, "name must be printable text"),
-    ({"header": {"region_names": ["a" * 81]}}, "80 characters"),
-    ({"header": {"region_names": ["region 2"]}}, "reserved for a region of this number"),
     ({"header": {"posed": "yes"}}, "posed must be true or false"),
-    ({"targets": np.zeros((2, 3))}, "targets must be"),
-    ({"compress": True}, "header.json is compressed"),
-    ({"header": {"pulls": "pull 1"}}, "pulls must be a list"),
     ({"header": {"pulls": [[]]}}, r"pulls\[0\] must be text"),
     ({"header": {"fixed_in_pose": True}}, "fixed_at.npy is missing"),
-    ({"header": {"pivots": [0, 0, 0]}}, "pivots must be"),
-    ({"header": {"pivots": {"h": [0.0, 0.0]}}}, r"pivots\.h must be a list of 3"),
     ({"header": {"pivots": {"h": [0.0, 0.0, 1e9]}}}, "pivot of h is .* away"),
-    ({"header": {"locality": 3}}, "locality must be a list"),
-    ({"header": {"locality": [2, None, 0.1]}}, r"locality must be a list of 4"),
-    ({"header": {"locality": [2.5, None, 0.1, 0.5]}}, r"locality\[0\] must be a whole number"),
     ({"header": {"locality": [99, None, 0.1, 0.5]}}, "0 to 5; got 99"),
-    ({"header": {"pulled_point": [[0, 99], [0.5, 0.5]]}}, "0 to 5; got 99"),
     ({"header": {"pulled_point": [[0, 1], [0.5, 0.6]]}}, "must have positive shares"),
-    (
-        {"header": {"pulled_point": [[0, 1], ["a", 0.6]]}},
-        r"pulled_point\[1\]\[0\] must",
-    ),
-    ({"header": {"pulled_point": [0, 1]}}, r"pulled_point\[0\] must be a list"),
-    ({"header": {"pulled_point": [[0, 1]]}}, "pulled_point must be a list of 2"),
     ({"header": {"locality": [2, -1.0, 0.1, 0.5]}}, "radius of a pull must be positive"),
-    ({"header": {"locality": [2, "far", 0.1, 0.5]}}, r"locality\[1\] must be a number"),
-    ({"header": {"locality": [2, None, None, 0.5]}}, r"locality\[2\] must be a number"),
     ({"header": {"locality": [2, None, 0.1, 1.5]}}, "follows must be from 0 to 1"),
-    ({"header": {"locality": [2, None, 0.1, "no"]}}, r"locality\[3\] must be a number"),
-    ({"locality": np.zeros((3, 3))}, "locality must be float64 of shape"),
-    ({"locality": np.full((4, 3), np.nan)}, "NaN or infinite"),
-    ({"locality": np.full((4, 3), 1e300)}, "the pose is damaged"),
 ]
 
 
@@ -452,19 +336,6 @@ def test_a_pickle_in_a_file_is_never_run(tmp_path):
     trap = np.array([[Trap()] * 3] * 6, dtype=object)
     refuse(rewritten(saved(shared(tiny), tmp_path), mesh_vertices=trap), tmp_path)
     assert not (tmp_path / "trapped").exists()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="forks")
-def test_a_file_that_is_being_saved_is_read_as_the_old_or_the_new_one(tmp_path, other_process):
-    path, (writer, _) = tmp_path / "saved.npz", other_process
-    save_session(path, shared(tiny))
-    print(path, file=writer.stdin, flush=True)
-    try:
-        assert writer.stdout.readline() == "begun\n"
-        sizes = {load_session(path).mesh.n_vertices for _ in range(60)}
-    finally:
-        writer.kill()
-    assert sizes == {4, 642}  # or nothing was tested
 
 
 def test_the_size_is_that_of_the_open_file(tmp_path, monkeypatch):
@@ -520,14 +391,6 @@ def test_a_session_too_large_to_read_is_not_written(tmp_path, monkeypatch):
     with pytest.raises(SessionError, match=r"saved\.npz: cannot be written \(.* bytes exceed"):
         save_session(tmp_path / "saved.npz", shared(posed))
     assert os.listdir(tmp_path) == []
-
-
-@pytest.mark.skipif(os.name != "posix", reason="no named pipes in folders here")
-def test_a_pipe_or_a_device_is_refused_without_blocking(tmp_path):
-    os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path / "pipe", "/dev/zero"):
-        with pytest.raises(SessionError, match="a device or a pipe"):
-            load_session(path)
 
 
 def test_a_view_that_is_no_json_is_refused_by_name(tmp_path):

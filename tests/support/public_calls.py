@@ -30,7 +30,7 @@ import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.faults import Search, as_soup
-from vtk_segdeform.session.groups import Handles, Painting
+from vtk_segdeform.session import Handles, Painting
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.films.film import Film
@@ -359,7 +359,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "cages": cages,
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
-    "density": lambda: np.ones(mesh().n_vertices),
     "divisions": lambda: (2, 2, 4),
     "event": lambda: "ModifiedEvent",
     "events": lambda: 1000,

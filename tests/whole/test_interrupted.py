@@ -241,42 +241,6 @@ def test_no_task_writes_after_its_caller_was_interrupted_twice(monkeypatch):
     assert len(begun) == count
 
 
-def test_blas_threads_are_restored_though_that_is_interrupted(monkeypatch):
-    class Library:
-        threads = 8
-
-        def select(self, **_):
-            return Library()
-
-        def limit(self, *, limits, **_):
-            return Limit(self, limits)
-
-    class Limit:
-        def __init__(self, library, limits):
-            self.library, self.tried = library, 0
-            self.before, library.threads = library.threads, limits
-
-        def restore_original_limits(self):
-            self.tried += 1
-            if self.tried == 1:
-                raise KeyboardInterrupt
-            self.library.threads = self.before
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-    library = Library()
-    limit = threads._BlasLimit(library)
-    monkeypatch.setattr(threads, "_blas_limit", lambda: limit)
-    for _ in range(2):
-        with pytest.raises(KeyboardInterrupt), threads.one_blas_thread():
-            assert library.threads == 1
-        assert library.threads == 8
-
-
 def test_nearest_points_are_those_of_scipy(monkeypatch):
     points = np.random.default_rng(0).random((5000, 3))
     tree = cKDTree(points[::7])

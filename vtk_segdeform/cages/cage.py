@@ -33,7 +33,6 @@ from ..regions import Regions
 MOST_CAGE_VERTICES = 1600
 """Most vertices of all cages together: the solver factors matrices of three rows per vertex."""
 
-_LONGEST_NAME = 100  # characters of a cage's name in a message
 _BOXED_FROM, _BOXES = 20_000, 64  # points from which boxes are tested; along the longest side
 _LARGEST_COORDINATE = 1e70  # coordinate, as for a mesh
 
@@ -112,7 +111,7 @@ class Cage(Described, Frozen):
 
     def require_encloses(self, points: ArrayLike, name: str) -> None:
         """Raise a CageError if any of *points* (n, 3) are outside; *name* describes them."""
-        name = require(name, str, "name")[:_LONGEST_NAME]
+        name = require(name, str, "name")[:100]
         x = as_points(points, name)
         if np.abs(x).max(initial=0.0) > _LARGEST_COORDINATE:
             raise CageError(
@@ -133,6 +132,13 @@ def encloses_region(cage: Cage, regions: Regions, r: int) -> bool:
     if r not in known:
         known[r] = bool(cage.contains(regions.mesh.vertices[regions.membership[r]]).all())
     return known[r]
+
+
+def require_enclosed(cage: Cage, regions: Regions, r: int, name: str) -> None:
+    """Raise a CageError unless *cage* encloses region *r*, which the message calls *name*."""
+    if not encloses_region(cage, regions, r):
+        members = regions.mesh.vertices[regions.membership[r]]
+        cage.require_encloses(members, f"vertices of {name}")
 
 
 def _inside_of_many(points: FloatArray, vertices: FloatArray, faces: IntArray) -> BoolArray:

@@ -13,9 +13,6 @@ which is always valid.
 The n vertices of a cage of area A are about ``sqrt(A / n)`` apart; the default offset is
 proportional to that length, because mean value coordinates degrade close to large faces.
 
-Where the mesh is fixed, cages need few vertices: `spacing` tells how far apart they should be at
-each vertex, and the offset and the faces of a cage follow it.
-
 A large mesh is decimated first, far more finely than its cages; only the last check is on the mesh
 itself.
 """
@@ -30,9 +27,9 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from .. import sizes
-from ..arrays import BoolArray, FloatArray, IntArray, as_ids, as_numbers, is_number, is_whole
+from ..arrays import BoolArray, FloatArray, IntArray, as_ids, is_number, is_whole
 from ..checks import shown
-from ..errors import ArgumentError, CageError, RegionError
+from ..errors import CageError, RegionError
 from ..geometry import decimated
 from ..kernels import nearest, one_blas_thread
 from ..mesh import Mesh, distance_to_surface, inside_points, require_mesh
@@ -40,25 +37,14 @@ from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from .cage import MOST_CAGE_VERTICES, Cage, cage_faults, encloses_region
 from .contour import contour_surface
-from .region_solid import Patch, SolidField, Surface, solid_field
+from .region_solid import STEPS_PER_OFFSET, Patch, SolidField, Surface, solid_field
 from .simplify import roundness, simplify
-from .spacing import bending_density, cage_spacing
 
 _OFFSET_SHARE = 0.4  # of sqrt(area of the region / vertices of its cage)
-_STEP_SHARE = 0.27  # of the grid, of the same length: about thirty contour vertices per cage vertex
-_OFFSET_GROWTH = 1.25  # attempt k = 0, 1, ... has 1.25^(k (k + 1) / 2) times the offset:
-_ATTEMPTS = 8  # 1, 1.25, 2, 4, 9, 28, 108, 517
+_ATTEMPTS = 8  # attempt k has 1.25^(k (k + 1) / 2) times the offset: 1, 1.25, 2, 4 ... 517
 _GOOD_QUALITY = 0.2  # least roundness of faces, and least distance in offsets, of a good cage
-_MOST_NODES, _NODES_PER_VERTEX = 3e5, 1e3  # limit of the nodes of a grid: the larger of both
-_FEWER_NODES = 3.0  # times, if spacing varies: half the time, and as good poses
 _FEWEST = 8  # vertices of a cage, and of each component of a cage with several
-_FLOOR = 12  # vertices of each cage before the rest is distributed
 _SUGGESTED, _SUGGESTED_EACH = 155, 30  # cage vertices in total, and for each part; half alone
-_UNIT_QUANTILE, _MOST_STRETCH = 0.05, 12.0  # of spacings: the unit, and the largest in that unit
-_LEAST_WIDTH = 1e-3  # width over length that a region counts with, at least
-_LEAST_CLEARANCE = 0.5  # of the offset: least distance between faces and the surface
-_PUSHES = 30  # rounds of moving faces away
-_MEASURED_VERTICES = 200  # nearest ones, whose exact distance is computed
 _LEAST_OFFSET, _MOST_OFFSET = 1e-12, 1e6  # limits of the offset, in diagonals of the mesh
 # Barycentric coordinates of samples of a face.
 _SAMPLES = np.array([(i, j, 6 - i - j) for i in range(7) for j in range(7 - i)]) / 6.0
@@ -84,8 +70,6 @@ def fit_cages(
     regions: Regions,
     n_vertices: int = 155,
     *,
-    fixed: ArrayLike = (),
-    density: ArrayLike | str | None = None,
     offset: float | None = None,
     progress: Progress | None = None,
 ) -> tuple[Cage, ...]:
@@ -100,17 +84,10 @@ def fit_cages(
     n_vertices : int
         Exact total number of cage vertices; at least 8 for each region, at most 1600.
         Distributed by area and shape: large and long regions get more.
-    fixed : (k,) int or (n,) bool
-        Vertices of the mesh that keep their shape, fixed or moved rigidly.  Cages have few vertices
-        there, and more where the mesh is free, the more the thinner it is.
-    density : (n,) float or "thickness", optional
-        Cage vertices per area at each vertex of the mesh, not negative; only ratios matter.
-        "thickness" is the inverse of the local thickness, the default if there are fixed vertices;
-        poses are better, and fitting takes two to three times as long.
     offset : float, optional
         Approximate distance of the cages from the surface, in the unit of the mesh.  By default,
         0.4 sqrt(area / vertices of its cage) for each region.  It is increased where no valid
-        cage is found at that distance, and where cage vertices are farther apart than elsewhere.
+        cage is found at that distance.
     progress : callable, optional
         Called with the fraction done and a text; may raise `Cancelled`.
 
@@ -123,8 +100,6 @@ def fit_cages(
     ------
     CageError
         If *n_vertices* is too small or too large, or *offset* is not positive.
-    ArgumentError
-        If *fixed* or *density* is invalid.
     """
     require_mesh(mesh)
     require_regions(regions, mesh)
@@ -135,59 +110,24 @@ def fit_cages(
     require_cage_vertices(n_vertices, n_regions)
     tell(progress, 0.0, "measuring regions")
     shape, membership = mesh, regions.membership
-    held = np.zeros(mesh.n_vertices, dtype=bool)
-    held[as_ids(fixed, mesh.n_vertices, "fixed")] = True
-    by_thickness = held.any() if density is None else isinstance(density, str)
-    wanted = None if density is None else _as_density(density, mesh.n_vertices)
     cluster = None
     if mesh.n_vertices > sizes.DECIMATED:
         shape, kept, cluster = decimated(mesh, sizes.DECIMATED_POINTS)
         membership = membership[:, kept]
         for members, some in zip(membership, regions.membership, strict=True):
             members[cluster[some]] = True
-        free = np.zeros(shape.n_vertices, dtype=bool)
-        free[cluster[~held]] = True
-        held = ~free
-        wanted = None if wanted is None else wanted[kept]
-    if by_thickness and not held.all():
-        wanted = bending_density(shape)
-    spacing = None if wanted is None else _spacing(shape, held, wanted, n_vertices)
     patches = _patches(shape, membership, part(progress, 0.0, 0.25))
-    numbers = _distributed(patches, n_vertices, spacing)
+    numbers = _distributed(patches, n_vertices)
     cages, fitting = [], part(progress, 0.25, 1.0)
     for r, (patch, number) in enumerate(zip(patches, numbers, strict=True)):
         piece = part(fitting, r / n_regions, (r + 1) / n_regions)
-        cage = _fit(patch, int(number), offset, piece, spacing)
+        cage = _fit(patch, int(number), offset, piece)
         if cluster is not None and not encloses_region(cage, regions, r):
             patch = Patch.of(Surface.of(mesh), regions.membership[r])
-            apart = None if spacing is None else spacing[cluster]
-            cage = _fit(patch, int(number), offset, piece, apart)
+            cage = _fit(patch, int(number), offset, piece)
         cages.append(cage)
     tell(progress, 1.0, "cages ready")
     return tuple(cages)
-
-
-def _as_density(density: ArrayLike | str, n: int) -> FloatArray | None:
-    """Return *density* as an array (n,), None if it is "thickness", or raise an ArgumentError."""
-    if isinstance(density, str):
-        if density != "thickness":
-            raise ArgumentError(f"density must be numbers or 'thickness'; got {shown(density)}")
-        return None
-    array = as_numbers(density, "density")
-    if array.shape != (n,) or not (array >= 0.0).all() or not np.isfinite(array).all():
-        raise ArgumentError(f"density must be {n} finite numbers, one per vertex, 0 or more")
-    return array
-
-
-def _spacing(
-    mesh: Mesh, held: BoolArray, density: FloatArray, n_vertices: int
-) -> FloatArray | None:
-    """Return the spacing of cage vertices at each vertex (n,); None if it is the same everywhere.
-
-    *held* (n,) are vertices that keep their shape.
-    """
-    density = np.where(held, 0.0, density)
-    return cage_spacing(mesh, density, n_vertices) if density.any() else None
 
 
 def _patches(mesh: Mesh, membership: BoolArray, progress: Progress | None) -> list[Patch]:
@@ -249,64 +189,42 @@ def _check_offset(offset: float | None, mesh: Mesh) -> None:
         )
 
 
-def _distributed(patches: list[Patch], n_vertices: int, spacing: FloatArray | None) -> IntArray:
+def _distributed(patches: list[Patch], n_vertices: int) -> IntArray:
     """Return the number of vertices of each cage, *n_vertices* in total.
 
     A fixed edge length would need numbers proportional to the area, a fixed number of edges around
     a limb the same number for small and large limbs; the square root of the area is in between.
     The square root of length over width gives long regions, which bend, more vertices.
-
-    With a *spacing* at each vertex, the numbers follow from it.
     """
-    if spacing is not None:
-        need = np.array([patch.weights @ spacing**-2.0 for patch in patches])
-        floor = _FEWEST
-    else:
-        area = np.array([patch.area for patch in patches])
-        spread = np.array([patch.spread for patch in patches])
-        length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
-        width = np.maximum(spread[:, 1:].sum(axis=1), _LEAST_WIDTH * length)
-        need = np.sqrt(area * length / width)
-        floor = min(_FLOOR, n_vertices // len(patches))
+    area = np.array([patch.area for patch in patches])
+    spread = np.array([patch.spread for patch in patches])
+    length = np.maximum(spread.sum(axis=1), np.finfo(float).tiny)
+    width = np.maximum(spread[:, 1:].sum(axis=1), 1e-3 * length)
+    need = np.sqrt(area * length / width)
+    floor = min(3 * _FEWEST // 2, n_vertices // len(patches))
     share = np.round(need / need.sum(), 9)  # equal regions get equal numbers
     ends = np.rint((n_vertices - floor * len(patches)) * np.cumsum(share) / share.sum())
     return np.asarray(floor + np.diff(ends, prepend=0.0).astype(np.int64))
 
 
-def _fit(
-    patch: Patch,
-    n: int,
-    offset: float | None,
-    progress: Progress | None,
-    spacing: FloatArray | None = None,
-) -> Cage:
-    """Return the first good cage, or the better one of the first two valid ones.
-
-    With a *spacing* at each vertex, its offset and the size of its faces are proportional to it.
-    """
-    length, stretch = float(np.sqrt(patch.area / n)), None
-    if spacing is not None:
-        least = np.quantile(spacing[patch.members], _UNIT_QUANTILE)
-        stretch = np.clip(spacing / least, 1.0, _MOST_STRETCH)
-        length = float(np.sqrt(patch.weights @ stretch**-2.0 / n))
+def _fit(patch: Patch, n: int, offset: float | None, progress: Progress | None) -> Cage:
+    """Return the first good cage, or the better one of the first two valid ones."""
+    length = float(np.sqrt(patch.area / n))
     offset = _OFFSET_SHARE * length if offset is None else offset
     valid: list[tuple[float, FloatArray, IntArray]] = []
     for attempt in range(_ATTEMPTS):
         message = f"fitting a cage of {n} vertices, attempt {attempt + 1}"
         tell(progress, attempt / _ATTEMPTS, message)
-        larger = _OFFSET_GROWTH ** (attempt * (attempt + 1) / 2)
-        nodes = max(_MOST_NODES, _NODES_PER_VERTEX * n) / (1.0 if stretch is None else _FEWER_NODES)
-        field = solid_field(
-            patch, offset * larger, _STEP_SHARE * length * larger, most_nodes=nodes, stretch=stretch
-        )
+        larger = 1.25 ** (attempt * (attempt + 1) / 2)
+        step, nodes = _OFFSET_SHARE * length * larger / STEPS_PER_OFFSET, max(3e5, 1e3 * n)
+        field = solid_field(patch, offset * larger, step, most_nodes=nodes)
         tell(progress, (attempt + 0.5) / _ATTEMPTS, message)
         if _FEWEST * field.n_shells > n:
             fault = f"it has {field.n_shells} components"
             continue
         share = part(progress, (attempt + 0.5) / _ATTEMPTS, (attempt + 0.8) / _ATTEMPTS)
         contour = contour_surface(field.smooth, field.offset)
-        density = None if field.stretch is None else field.stretch_at(contour[0]) ** -2.0
-        vertices, faces = simplify(*contour, n, density=density, progress=share, message=message)
+        vertices, faces = simplify(*contour, n, progress=share, message=message)
         tell(progress, (attempt + 0.8) / _ATTEMPTS, message)
         vertices = _cleared(vertices, faces, field)
         tell(progress, (attempt + 0.9) / _ATTEMPTS, message)
@@ -344,8 +262,8 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
     """
     vertices = vertices.copy()
     slope = [np.gradient(field.smooth, axis=axis) for axis in range(3)]
-    least = _LEAST_CLEARANCE * field.offset
-    for _ in range(_PUSHES):
+    least = 0.5 * field.offset
+    for _ in range(30):
         at = (_SAMPLES @ vertices[faces]).reshape(-1, 3).T
         distance = ndimage.map_coordinates(field.distance, at, order=1)
         near = np.flatnonzero(distance < least)
@@ -353,7 +271,6 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
             break
         away = np.stack([ndimage.map_coordinates(s, at[:, near], order=1) for s in slope])
         away *= (1.1 * least - distance[near]) / np.maximum(np.linalg.norm(away, axis=0), 1e-9)
-        away *= field.stretch_at(at[:, near].T)
         face, sample = np.divmod(near, len(_SAMPLES))
         corner, weight = faces[face].ravel(), _SAMPLES[sample].ravel()
         total = np.bincount(corner, weight, minlength=len(vertices))
@@ -367,9 +284,7 @@ def _cleared(vertices: FloatArray, faces: IntArray, field: SolidField) -> FloatA
 def _quality(vertices: FloatArray, faces: IntArray, field: SolidField) -> float:
     """Return the quality of a cage, 1 or more if no face is a needle or close to the surface."""
     tree = cKDTree((_SAMPLES @ vertices[faces]).reshape(-1, 3))
-    x, unit = field.members, field.stretch_at(field.members)
-    gap = nearest(tree, x)[0][:, 0]
-    closest = np.argsort(gap / unit, kind="stable")[:_MEASURED_VERTICES]
-    clearance = distance_to_surface(x[closest], vertices, faces) / unit[closest]
-    clearance = clearance.min() / field.offset
+    gap = nearest(tree, field.members)[0][:, 0]
+    closest = field.members[np.argsort(gap, kind="stable")[:200]]
+    clearance = distance_to_surface(closest, vertices, faces).min() / field.offset
     return float(min(roundness(vertices, faces).min(), clearance) / _GOOD_QUALITY)

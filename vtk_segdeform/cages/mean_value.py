@@ -62,8 +62,7 @@ from ..progress import Progress
 _ON_EDGE = 1e-14  # points at this distance are on the vertex or edge
 _OFF_PLANE = 1e-30  # added to h, so that it is never exactly 0
 _NEAR_PLANE = 1e-3  # of max |a|: for smaller |h|, S is the sum of psi_i
-_FARTHEST_POINT = 1e60  # diagonals; fourth powers of larger distances overflow
-_NUMBERS_AT_ONCE = 1 << 15  # per temporary array: a quarter of a megabyte, which fits the cache
+FARTHEST_POINT = 1e60  # diagonals; fourth powers of larger distances overflow
 
 
 def mean_value_coordinates(
@@ -116,9 +115,9 @@ def mean_value_coordinates(
     _require_closed(p, faces)
     low, high = p.min(axis=0), p.max(axis=0)
     centre, size = (low + high) / 2.0, np.linalg.norm(high - low)
-    if max(x.max(initial=0.0), -x.min(initial=0.0)) > _FARTHEST_POINT * size:
+    if max(x.max(initial=0.0), -x.min(initial=0.0)) > FARTHEST_POINT * size:
         raise ArgumentError(
-            f"points must be within {_FARTHEST_POINT:.0e} diagonals of the cage; "
+            f"points must be within {FARTHEST_POINT:.0e} diagonals of the cage; "
             "some are farther away"
         )
     cage = _prepare((p - centre) / size, faces)
@@ -133,8 +132,8 @@ def mean_value_coordinates(
         else:
             weights[start:stop] = _weights(cage, local.T).T
 
-    # With fewer than 16 rows, calls cost more time than the cache saves.
-    rows = max(16, _NUMBERS_AT_ONCE // faces.size)
+    # Temporary arrays of a quarter of a megabyte fit the cache; fewer than 16 rows are slower.
+    rows = max(16, (1 << 15) // faces.size)
     in_parallel(work, len(x), rows, progress=progress, message="mean value coordinates")
     return weights
 

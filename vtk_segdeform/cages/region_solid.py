@@ -31,16 +31,11 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import lids_of, principal_axes
-from ..kernels import in_parallel
+from ..kernels import ROWS_AT_ONCE, in_parallel
 from ..mesh import Mesh, inside_nodes, ragged_arange
 
-_STEPS_PER_OFFSET = 1.5  # at least, so that every point of S has a node inside the offset surface
+STEPS_PER_OFFSET = 1.5  # at least, so that every point of S has a node inside the offset surface
 _MARGIN = 3.7183  # steps around the offset surface; uneven, so that no extreme is on a node
-_BLUR = 0.5  # standard deviation, relative to the offset
-_FIRST_OF_EQUALS = 1.0 - 1e-6 * np.arange(3)  # breaks ties between equal edges
-_FACES_AT_ONCE = 50_000  # of a task
-_FLAT_AREA = 1e-12  # area of faces relative to the square of their length
-_LEAST_LENGTH = 1e-2  # length of a face without any, relative to the mesh
 _SAMPLE_SPACING = 0.7  # steps between samples of a face: less than 1, to leave no gaps
 
 
@@ -78,7 +73,7 @@ class Surface:
             square = ((x - x[:, [1, 2, 0]]) ** 2).sum(axis=2).max(axis=1)
             longest[start:stop] = np.sqrt(square)
 
-        in_parallel(work, mesh.n_faces, _FACES_AT_ONCE)
+        in_parallel(work, mesh.n_faces, ROWS_AT_ONCE)
         points = mesh.vertices - centre
         walls = points, mesh.faces
         if not mesh.is_closed:
@@ -107,10 +102,8 @@ class Patch:
         touching = members[surface.faces].any(axis=1)
         corners, thirds = surface.faces[touching].ravel(), surface.face_areas[touching] / 3.0
         length = surface.longest[touching]
-        least = _LEAST_LENGTH * np.ptp(surface.points, axis=0).max()
-        if thirds.sum() <= _FLAT_AREA * (
-            length @ length
-        ):  # count flat faces by their length instead
+        least = 1e-2 * np.ptp(surface.points, axis=0).max()
+        if thirds.sum() <= 1e-12 * (length @ length):  # count flat faces by their length instead
             thirds = np.maximum(length, least) ** 2 / 12.0
         weights = np.zeros(len(surface.points))
         weights += np.bincount(corners, np.repeat(thirds, 3), minlength=len(weights))
@@ -185,43 +178,21 @@ class SolidField:
     offset: float
     members: FloatArray  # the vertices of the region
     n_shells: int  # components of the surface smooth = offset
-    stretch: FloatArray | None = None  # of the offset at every node; distances are divided by it
-
-    def stretch_at(self, x: FloatArray) -> FloatArray:
-        """Return the stretch of the offset at points *x* (k, 3) of the grid, (k,)."""
-        if self.stretch is None:
-            return np.ones(len(x))
-        return np.asarray(ndimage.map_coordinates(self.stretch, x.T, order=1, mode="nearest"))
 
 
-def solid_field(
-    patch: Patch,
-    offset: float,
-    step: float,
-    *,
-    most_nodes: float,
-    stretch: FloatArray | None = None,
-) -> SolidField:
+def solid_field(patch: Patch, offset: float, step: float, *, most_nodes: float) -> SolidField:
     """Return the distance to the solid of the region, on a grid that extends beyond *offset*.
 
     *step* is increased if the grid would have more than *most_nodes* nodes, and decreased if the
     offset would have too few steps; if both, the offset is increased.
-
-    With *stretch* (n,), at least 1, the offset at a vertex is that many times *offset*: distances
-    are divided by the stretch at the nearest vertex, smoothed.  Where *offset* is increased, only
-    smaller offsets are: otherwise the grid would grow with the largest one.
     """
     surface, members = patch.surface, patch.members
     low, high = patch.box
-    asked, largest = offset, offset if stretch is None else offset * float(stretch[members].max())
-    step = min(step, offset / _STEPS_PER_OFFSET)
-    while np.prod((high - low + 2 * largest) / step + 2 * _MARGIN + 2) > most_nodes:
+    step = min(step, offset / STEPS_PER_OFFSET)
+    while np.prod((high - low + 2 * offset) / step + 2 * _MARGIN + 2) > most_nodes:
         step *= 1.1
-        offset = max(offset, step * _STEPS_PER_OFFSET)
-        largest = max(largest, offset)
-    if stretch is not None:
-        stretch = np.maximum(stretch * (asked / offset), 1.0)
-    pad = largest + _MARGIN * step
+        offset = max(offset, step * STEPS_PER_OFFSET)
+    pad = offset + _MARGIN * step
     nx, ny, nz = (int(k) for k in np.ceil((high - low + 2 * pad) / step) + 1)
     grid = Grid((low - pad) @ patch.axes, patch.axes, step, (nx, ny, nz))
 
@@ -236,25 +207,9 @@ def solid_field(
     if not members.all():
         inside = inside[members[surface.tree.query(grid.to_points(inside))[1]]]
     distance = _distance(samples, inside, grid.shape)
-    smooth = ndimage.gaussian_filter(distance, _BLUR * offset / step, mode="nearest")
-    if stretch is not None:
-        stretch = _spread(nodes[members], stretch[members], grid.shape, offset / step)
-        smooth, distance = smooth / stretch, distance / stretch
+    smooth = ndimage.gaussian_filter(distance, 0.5 * offset / step, mode="nearest")
     smooth, n_shells = _filled(smooth, offset / step, nodes[members])
-    return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells, stretch)
-
-
-def _spread(
-    members: FloatArray, values: FloatArray, shape: tuple[int, int, int], blur: float
-) -> FloatArray:
-    """Return *values* of the *members* at every node: of the nearest node with any, smoothed."""
-    node = np.ravel_multi_index(tuple(np.rint(members).astype(np.int64).T), shape)
-    count = np.bincount(node, minlength=int(np.prod(shape)))
-    total = np.bincount(node, values, minlength=len(count))
-    without = (count == 0).reshape(shape)
-    mean = (total / np.maximum(count, 1)).reshape(shape)
-    nearest = ndimage.distance_transform_edt(without, return_distances=False, return_indices=True)
-    return ndimage.gaussian_filter(mean[tuple(nearest)], 2.0 * blur, mode="nearest")
+    return SolidField(grid, distance, smooth, offset / step, nodes[members], n_shells)
 
 
 def _distance(samples: FloatArray, inside: IntArray, shape: tuple[int, int, int]) -> FloatArray:
@@ -296,7 +251,7 @@ def _samples(triangles: FloatArray) -> FloatArray:
     """Return points at most a step apart on the *triangles* (m, 3, 3) that are larger."""
     length = np.linalg.norm(triangles - triangles[:, [1, 2, 0]], axis=2)
     large = np.flatnonzero(length.max(axis=1) > _SAMPLE_SPACING)
-    longest = (length[large] * _FIRST_OF_EQUALS).argmax(axis=1)
+    longest = (length[large] * [1.0, 1.0 - 1e-6, 1.0 - 2e-6]).argmax(axis=1)  # the first of equals
     order = (longest[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(triangles[large], order[..., None], axis=1).transpose(1, 0, 2)
     base = length[large, longest]

@@ -9,9 +9,6 @@ Collapsing edge (i, j) to a point p costs
     a       accumulated area; the second term favours edges of equal length, which matter more
             for a cage that bends than a sharp outline
 
-With a density rho of vertices per area, costs are multiplied by rho^2, its mean over the
-accumulated area: edges of equal cost then have lengths proportional to rho^(-1/2).
-
 A collapse is valid if it preserves the topology (the link condition of [DEGN99]: i and j have
 exactly two common neighbours), inverts no face and creates no needle.  Each round collapses many of
 the cheapest edges at once, chosen so that they do not affect each other; all operations are on
@@ -35,14 +32,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import compiled_checks, inputs, scratch
+from ..kernels import compiled_checks, inputs
 from ..mesh import cross_rows
 from ..progress import Progress, tell
 
 _LEAST_ROUNDNESS = 0.01  # least `roundness` of a changed face
-_LENGTH_WEIGHT = 0.05  # k
-_MIDPOINT_WEIGHT = 0.05  # attracts p to the midpoint of the edge, relative to the trace of Q
-_SHARE_OF_ROUND = 0.3  # of the edges, that are considered in one round
+_EVENNESS = 0.05  # k; also attracts p to the midpoint of its edge, relative to the trace of Q
 _PASSES = 2  # of the search for independent edges
 _LEAST_COSINE = 0.3  # between the normals of a face before and after
 
@@ -51,8 +46,8 @@ _LEAST_COSINE = 0.3  # between the normals of a face before and after
 class _Surface:
     points: FloatArray
     faces: IntArray
-    # (n, 12), accumulated in each vertex: xx, xy, xz, yy, yz, zz of A, then b and c of
-    # Q(p) = p'A p - 2 b'p + c, the area a, and the integral of the relative density over it
+    # (n, 11), accumulated in each vertex: xx, xy, xz, yy, yz, zz of A, then b and c of
+    # Q(p) = p'A p - 2 b'p + c, and the area a
     sums: FloatArray
 
 
@@ -79,7 +74,6 @@ def simplify(
     faces: IntArray,
     n_vertices: int,
     *,
-    density: FloatArray | None = None,
     progress: Progress | None = None,
     message: str = "simplifying",
 ) -> tuple[FloatArray, IntArray]:
@@ -93,8 +87,6 @@ def simplify(
         Closed and oriented; each component keeps at least four vertices.
     n_vertices : int
         Target number of vertices.
-    density : (n,) float, optional
-        Positive; the result has as many more vertices per area where it is larger.
     progress : Progress, optional
         Called between rounds; may cancel.
     message : str
@@ -105,7 +97,7 @@ def simplify(
     vertices, faces : (n', 3) float, (m', 3) int
         Closed, oriented, of the same topology; n' >= *n_vertices*.
     """
-    surface = _accumulated(vertices, faces, density)
+    surface = _accumulated(vertices, faces)
     left = len(vertices)
     reduction = math.log(max(left / max(n_vertices, 1), 2.0))
     rejected = np.empty(0, dtype=np.int64)
@@ -138,7 +130,7 @@ def roundness(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return _normals(vertices[faces])[1]
 
 
-def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | None) -> _Surface:
+def _accumulated(vertices: FloatArray, faces: IntArray) -> _Surface:
     """Return the surface with a third of the quadric and area of each face at its corners."""
     corners = vertices[faces]
     normal = cross_rows(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -147,10 +139,9 @@ def _accumulated(vertices: FloatArray, faces: IntArray, density: FloatArray | No
     (x, y, z), d = normal.T, _dot(normal, corners[:, 0])
     terms = x * x, x * y, x * z, y * y, y * z, z * z, x * d, y * d, z * d, d * d, np.ones_like(d)
     share, at = np.repeat(twice_area / 6.0, 3), faces.ravel()
-    sums = np.empty((len(vertices), 12))
+    sums = np.empty((len(vertices), 11))
     for k, term in enumerate(terms):
         sums[:, k] = np.bincount(at, share * np.repeat(term, 3), minlength=len(vertices))
-    sums[:, 11] = sums[:, 10] if density is None else sums[:, 10] * density
     return _Surface(vertices.copy(), faces.copy(), sums)
 
 
@@ -166,11 +157,10 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
     kernels = compiled_checks(len(s.faces))
     if kernels:
         ends = np.empty((m, 2), dtype=np.int64)
-        kernels.sorted_edges(i, j, ends, *scratch(np.int64, n + 2, 2 * m, 2 * m), *inputs(s.faces))
+        room = (np.empty(size, dtype=np.int64) for size in (n + 2, 2 * m, 2 * m))
+        kernels.sorted_edges(i, j, ends, *room, *inputs(s.faces))
         read = inputs(i, j, known.i, known.j, known.cost, known.place, is_moved)
-        kernels.collapse_costs(
-            cost, place, *read, _MIDPOINT_WEIGHT, _LENGTH_WEIGHT, *inputs(s.points, s.sums)
-        )
+        kernels.collapse_costs(cost, place, *read, _EVENNESS, _EVENNESS, *inputs(s.points, s.sums))
     else:
         tail, head, apex = (s.faces[:, k].ravel() for k in ([0, 1, 2], [1, 2, 0], [2, 0, 1]))
         up = tail < head
@@ -189,9 +179,9 @@ def _costs(s: _Surface, known: _Edges, is_moved: BoolArray) -> tuple[_Edges, Flo
 
 def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray]:
     """Return the costs of edges from *i* to *j*, and the points that they collapse to."""
-    xx, xy, xz, yy, yz, zz, bx, by, bz, c, area, need = (s.sums[i] + s.sums[j]).T
+    xx, xy, xz, yy, yz, zz, bx, by, bz, c, area = (s.sums[i] + s.sums[j]).T
     x, y, z = (0.5 * (s.points[i] + s.points[j])).T
-    more = _MIDPOINT_WEIGHT * ((xx + yy) + zz)
+    more = _EVENNESS * ((xx + yy) + zz)
     # (A + k I)(p - m) = b - A m; the inverse of the symmetric matrix by cross products
     pull_x = bx - ((xx * x + xy * y) + xz * z)
     pull_y = by - ((xy * x + yy * y) + yz * z)
@@ -207,8 +197,7 @@ def _cost(s: _Surface, i: IntArray, j: IntArray) -> tuple[FloatArray, FloatArray
     quadratic += ((xz * x + yz * y) + zz * z) * z
     error = (quadratic - 2.0 * ((bx * x + by * y) + bz * z)) + c
     d = s.points[i] - s.points[j]
-    cost = (error + _LENGTH_WEIGHT * area * _dot(d, d)) * (need / area) ** 2
-    return cost, np.stack([x, y, z], axis=1)
+    return error + _EVENNESS * area * _dot(d, d), np.stack([x, y, z], axis=1)
 
 
 def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
@@ -218,13 +207,13 @@ def _independent(edges: _Edges, cost: FloatArray, n: int) -> IntArray:
     with its own; a second pass considers the edges that overlap with no chosen one.
     """
     i, j = edges.i, edges.j
-    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(_SHARE_OF_ROUND * len(cost))
+    cheapest, most = np.flatnonzero(np.isfinite(cost)), math.ceil(0.3 * len(cost))
     if len(cheapest) > most:
         cheapest = cheapest[cost[cheapest] <= np.partition(cost[cheapest], most - 1)[most - 1]]
     cheapest = cheapest[np.argsort(cost[cheapest], kind="stable")[:most]]
     if kernels := compiled_checks(len(cost)):
         found = np.empty(len(cheapest), dtype=np.int64)
-        room = (*scratch(np.int64, n, n), *np.empty((2, n), dtype=bool))
+        room = (*np.empty((2, n), dtype=np.int64), *np.empty((2, n), dtype=bool))
         count = kernels.independent_edges(found, cheapest, _PASSES, *room, *inputs(i, j))
         return np.asarray(found[:count])
     chosen = [cheapest[:0]]

@@ -7,7 +7,6 @@ With ``--json`` it prints one object with these keys:
     components, closed          their number; whether none has a border
     holes                       number of edges of each border, without those of inner walls
     encloses                    whether each component encloses a volume
-    flattened                   whether it does not because it is an open body pressed flat
     volume_under_lids           whether some volume is preserved under lids over holes
     volume                      the volume in words
     workarounds                 what the mesh has differently: objects with kind, text and count,
@@ -102,7 +101,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
 def _unread(name: str) -> dict[str, Any]:
     """Return what is known of the file *name* before it is read."""
     unknown = ("points", "polygons", "vertices", "faces", "components", "closed")
-    none = ("holes", "encloses", "flattened", "workarounds", "faults", "notes")
+    none = ("holes", "encloses", "workarounds", "faults", "notes")
     return {
         "file": name,
         **dict.fromkeys(unknown),
@@ -126,7 +125,6 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
             (len(mesh.borders[k]) for k in np.flatnonzero(~lids.of_wall)), reverse=True
         ),
         "encloses": lids.encloses.tolist(),
-        "flattened": lids.flattened.tolist(),
         "volume_under_lids": bool(lids.holes.any()),
         "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
@@ -177,8 +175,6 @@ def _print(found: dict[str, Any], say: Say) -> None:
     faces = counted(found["faces"], "face", "faces")
     say(f"{given}; as a mesh {found['vertices']} vertices, {faces}, {parts}")
     say(f"It can be deformed as it is. {found['volume']}.")
-    if any(found["flattened"]):
-        say("  --lids on preserves the volume of a flattened body, unless it is 0")
     for each in found["workarounds"]:
         if each["kind"] != "hole":
             say(f"  {each['text']}")

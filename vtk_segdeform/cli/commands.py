@@ -64,10 +64,10 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[fixed] = True
-    regions, rigid = clamped(
+    regions, _ = clamped(
         found, fixed=is_fixed, handle=handle, targets=path[-1], n_cage_vertices=size
     )
-    cages = fit_cages(mesh, regions, size, fixed=rigid, progress=part(progress, 0.18, 0.6))
+    cages = fit_cages(mesh, regions, size, progress=part(progress, 0.18, 0.6))
     report_regions(regions, say)
     report_cages(cages, say)
     deformer = Deformer(

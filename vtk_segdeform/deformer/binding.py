@@ -22,7 +22,6 @@ from ..cages import Cage
 from ..energy import (
     Energy,
     Interior,
-    join_rotations,
     shape_energy,
     with_cage_stiffness,
     with_interior,
@@ -34,7 +33,7 @@ from ..regions import Regions
 from ..solver import CoarseVolume
 from ..subspace import cage_subspace
 
-_FORMAT = 13  # increment whenever the content of a binding changes
+_FORMAT = 14  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,53 +107,26 @@ class Binding:
         share = part(progress, 0.0, 0.38)  # shares of the time for 5,000 to 300,000 vertices
         subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
-        clusters = _first_clusters(inputs)
-        share = part(progress, 0.4, 0.82)
+        clusters = _clusters(inputs)
+        share = part(progress, 0.4, 0.9)
         energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
         faces = [cage.faces for cage in cages]
         energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
-        energy = _joined(inputs, energy, clusters, part(progress, 0.82, 0.91))
         energy = _with_interior(inputs, energy)
         coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
         return cls(energy, coarse)
 
 
-def _first_clusters(inputs: BindingInputs) -> IntArray:
-    """Return the rotation cluster of each vertex: many small ones, which `_joined` joins."""
-    n = inputs.rest.n_vertices
-    count = max(sizes.FIRST_CLUSTERS, sizes.FIRST_CLUSTERS_EACH * inputs.n_clusters)
-    if count >= n:
+def _clusters(inputs: BindingInputs) -> IntArray:
+    """Return the rotation cluster of each vertex, (n,): vertices that lie together."""
+    n, x, parts = inputs.rest.n_vertices, inputs.rest.vertices, inputs.parts
+    if inputs.n_clusters >= n:
         return np.arange(n)
-    shares = inputs.shares
-    if n > sizes.DECIMATED:
-        _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
-        parts, x = inputs.parts[kept], inputs.rest.vertices[kept]
-        return cluster_within_parts(x, parts, count, shares=shares, quick=True)[of_vertex]
-    x = inputs.rest.vertices
-    return cluster_within_parts(x, inputs.parts, count, shares=shares, quick=True)
-
-
-def _joined(
-    inputs: BindingInputs, energy: Energy, clusters: IntArray, progress: Progress | None
-) -> Energy:
-    """Return *energy* with the requested number of rotations."""
-    counts = np.bincount(clusters)
-    if len(counts) <= inputs.n_clusters:
-        return energy
-    x = inputs.rest.vertices
-    means = np.stack([np.bincount(clusters, axis) / counts for axis in x.T], axis=1)
-    parts = np.zeros(len(counts), dtype=np.int64)
-    parts[clusters] = inputs.parts
-    patches = means, parts, counts
-    n_clusters = inputs.n_clusters
-    return join_rotations(
-        energy,
-        inputs.rest_cages,
-        patches,
-        n_clusters,
-        shares=inputs.shares,
-        progress=progress,
-    )[0]
+    if n <= sizes.DECIMATED:
+        return cluster_within_parts(x, parts, inputs.n_clusters, shares=inputs.shares)
+    _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
+    some = x[kept], parts[kept], inputs.n_clusters
+    return cluster_within_parts(*some, shares=inputs.shares)[of_vertex]
 
 
 def _with_interior(inputs: BindingInputs, energy: Energy) -> Energy:

@@ -115,10 +115,10 @@ def deform(
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[stays] = True
-    regions, rigid = clamped(
+    regions, _ = clamped(
         regions, fixed=is_fixed, handle=moves, targets=path[-1], n_cage_vertices=size
     )
-    cages = fit_cages(mesh, regions, size, fixed=rigid, progress=next(stages))
+    cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
         mesh,
         regions,

@@ -163,7 +163,7 @@ class Path:
         if len(preserved) > 1 and not are_met(preserved, x):
             # Of small bodies the coarse volumes, and so these directions, may vanish.
             slopes = [each.gradient(x) / self._problem.frame.size for each in preserved]
-            rows = self._problem.subspace.adjoints(slopes)
+            rows = [self._problem.subspace.adjoint(slope) for slope in slopes]
             x = self._moved_to_volume(preserved, self.solver.directions(rows))
         return x, 0.0
 

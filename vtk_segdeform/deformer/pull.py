@@ -117,7 +117,7 @@ def pull(
     regions = segment(mesh, n_regions, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
-    cages = fit_cages(mesh, regions, size, density="thickness", progress=next(stages))
+    cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,
         progress=next(stages),

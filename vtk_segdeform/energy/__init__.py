@@ -6,7 +6,6 @@ The files, in reading order:
     operators            its operators on the mesh and in the subspace
     cubature             a weighted sample of vertices in place of all
     interior             rotations inside the body
-    rotation_clusters    one local rotation for several vertices
     hessian              the exact Hessian, local rotations included, and its factor
 """
 
@@ -14,14 +13,12 @@ from .energy import Energy, shape_energy, with_cage_stiffness, with_rotating_row
 from .hessian import Factor, full_factor, quadratic_factor, rotation_term
 from .interior import Interior, with_interior
 from .operators import reduced_operators, surface_operators
-from .rotation_clusters import join_rotations
 
 __all__ = [
     "Energy",
     "Factor",
     "Interior",
     "full_factor",
-    "join_rotations",
     "quadratic_factor",
     "reduced_operators",
     "rotation_term",

@@ -66,8 +66,7 @@ class Sample:
         """
         x, faces = mesh.vertices, mesh.faces
         n = len(x)
-        each = sizes.CUBATURE_SAMPLE_EACH * (int(clusters.max()) + 1)
-        number = max(sizes.CUBATURE_SAMPLE, each)
+        number = sizes.CUBATURE_SAMPLE
         if n < sizes.CUBATURE_FACTOR * number:
             return None
         weights = _weights(_along_curve(x, clusters), clusters, mesh.vertex_areas, number)

@@ -34,8 +34,6 @@ from .energy import Energy
 
 _TRACE_SHARE = 0.3  # of the trace of the energy; with 0.1, the twist of a bar jumps
 _PATCHES = 200  # with 100, the twist of a bar jumps
-_DEPTH = 0.75  # of the points, in radii of their balls
-_DIFFERENCE = 1e-3  # of the central differences, in radii
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ class Interior:
         own = encloses[component] & (area * radius > 0.0)
         own &= diameters < mesh.diagonal  # otherwise nothing is opposite
         x, radius, area, component = x[own], radius[own], area[own], component[own]
-        points, volume = x + _DEPTH * radius[:, None] * inward[own], area * radius
+        points, volume = x + 0.75 * radius[:, None] * inward[own], area * radius
         if not len(x):
             return cls(points, radius, volume, weights[:, own])
         patch = cluster_positions(x, _PATCHES)
@@ -89,7 +87,7 @@ class Interior:
         found = np.zeros((len(self.points), 3, subspace.n_columns))
         for cage, own, alpha in zip(cages, subspace.columns, self.weights, strict=True):
             some = np.flatnonzero(alpha > 0.0)
-            step = _DIFFERENCE * self.radii[some, None]
+            step = 1e-3 * self.radii[some, None]
             for axis in range(3):
                 way = step * np.eye(3)[axis]
                 sides = np.concatenate([self.points[some] + way, self.points[some] - way])

@@ -28,7 +28,6 @@ from ..kernels import in_parallel
 from ..subspace import Subspace
 
 _NUMBERS_AT_ONCE = 1 << 19  # of W~, that are multiplied together
-_PIECES_SUMMED = 32  # such pieces that are computed before they are added up
 
 
 class SurfaceOperators(NamedTuple):
@@ -153,9 +152,9 @@ def reduced_operators(
         masses = (here * mass[vertices[heavy], None]).T @ here
         found[start] = columns, [squares, plain, masses]
 
-    totals = np.zeros((3, m, m))
-    for first in range(0, subspace.n_vertices, _PIECES_SUMMED * size):  # summed in a fixed order
-        stop = min(first + _PIECES_SUMMED * size, subspace.n_vertices)
+    totals, together = np.zeros((3, m, m)), 32 * size
+    for first in range(0, subspace.n_vertices, together):  # summed in a fixed order
+        stop = min(first + together, subspace.n_vertices)
         in_parallel(partial(work, first), stop - first, size)
         for start in sorted(found):
             columns, products = found.pop(start)

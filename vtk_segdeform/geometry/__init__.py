@@ -31,7 +31,7 @@ from .differential import (
 )
 from .distortion import distortion, triangle_distortion
 from .intrinsic import IntrinsicTriangulation
-from .kmeans import cluster_positions, cluster_within_parts, farthest_points
+from .kmeans import cluster_positions, cluster_within_parts
 from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, inner_balls, local_volume_change
 from .normal_transport import NormalTransport
@@ -70,7 +70,6 @@ __all__ = [
     "distinct_lengths",
     "distortion",
     "faces_between",
-    "farthest_points",
     "guess_up_axis",
     "inner_balls",
     "inner_vertices",

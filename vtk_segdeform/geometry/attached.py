@@ -17,7 +17,6 @@ from ..arrays import BoolArray, FloatArray, IntArray
 
 SMALL_COMPONENT = 0.0125  # of the whole area; also the smallest limb of a segmentation
 _LARGEST_INSET = 0.1  # of the whole area; also the smallest component that another is set into
-_NEAR_GAP = 0.05  # gap, in diagonals of all points
 
 
 def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> BoolArray:
@@ -34,7 +33,7 @@ def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> Bool
     is_attached = np.zeros(len(share), dtype=bool)
     if len(share) == 1:
         return is_attached
-    near = _NEAR_GAP * float(np.linalg.norm(np.ptp(points, axis=0)))
+    near = 0.05 * float(np.linalg.norm(np.ptp(points, axis=0)))
     large = share >= SMALL_COMPONENT
     large[share.argmax()] = True
     one, _, gap = nearest_pairs(points, component, large)

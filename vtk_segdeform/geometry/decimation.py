@@ -22,10 +22,7 @@ from ..mesh import Mesh, connected
 from .sampling import faces_between, unique_edges
 from .ties import principal_axes
 
-_CLUSTERS_PER_CELL = 1.5  # clusters in a surface, for each square of the grid that would cover it
-_ROUNDS = 6  # of the search for the spacing
-_FEWEST_CLUSTERS, _MOST_CLUSTERS = 0.7, 1.5  # clusters, in numbers requested
-_SMOOTHING_PASSES = 8, 24, 72, 216  # of a noisy mesh, until its clusters are few enough
+_MOST_CLUSTERS = 1.5  # in numbers requested; also clusters for each square of a grid on the surface
 
 _last: WeakKeyDictionary[Mesh, tuple[int, Mesh, IntArray, IntArray]] = WeakKeyDictionary()
 _lock = Lock()  # several threads ask for the same mesh at the same time
@@ -59,10 +56,10 @@ def _clusters(mesh: Mesh, n_points: int) -> IntArray:
     """Return the cluster of each vertex, (n,) int."""
     x = mesh.vertices @ principal_axes(mesh.vertices).T
     x = np.asarray(x - x.min(axis=0))
-    spacing = np.sqrt(_CLUSTERS_PER_CELL * mesh.face_areas.sum() / n_points)
+    spacing = np.sqrt(_MOST_CLUSTERS * mesh.face_areas.sum() / n_points)
     most = _MOST_CLUSTERS * n_points + mesh.components.max() + 1
     cluster, spacing = _in_cells(mesh, x, spacing, n_points)
-    for passes in _SMOOTHING_PASSES:
+    for passes in (8, 24, 72, 216):  # of a noisy mesh
         if cluster.max() < most:
             break
         x = _smoothed(mesh, x, passes)
@@ -74,14 +71,14 @@ def _in_cells(mesh: Mesh, x: FloatArray, spacing: float, n_points: int) -> tuple
     """Return clusters (n,) for vertices at *x* (n, 3), and the spacing, searched from *spacing*."""
     i, j = mesh.edges.T
     least = np.ptp(x, axis=0).max() / (1 << 20)
-    for _ in range(_ROUNDS):
+    for _ in range(6):
         spacing = max(spacing, least)
         key = np.zeros(len(x), dtype=np.int64)
         for axis in range(3):
             key = (key << 21) + np.floor(x[:, axis] / spacing).astype(np.int64)
         n_cells = len(np.unique(key))
         ratio = n_cells / n_points
-        if _FEWEST_CLUSTERS < ratio < _MOST_CLUSTERS or spacing == least:
+        if 1.0 / _MOST_CLUSTERS < ratio < _MOST_CLUSTERS or spacing == least:
             break
         spacing *= np.sqrt(ratio)
     same = key[i] == key[j]

@@ -30,12 +30,9 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import in_parallel
+from ..kernels import ROWS_AT_ONCE, in_parallel
 from ..mesh import HalfEdges, Mesh
-from .intrinsic import FACES_AT_ONCE, IntrinsicTriangulation
-
-_LEAST_AREA = 0.05  # share of the mean area of a vertex's neighbours
-_STRIP_SHARE = 0.1  # share of inner vertices below which a component is a strip
+from .intrinsic import IntrinsicTriangulation
 
 
 def cotangent_laplacian(
@@ -76,7 +73,7 @@ def with_least_areas(areas: FloatArray, faces: IntArray) -> FloatArray:
     around = np.bincount(faces.ravel(), areas[faces[:, [1, 2, 0]]].ravel(), n)
     around += np.bincount(faces.ravel(), areas[faces[:, [2, 0, 1]]].ravel(), n)
     count = 2.0 * np.bincount(faces.ravel(), minlength=n)
-    floor = _LEAST_AREA * around / np.maximum(count, 1.0)
+    floor = 0.05 * around / np.maximum(count, 1.0)
     return np.asarray(np.maximum(np.maximum(areas, floor), np.finfo(float).tiny))
 
 
@@ -93,19 +90,8 @@ def inner_vertices(mesh: Mesh) -> BoolArray:
     inner = np.ones(mesh.n_vertices, dtype=bool)
     inner[half_edges.tail[ends]] = inner[half_edges.head[ends]] = False
     count = np.bincount(mesh.components, inner)
-    is_strip = count < _STRIP_SHARE * np.bincount(mesh.components)
+    is_strip = count < 0.1 * np.bincount(mesh.components)
     return np.asarray(inner | is_strip[mesh.components])
-
-
-def mean_curvature_normals(surface: IntrinsicTriangulation) -> FloatArray:
-    """Return delta of eq. (5), (n, 3), in 1/length; on a sphere, outward and of length 1/r.
-
-    Only at `inner_vertices` is it a curvature.
-    """
-    x = surface.vertices
-    areas = with_least_areas(mixed_voronoi_areas(surface), surface.faces)
-    laplacian = cotangent_laplacian(surface.faces, surface.cotangents, len(x))
-    return (laplacian @ x) / (2.0 * areas)[:, None]
 
 
 def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
@@ -125,5 +111,5 @@ def area_gradients(surface: IntrinsicTriangulation) -> FloatArray:
             out[:, corner] = share[:, [last]] * (x[:, corner] - x[:, after])
             out[:, corner] += share[:, [after]] * (x[:, corner] - x[:, last])
 
-    in_parallel(work, len(faces), FACES_AT_ONCE)
+    in_parallel(work, len(faces), ROWS_AT_ONCE)
     return gradients

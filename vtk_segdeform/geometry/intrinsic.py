@@ -34,16 +34,11 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import in_parallel
+from ..kernels import ROWS_AT_ONCE, in_parallel
 from ..mesh import HalfEdges, next_half_edge
 
 _SLACK = 1e-6  # d, relative to the mean edge length
 _BAD_COTANGENT = 100.0  # cotangent of the smallest angle of a bad triangle: 0.6 degrees
-_DELAUNAY_SUM = (
-    -1e-9
-)  # an edge with a larger cot + cot counts as Delaunay; not 0, because of rounding
-_MOST_ROUNDS = 1000  # of flips; more than ten are rare
-FACES_AT_ONCE = 50_000  # of a task
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +87,7 @@ def areas(lengths: FloatArray) -> FloatArray:
         product = (a + (b + c)) * (c - (a - b)) * (c + (a - b)) * (a + (b - c))  # [Kah14]
         found[start:stop] = 0.25 * np.sqrt(np.maximum(product, 0.0))
 
-    in_parallel(work, len(lengths), FACES_AT_ONCE)
+    in_parallel(work, len(lengths), ROWS_AT_ONCE)
     return found
 
 
@@ -114,7 +109,7 @@ def _edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
         for corner, side in enumerate((c - b, a - c, b - a)):
             lengths[start:stop, corner] = np.sqrt(np.einsum("ij,ij->i", side, side))
 
-    in_parallel(work, len(faces), FACES_AT_ONCE)
+    in_parallel(work, len(faces), ROWS_AT_ONCE)
     return lengths
 
 
@@ -131,7 +126,7 @@ def _flipped(faces: IntArray, lengths: FloatArray, n_vertices: int) -> tuple[Int
     twin = _twins(faces, n_vertices)
     corners, opposite = faces.copy().ravel(), lengths.copy().ravel()
     cot = cotangents(lengths)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(1000):  # more than ten are rare
         bad = np.flatnonzero(np.abs(cot).max(axis=1) > _BAD_COTANGENT)
         h = _independent(_not_delaunay(bad, twin, cot.ravel()), twin, cot.ravel())
         if not len(h):
@@ -161,7 +156,7 @@ def _not_delaunay(bad: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:
     h = (3 * bad[:, None] + np.arange(3)).ravel()
     h = np.unique(np.minimum(h, twin[h]))
     inner = h // 3 != twin[h] // 3
-    return np.asarray(h[inner & (cot[h] + cot[twin[h]] < _DELAUNAY_SUM)])
+    return np.asarray(h[inner & (cot[h] + cot[twin[h]] < -1e-9)])
 
 
 def _independent(h: IntArray, twin: IntArray, cot: FloatArray) -> IntArray:

@@ -22,9 +22,6 @@ from ..errors import ArgumentError
 from ..kernels import nearest
 from .ties import tie_breakers
 
-_SAMPLE, _SAMPLE_PER_CLUSTER = 8000, 10  # points that centres are computed from, whichever is more
-_COMPARED = 4  # nearest centres that are compared for ties
-
 
 def cluster_positions(
     positions: FloatArray, n_clusters: int, *, rounds: int = 5, seeded: bool = True
@@ -38,11 +35,11 @@ def cluster_positions(
     rng = np.random.default_rng(0)
     favour = tie_breakers(len(positions))
     sample = positions
-    enough = max(_SAMPLE, _SAMPLE_PER_CLUSTER * n_clusters)
+    enough = max(8000, 10 * n_clusters)  # to compute centres from
     if len(positions) > enough:
         sample = positions[np.sort(rng.permutation(len(positions))[:enough])]
     if seeded:
-        centres = sample[_farthest_points(sample, n_clusters, favour[: len(sample)])]
+        centres = sample[farthest_points(sample, n_clusters)]
     else:
         centres = sample[rng.permutation(len(sample))[:n_clusters]]
     for _ in range(rounds - 1):
@@ -58,15 +55,12 @@ def cluster_within_parts(
     n_clusters: int,
     *,
     shares: FloatArray | None = None,
-    quick: bool = False,
 ) -> IntArray:
     """Return (n,) int: about *n_clusters* clusters of position, each within one of the *parts*.
 
     *parts* (n,) are numbers from 0; some may be unused.  Numbers of clusters are proportional to
-    the *shares* of the parts, by default the numbers of their positions.  *quick* clusters are less
-    even in size.
+    the *shares* of the parts, by default the numbers of their positions.
     """
-    rounds, seeded = (3, False) if quick else (5, True)
     if not is_whole(n_clusters, 1):
         raise ArgumentError(
             f"the number of clusters must be a whole number, 1 or more; got {n_clusters!r}"
@@ -79,7 +73,7 @@ def cluster_within_parts(
     wanted = n_clusters * (counts / len(positions) if shares is None else shares / shares.sum())
     for here, number in zip(np.split(by_part, np.cumsum(counts)[:-1]), wanted, strict=True):
         share = min(max(1, round(number)), len(here))
-        local = cluster_positions(positions[here], share, rounds=rounds, seeded=seeded)
+        local = cluster_positions(positions[here], share)
         clusters[here] = used + local
         used += int(local.max()) + 1
     return clusters
@@ -87,10 +81,7 @@ def cluster_within_parts(
 
 def farthest_points(positions: FloatArray, count: int) -> IntArray:
     """Return (count,) int: indices into *positions* (n, 3), each farthest from all before it."""
-    return _farthest_points(positions, count, tie_breakers(len(positions)))
-
-
-def _farthest_points(positions: FloatArray, count: int, favour: FloatArray) -> IntArray:
+    favour = tie_breakers(len(positions))
     chosen = np.empty(count, dtype=np.int64)
     x = np.ascontiguousarray(positions.T)
     offset, squared = np.empty_like(x), np.empty(len(positions))
@@ -116,7 +107,7 @@ def _numbered(labels: IntArray) -> IntArray:
 
 def _nearest(positions: FloatArray, centres: FloatArray, favour: FloatArray) -> IntArray:
     """Return the nearest of the *centres* to each position, (n,)."""
-    few = min(_COMPARED, len(centres))
+    few = min(4, len(centres))  # that are compared for ties
     distance, which = nearest(cKDTree(centres), positions, range(1, few + 1))
     best = (distance**2 * favour[which]).argmin(axis=1)
     return np.asarray(np.take_along_axis(which, best[:, None], axis=1)[:, 0], dtype=np.int64)

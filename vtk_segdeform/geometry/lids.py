@@ -29,10 +29,6 @@ gets a lid as well, which closes one of the bodies; but it is not counted as a h
 
 The absolute value is taken because an open surface may be turned inside out.
 
-An open body that has been pressed flat is none of these sheets, although its q is small as well: it
-is thinner than points x and y are apart.  It has two layers that face opposite ways, so its area
-vector, the sum of n dA over S, is short, and it lies in a plane.
-
 Source
 ------
 The winding number of open surfaces: A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-
@@ -54,19 +50,10 @@ from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
 from .volume import corner_and_edges, signed_volume
 
 _LEAST_WINDING, _MOST_WINDING = 0.48, 1.3  # abs(q) of an open component that encloses a volume
-_VIEWPOINTS = 50, 400  # fewest and most points x; by default one for each face
 _SEEN_POINTS = 10  # points y for each of them
-_FEWEST_VIEWPOINTS, _MOST_PAIRS = (
-    12,
-    2e8,
-)  # points x, and pairs of x and y, if there are many components
 _SUMMED_FACES = 8  # faces of a component, up to which q is summed over pairs of faces
 _INNER_POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0  # points x of a face
-_LEAST_DISTANCE = 0.3  # |y - x| at least, in distances of neighbouring points y
 _NO_VOLUME = 1e-11  # of the area to the power 3/2
-_FLAT_THICKNESS = 0.01  # root mean square, of a flattened body, in square roots of its area
-_ONE_LAYER = 0.5  # length of the area vector, in areas, from which a flat component is a sheet
-_NOTHING = "no volume to preserve"
 _known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
 
@@ -88,8 +75,6 @@ class Lids:
         Whether three or more faces meet at every edge of a loop: it is no hole.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
-    flattened : (c,) bool
-        The open components that enclose none because they are bodies that were pressed flat.
     option : bool or None
         As in `lids_of`.
     """
@@ -100,7 +85,6 @@ class Lids:
     component: IntArray
     of_wall: BoolArray
     encloses: BoolArray
-    flattened: BoolArray
     option: bool | None = None
 
     @property
@@ -132,13 +116,8 @@ class Lids:
             many = int(is_open.sum())
             if self.option is False:
                 return "Open surface, lids off: no volume to preserve"
-            if self.flattened[is_open].all():
-                bodies = "Flattened body" if many == 1 else f"{many} flattened bodies"
-                loops = _counted(len(self.component), "hole")
-                return f"{bodies} with {loops}: too thin to preserve the volume"
-            if not self.flattened.any():
-                return f"{_counted(many, 'open sheet') if many > 1 else 'Open sheet'}: {_NOTHING}"
-            return f"{many} open parts: {_NOTHING}"
+            sheets = _counted(many, "open sheet") if many > 1 else "Open sheet"
+            return f"{sheets}: no volume to preserve"
         done = "kept" if preserved else "measured"
         inside = f" with {'an inner wall' if walls == 1 else 'inner walls'}" if walls else ""
         parts = [f"Closed surface{inside}: volume {done}"]
@@ -147,7 +126,7 @@ class Lids:
             parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
         without = int((~self.encloses).sum())
         if without:
-            are_sheets = (is_open & ~self.flattened)[~self.encloses].all()
+            are_sheets = is_open[~self.encloses].all()
             name = "open sheet" if are_sheets and self.option is None else "part"
             has = "has" if without == 1 else "have"
             parts.append(f"{_counted(without, name)} {has} no volume")
@@ -205,9 +184,8 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
     component = mesh.components[[each[0] for each in mesh.borders]].astype(np.int64)
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
     of_wall = _walls(mesh, tail, head, loop, k)
-    found = Lids(faces, loop, extension, component, of_wall, every, ~every, wanted)
-    found = replace(found, encloses=_enclosing(mesh, found, wanted))
-    return replace(found, flattened=_flattened(mesh, found))
+    found = Lids(faces, loop, extension, component, of_wall, every, wanted)
+    return replace(found, encloses=_enclosing(mesh, found, wanted))
 
 
 def _walls(mesh: Mesh, tail: IntArray, head: IntArray, loop: IntArray, k: int) -> BoolArray:
@@ -265,11 +243,11 @@ def mean_winding(points: FloatArray, faces: IntArray, *, most: int = 400) -> flo
         y = corner[own] + u[:, None] * e[own] + v[:, None] * f[own]
         return y, normals[own] / np.maximum(twice[own, None], np.finfo(float).tiny)
 
-    count = min(int(np.clip(len(faces), *_VIEWPOINTS)), max(most, _FEWEST_VIEWPOINTS))
+    count = min(int(np.clip(len(faces), 50, 400)), max(most, 12))
     y, n = sample(_SEEN_POINTS * count)
     x, _ = sample(count)
     area = 0.5 * float(ends[-1]) / len(y)
-    nearest = _LEAST_DISTANCE * np.sqrt(area)
+    nearest = 0.3 * np.sqrt(area)  # |y - x| at least, in distances of neighbouring points y
     heights = np.einsum("ij,ij->i", y, n) - x @ n.T
     square = np.square(x)[:, None].sum(axis=2) - 2.0 * x @ y.T + np.square(y).sum(axis=1)
     np.maximum(square, nearest**2, out=square)
@@ -319,7 +297,7 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
         q = np.zeros(count)
         few = sizes[asked] <= _SUMMED_FACES
         q[asked[few]] = _winding_of_few(mesh, order, starts[asked[few]], sizes[asked[few]])
-        at_once = np.sqrt(_MOST_PAIRS / (_SEEN_POINTS * max(len(asked), 1)))
+        at_once = np.sqrt(2e8 / (_SEEN_POINTS * max(len(asked), 1)))  # of all pairs of x and y
         for c in asked[~few]:
             used, faces = np.unique(
                 mesh.faces[order[starts[c] : starts[c] + sizes[c]]], return_inverse=True
@@ -330,30 +308,6 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
         encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
-
-
-def _flattened(mesh: Mesh, lids: Lids) -> BoolArray:
-    """Return which open components without a volume are two layers in a plane, (c,) bool."""
-    count, component = len(lids.encloses), mesh.components[mesh.faces[:, 0]]
-
-    def sums(component: IntArray, values: FloatArray) -> FloatArray:
-        """Return the sums (c, k) of *values* (m, k) over the faces of each *component*."""
-        return np.stack([np.bincount(component, row, count) for row in values.T], axis=1)
-
-    _, e, f = corner_and_edges(lids.extension @ mesh.vertices, lids.faces)
-    vectors = sums(lids.component[lids.loop], 0.5 * np.cross(e, f))  # those of S, reversed
-    total = sums(component, mesh.face_areas[:, None])
-    is_short = np.linalg.norm(vectors, axis=1) < _ONE_LAYER * total[:, 0]
-    found = lids.is_open & ~lids.encloses & is_short
-    asked = found[component]
-    component, areas = component[asked], mesh.face_areas[asked, None]
-    total = np.maximum(total, np.finfo(float).tiny)
-    x = mesh.vertices[mesh.faces[asked]].mean(axis=1)
-    x = x - (sums(component, areas * x) / total)[component]
-    moments = areas[:, None] * x[:, :, None] * x[:, None]
-    moments = (sums(component, moments.reshape(-1, 9)) / total).reshape(-1, 3, 3)
-    thickness = np.linalg.eigvalsh(moments)[:, 0]  # squared
-    return np.asarray(found & (thickness < _FLAT_THICKNESS**2 * total[:, 0]))
 
 
 def _one_sided(mesh: Mesh) -> BoolArray:

@@ -33,19 +33,13 @@ from scipy.spatial import cKDTree
 
 from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..kernels import compiled_kernels, in_parallel, inputs, nearest
+from ..kernels import ROWS_AT_ONCE, in_parallel, nearest
 from ..mesh import Mesh, cross_rows, require_mesh
 from .lids import lids_of
 from .sampling import faces_between, unique_edges, voronoi_cells
 from .volume import corner_and_edges, outer_components, volume_gradient
 
-_MOST_SHRINKS = 30  # of a ball
 _MOST_COSINE = np.cos(np.radians(40.0))  # at a smaller angle both points are on one side
-_SMOOTHING_WIDTH = 0.25  # of smoothing, relative to the median diameter of the balls
-_MOST_ROUNDS = 100  # of smoothing
-_CELL_REACH = 1.6  # distances of neighbouring cells
-_VERTICES_AT_ONCE = 1 << 15  # of a task
-_LEAST_VOLUME = 0.05  # of the mean volume; the quotient of a smaller one is unreliable
 
 
 class LocalVolume:
@@ -83,8 +77,7 @@ class LocalVolume:
                 )
         self._volumes = _Volumes(points, faces)
         self._rest = self._volumes.smoothed(points)
-        floor = _LEAST_VOLUME * np.abs(self._rest).mean()
-        self._reliable = self._rest > floor
+        self._reliable = self._rest > 0.05 * np.abs(self._rest).mean()
 
     @property
     def is_defined(self) -> bool:
@@ -117,7 +110,7 @@ class LocalVolume:
 
         def work(first: int, last: int) -> None:
             for k, weights in enumerate(self._interpolation[first:last], first):
-                out[k * _VERTICES_AT_ONCE : (k + 1) * _VERTICES_AT_ONCE] = weights @ s
+                out[k * ROWS_AT_ONCE : (k + 1) * ROWS_AT_ONCE] = weights @ s
 
         in_parallel(work, len(self._interpolation), 1)
         return out
@@ -137,22 +130,18 @@ class _Volumes:
         ring = joined + joined.T + sparse.eye_array(n)
         self._average = (sparse.diags_array(1.0 / ring.sum(axis=1)) @ ring).tocsr()
         edge = float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
-        rounds = (_SMOOTHING_WIDTH * float(np.median(diameter)) / edge) ** 2
-        self._rounds = int(np.clip(round(rounds), 1, _MOST_ROUNDS))
+        rounds = (0.25 * float(np.median(diameter)) / edge) ** 2
+        self._rounds = int(np.clip(round(rounds), 1, 100))
 
     def smoothed(self, x: FloatArray) -> FloatArray:
         """Return sum_j k_ij L_j(x), (k,)."""
-        if kernels := compiled_kernels(len(self._faces)):
-            volumes = np.zeros(len(x))
-            kernels.opposite_volumes(*inputs(x, self._faces, self._opposite), volumes)
-        else:
-            x = x - x.mean(axis=0)
-            a, e, f = corner_and_edges(x, self._faces)
-            normals = cross_rows(e, f)
-            heights = np.einsum("ij,ij->i", a, normals)
-            sums = self._around @ np.column_stack([normals, heights])  # over the faces at a vertex
-            apex = x[self._opposite]
-            volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
+        x = x - x.mean(axis=0)
+        a, e, f = corner_and_edges(x, self._faces)
+        normals = cross_rows(e, f)
+        heights = np.einsum("ij,ij->i", a, normals)
+        sums = self._around @ np.column_stack([normals, heights])  # over the faces at a vertex
+        apex = x[self._opposite]
+        volumes = np.asarray(sums[:, 3] - np.einsum("ij,ij->i", apex, sums[:, :3])) / 18.0
         for _ in range(self._rounds):
             volumes = np.asarray(self._average @ volumes)
         return np.asarray(volumes)
@@ -202,13 +191,13 @@ def _interpolation(
     mixed between the two sides of a thin body.
     """
     i, j = edges.T
-    reach = _CELL_REACH * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
+    reach = 1.6 * float(np.median(np.linalg.norm(points[i] - points[j], axis=1)))
     joined = sparse.coo_array((np.ones(len(i)), (i, j)), (len(points), len(points)))
     once = (joined + joined.T + sparse.eye_array(len(points))).tocsr()
     twice = (once @ once).tocsr()
     parts = []
-    for start in range(0, len(x), _VERTICES_AT_ONCE):
-        own = cells[start : start + _VERTICES_AT_ONCE]
+    for start in range(0, len(x), ROWS_AT_ONCE):
+        own = cells[start : start + ROWS_AT_ONCE]
         candidates = twice[own]
         near = candidates.indices
         vertex = np.repeat(np.arange(len(own)), np.diff(candidates.indptr))
@@ -238,7 +227,7 @@ def inner_balls(x: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, F
     tree = cKDTree(np.hstack([x, away]))
     radius = np.full(len(x), size)
     active = opposite = np.arange(len(x))
-    for turn in range(_MOST_SHRINKS):
+    for turn in range(30):
         centre = x[active] + radius[active, None] * inward[active]
         places = np.hstack([centre, away[active]])
         distances, indices = nearest(tree, places)

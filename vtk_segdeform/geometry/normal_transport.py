@@ -29,11 +29,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 _EQUAL_NORMALS = 1e-3  # distance of two unit normals that are the same one, stored in few bits
 _LEAST_EIGENVALUE = 1e-6  # relative eigenvalue below which area vectors around a normal do not span
 _LARGEST_COORDINATE = 1e100
-_FLAT_AREA = (
-    1e-5  # area over longest edge squared: the normal of a flatter face is rounding.  A normal
-)
-# with no other faces follows those beside them
-_ROUNDING = 1e-14
+_FLAT_AREA = 1e-5  # over the longest edge squared: the normal of a flatter face is rounding
 _MOST_AMPLIFIED = 2.0  # largest sum |c_f A_f| / |n| of a combination
 
 
@@ -132,7 +128,7 @@ class NormalTransport:
         c[amplified[owner]] = 0.0
         by_area = self._matrix(c)
         rest = n - by_area @ vectors
-        rest[np.abs(rest).max(axis=1) < _ROUNDING] = 0.0
+        rest[np.abs(rest).max(axis=1) < 1e-14] = 0.0
         if not rest.any():
             return by_area, []
         # cof(F) r in terms of the cross products of the columns u, v, w of F:

@@ -28,8 +28,6 @@ from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import HalfEdges, Mesh, two_sides
 
-_MOST_TASKS, _FEWEST_PER_TASK = 16, 1 << 12  # tasks, and vertices
-_SUBSET_SHARE = 15  # vertices for each one of a subset, up to which computing all normals is faster
 _all_rings: WeakKeyDictionary[Mesh, tuple[NDArray[np.int32], IntArray]] = WeakKeyDictionary()
 
 
@@ -71,7 +69,7 @@ class VertexNormals:
         out = np.empty((self._n, 3), dtype=np.float32) if out is None else out
         if kernels := compiled_kernels(len(self._faces)):
             arguments = inputs(x, *self._rings)
-            size = max(_FEWEST_PER_TASK, -(-self._n // _MOST_TASKS))
+            size = max(1 << 12, -(-self._n // 16))
 
             def work(first: int, last: int) -> None:
                 kernels.ring_normals(out, *arguments, self._scale, first, last)
@@ -86,7 +84,7 @@ class VertexNormals:
 
     def subset(self, vertices: IntArray) -> Callable[[FloatArray], FloatArray]:
         """Return a function of a pose (n, 3) for the normals (k, 3) of these *vertices* (k,)."""
-        if self._n < _SUBSET_SHARE * len(vertices) and compiled_kernels(len(self._faces)):
+        if self._n < 15 * len(vertices) and compiled_kernels(len(self._faces)):  # all are as fast
             return lambda x: np.asarray(self.of(x)[vertices], dtype=float)
         row = np.full(self._n, -1)
         row[vertices] = np.arange(len(vertices))

@@ -13,10 +13,6 @@ from scipy.spatial import ConvexHull, QhullError
 from ..arrays import FloatArray, bounds_of
 
 _FOOTPRINT_HEIGHT = 0.03  # of the height: the vertices that belong to a footprint
-_MOST_VERTICES = 100_000  # of more, every second, third ... determines the footprints
-_LEAST_DIFFERENCE = (
-    0.01  # difference of footprints, in squares of the middle extent; smaller ones are chance
-)
 
 
 def guess_up_axis(vertices: FloatArray) -> int:
@@ -32,9 +28,9 @@ def guess_up_axis(vertices: FloatArray) -> int:
     unit = float(np.sort(extent)[1])
     if not unit > 0.0:  # points on a line
         return 1 if extent[1] > extent[2] else 2
-    points = (vertices[:: max(1, len(vertices) // _MOST_VERTICES)] - low) / unit
+    points = (vertices[:: max(1, len(vertices) // 100_000)] - low) / unit
     y, z = (_footprint(points, axis, extent[axis] / unit) for axis in (1, 2))
-    if abs(y - z) > _LEAST_DIFFERENCE:
+    if abs(y - z) > 0.01:  # squares of the middle extent; less is chance
         return 1 if y > z else 2
     return 1 if extent[1] > extent[2] else 2
 

@@ -27,11 +27,10 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import compiled_kernels, in_parallel, inputs
+from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs
 from ..mesh import cross_rows
 
 _FACES_PER_SUM = 4096  # partial sums are fixed, so that results do not depend on threads
-_SUMS_AT_ONCE = 16  # of a task
 
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
@@ -166,6 +165,6 @@ def _by_blocks(kernel: Any, arguments: tuple[FloatArray | IntArray, ...], out: F
     in_parallel(
         lambda first, last: kernel(*arguments, out, _FACES_PER_SUM, first, last),
         len(out),
-        _SUMS_AT_ONCE,
+        ROWS_AT_ONCE // _FACES_PER_SUM,
     )
     return out

@@ -17,13 +17,20 @@ from .dispatch import (
     load_early,
     load_for,
     load_late,
-    scratch,
     wait_until_compiled,
     writable,
 )
-from .threads import in_parallel, n_threads, nearest, one_blas_thread, quick_turns
+from .threads import (
+    ROWS_AT_ONCE,
+    in_parallel,
+    n_threads,
+    nearest,
+    one_blas_thread,
+    quick_turns,
+)
 
 __all__ = [
+    "ROWS_AT_ONCE",
     "advice",
     "compiled_checks",
     "compiled_kernels",
@@ -37,7 +44,6 @@ __all__ = [
     "nearest",
     "one_blas_thread",
     "quick_turns",
-    "scratch",
     "wait_until_compiled",
     "writable",
 ]

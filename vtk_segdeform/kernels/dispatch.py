@@ -34,8 +34,6 @@ from . import compilation
 from .threads import quick_turns
 
 _LIBRARIES = "numba", "threadpoolctl"  # required for speed only
-_HUGE = 1 << 24  # bytes; only the pages that are used take memory
-_LARGE = 1 << 17  # bytes; a process has less than that at hand, without new pages
 _checked = [0]  # faces processed so far by equivalents in numpy
 _is_late = [False]  # whether small arrays are processed in numpy until the kernels are loaded
 _does_without: list[bool | None] = [None]  # whether they are being compiled; None: to be found out
@@ -141,20 +139,6 @@ def writable(array: NDArray[Any]) -> NDArray[Any]:
     For microsecond kernels, where the overhead of `inputs` would equal the kernel itself.
     """
     return array if array.flags.carray else np.array(array, order="C")
-
-
-def scratch(kind: type[np.signedinteger[Any]], *sizes: int) -> list[NDArray[Any]]:
-    """Return integer arrays of the given sizes and any values, for the time of a computation.
-
-    Large ones are parts of one array that is large enough for numpy to request huge pages: small
-    pages can take longer to get than a kernel takes to fill them.  Once such an array has been
-    freed, glibc also keeps twice as much for the next arrays, instead of returning their pages.
-    """
-    if sum(sizes) * kind().itemsize < _LARGE:
-        return [np.empty(size, dtype=kind) for size in sizes]
-    ends = np.cumsum(sizes)
-    room = np.empty(max(int(ends[-1]), _HUGE // kind().itemsize), dtype=kind)
-    return np.split(room[: ends[-1]], ends[:-1])
 
 
 def _load() -> None:

@@ -32,6 +32,9 @@ from ..progress import Progress
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
+ROWS_AT_ONCE = 1 << 15
+"""Rows of a task or of a temporary array: beside their work a call takes no time."""
+
 _TURN = 1e-4  # seconds
 _finding = threading.Lock()
 _turns_lock = threading.Lock()

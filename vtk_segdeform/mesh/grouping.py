@@ -13,7 +13,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, IntArray
-from ..kernels import compiled_checks, inputs, scratch
+from ..kernels import compiled_checks, inputs
 
 _PIECE = 1 << 20  # rows of `ragged_arange` at once
 _MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, with irregular bits: a multiplicative hash
@@ -97,8 +97,7 @@ def first_equal_row(rows: NDArray[np.generic]) -> IntArray:
     points = rows.shape[1:] == (3,) and rows.dtype == np.float64
     if points and (kernels := compiled_checks(len(rows))):
         found = np.empty(len(rows), dtype=np.int64)
-        (table,) = scratch(np.int32, 1 << (2 * len(rows)).bit_length())
-        table[:] = -1
+        table = np.full(1 << (2 * len(rows)).bit_length(), -1, dtype=np.int32)
         kernels.first_equal_points(found, *inputs(rows), table)
         return found
     hashes = row_hashes(rows)

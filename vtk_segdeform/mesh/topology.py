@@ -28,7 +28,7 @@ import numpy as np
 
 from ..arrays import BoolArray, IntArray
 from ..freezing import read_only
-from ..kernels import compiled_checks, inputs, scratch
+from ..kernels import compiled_checks, inputs
 from .edges import components, edge_keys, flipped_faces, next_half_edge
 from .grouping import (
     begins,
@@ -83,8 +83,8 @@ class HalfEdges:
         if kernels is None:
             return None
         (faces,) = inputs(self.faces)
-        links, narrow = scratch(np.int64, 3 * m, 2 * n + 1)
-        border, starts, *after = np.split(narrow.view(np.int32), np.cumsum([n, n + 2, n]))
+        links, narrow = np.empty(3 * m, dtype=np.int64), np.empty(4 * n + 2, dtype=np.int32)
+        border, starts, *after = np.split(narrow, np.cumsum([n, n + 2, n]))
         count = kernels.one_fan_each(border, starts, *after, links, faces)
         if count < 0:
             return None
@@ -100,7 +100,7 @@ class HalfEdges:
         kernels = compiled_checks(m) if m < _MOST else None
         if kernels is None:
             return None
-        opposite, others = np.empty(3 * m, dtype=np.int64), scratch(np.int64, n + 2, n, 3 * m)
+        opposite, *others = (np.empty(size, dtype=np.int64) for size in (3 * m, n + 2, n, 3 * m))
         return opposite, kernels.pair_half_edges(opposite, *others, *inputs(self.faces))
 
     @cached_property

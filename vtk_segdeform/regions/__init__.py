@@ -11,7 +11,15 @@ The files, in reading order:
     borders         smoothing of the borders between parts on the mesh
 """
 
-from .regions import CageSurface, Regions, cage_distance_weights, require_region, require_regions
+from .borders import within_rings
+from .regions import (
+    CageSurface,
+    Regions,
+    cage_distance_weights,
+    require_region,
+    require_regions,
+    usual_overlap,
+)
 from .segmentation import segment
 
 __all__ = [
@@ -21,4 +29,6 @@ __all__ = [
     "require_region",
     "require_regions",
     "segment",
+    "usual_overlap",
+    "within_rings",
 ]

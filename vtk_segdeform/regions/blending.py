@@ -29,35 +29,21 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csgraph
 
-from ..arrays import BoolArray, FloatArray, IntArray
-from ..kernels import compiled_kernels, inputs
+from ..arrays import BoolArray, FloatArray
 from ..mesh import Mesh
-
-_PAIRS_AT_ONCE = 400_000  # point-triangle pairs processed at once, about 100 MB
-
-
-def border_edges(mesh: Mesh, membership: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the edges whose two ends are not in the same regions, (b,) and (b,)."""
-    i, j = np.ascontiguousarray(mesh.edges.T)
-    crosses = np.zeros(len(i), dtype=bool)
-    for regions in np.packbits(membership, axis=0):  # eight at a time
-        crosses |= regions[i] != regions[j]
-    return i[crosses], j[crosses]
 
 
 def borders(mesh: Mesh, membership: BoolArray) -> BoolArray:
     """Return the members of each region that have a neighbour outside, (r, n) bool."""
-    i, j = border_edges(mesh, membership)
+    i, j = mesh.edges.T
     border = np.zeros_like(membership)
     for members, edge in zip(membership, border, strict=True):
-        edge[i[members[i] & ~members[j]]] = True
-        edge[j[members[j] & ~members[i]]] = True
-    return border
+        crosses = members[i] != members[j]
+        edge[i[crosses]] = edge[j[crosses]] = True
+    return border & membership
 
 
-def border_distance(
-    mesh: Mesh, membership: BoolArray, wanted: IntArray | None = None
-) -> FloatArray:
+def border_distance(mesh: Mesh, membership: BoolArray) -> FloatArray:
     """Return the distance of each vertex to the border of each region that contains it.
 
     Parameters
@@ -66,8 +52,6 @@ def border_distance(
         n vertices.
     membership : (r, n) bool
         The vertices of each region.
-    wanted : (k,) int, optional
-        The vertices whose distances are needed; others may have any.
 
     Returns
     -------
@@ -81,20 +65,13 @@ def border_distance(
     is processed on its own.
     """
     distance = np.zeros(membership.shape)
-    kernels, graph = compiled_kernels(mesh.n_faces), mesh.adjacency
     for d, members, edge in zip(distance, membership, borders(mesh, membership), strict=True):
-        if kernels:
-            d[members] = np.inf
-            arrays = members, np.flatnonzero(edge), graph.indptr, graph.indices, graph.data
-            some = np.arange(0) if wanted is None else wanted
-            kernels.distances_inside(d, *inputs(*arrays, some))
-            continue
         inside = np.flatnonzero(members)
         start = np.flatnonzero(edge[inside])
         if not len(start):
             d[inside] = np.inf
             continue
-        own = graph[inside][:, inside]
+        own = mesh.adjacency[inside][:, inside]
         d[inside] = csgraph.dijkstra(own, directed=False, indices=start, min_only=True)
     return distance
 
@@ -104,7 +81,7 @@ def overlap_weights(mesh: Mesh, membership: BoolArray, power: float) -> FloatArr
     shared = np.flatnonzero(np.count_nonzero(membership, axis=0) > 1)
     weights = membership.astype(np.float64)
     if len(shared):
-        distance = np.take(border_distance(mesh, membership, shared), shared, axis=1)
+        distance = np.take(border_distance(mesh, membership), shared, axis=1)
         weights[:, shared] = blend_weights(np.take(membership, shared, axis=1), distance, power)
     return weights
 
@@ -133,36 +110,3 @@ def blend_weights(membership: BoolArray, distance: FloatArray, power: float = 1.
     d = np.where(largest == 0.0, membership, d)
     d = (d / d.max(axis=0)) ** power  # the largest is 1, which prevents overflow of the power
     return np.asarray(d / d.sum(axis=0))
-
-
-def distance_to_triangles(
-    points: FloatArray, vertices: FloatArray, triangles: IntArray
-) -> FloatArray:
-    """Return the distance of each point to the nearest point of *triangles* (k, 3), (n,)."""
-    corners = vertices[triangles]  # (k, 3, 3)
-    step = max(1, _PAIRS_AT_ONCE // max(1, len(triangles)))
-    parts = [_nearest(points[i : i + step], corners) for i in range(0, len(points), step)]
-    return np.concatenate(parts) if parts else np.empty(0)
-
-
-def _nearest(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the distance to the nearest triangle: to its plane above its face, else to an edge."""
-    x = points[:, None, :]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    over_face = np.broadcast_to(length > 0.0, (len(points), len(corners))).copy()
-    squared = np.full(over_face.shape, np.inf)
-    for corner in range(3):
-        a = corners[:, corner]
-        edge = corners[:, (corner + 1) % 3] - a
-        from_a = x - a
-        along = np.einsum("nkc,kc->nk", from_a, edge)
-        size = np.einsum("kc,kc->k", edge, edge)
-        t = np.clip(along / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
-        gap = from_a - t[:, :, None] * edge
-        squared = np.minimum(squared, np.einsum("nkc,nkc->nk", gap, gap))
-        over_face &= np.einsum("nkc,kc->nk", from_a, np.cross(normal, edge)) >= 0.0
-    height = np.einsum("nkc,kc->nk", x - corners[:, 0], normal)
-    squared = np.where(over_face, height**2, squared)
-    return np.asarray(np.sqrt(squared.min(axis=1)))

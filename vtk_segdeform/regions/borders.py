@@ -21,9 +21,20 @@ from ..mesh import Mesh, connected
 from .coarse import symmetric
 
 _CREASE_RADIUS = 0.06  # relative to sqrt(area): a concave edge of this radius halves the diffusion
-_SCALE_POINTS = 3000  # diffusion acts at the scale of an edge in a mesh of so many vertices
 _ROUNDS = 3  # of diffusion
-_MOST_STEPS = 60  # of diffusion, per round
+
+
+def within_rings(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
+    """Return the vertices up to *rings* edges away from *ids*, sorted."""
+    reached = np.zeros(graph.shape[0], dtype=bool)
+    reached[ids] = True
+    for _ in range(rings):
+        others = graph[ids].indices
+        ids = np.unique(others[~reached[others]])
+        if not len(ids):
+            break
+        reached[ids] = True
+    return np.flatnonzero(reached)
 
 
 def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
@@ -34,17 +45,18 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     """
     area = mesh.face_areas.sum()
     edge = np.median(mesh.adjacency.data)
-    steps = int(np.clip(np.ceil(4.0 * area / _SCALE_POINTS / edge**2), 4, _MOST_STEPS))
+    # At the scale of an edge in a mesh of 3,000 vertices.
+    steps = int(np.clip(np.ceil(4.0 * area / 3000 / edge**2), 4, 60))
     rings = int(np.ceil(np.sqrt(steps))) + 1
     borders = np.unique(mesh.edges[np.diff(labels[mesh.edges], axis=1)[:, 0] != 0])
-    zone = _within(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
+    zone = within_rings(mesh.adjacency, borders, _ROUNDS * rings + steps + 1)
     diffusion = _diffusion(mesh, zone, edge)
     far = np.bincount(np.delete(labels, zone), minlength=labels.max() + 1)
     label = labels[zone]
     for _ in range(_ROUNDS):
         most, smooth = np.zeros(len(zone)), label.copy()
         for part in np.unique(label):
-            near = _within(diffusion, np.flatnonzero(label == part), rings)
+            near = within_rings(diffusion, np.flatnonzero(label == part), rings)
             step = diffusion[near][:, near]
             amount = (label[near] == part).astype(float)
             for _ in range(steps):
@@ -57,17 +69,6 @@ def smooth_borders(mesh: Mesh, labels: IntArray) -> IntArray:
     labels = labels.copy()
     labels[zone] = label
     return labels
-
-
-def _within(graph: sparse.csr_array, ids: IntArray, rings: int) -> IntArray:
-    """Return the vertices up to *rings* edges away from *ids*, sorted."""
-    reached = np.zeros(graph.shape[0], dtype=bool)
-    reached[ids] = True
-    for _ in range(rings):
-        others = graph[ids].indices
-        ids = np.unique(others[~reached[others]])
-        reached[ids] = True
-    return np.flatnonzero(reached)
 
 
 def _diffusion(mesh: Mesh, zone: IntArray, usual: float) -> sparse.csr_array:
@@ -109,7 +110,7 @@ def connected_parts(mesh: Mesh, labels: IntArray) -> IntArray:
     _, largest = np.unique(label[order], return_index=True)
     stray = np.ones(len(label), dtype=bool)
     stray[order[largest]] = False
-    near = _within(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
+    near = within_rings(mesh.adjacency, np.flatnonzero(stray[piece]), 1)
     settled = np.flatnonzero(~stray[piece[near]])
     labels = labels.copy()
     labels[near] = labels[near[nearest_source(distinct_lengths(mesh)[near][:, near], settled)]]

@@ -19,13 +19,13 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import csgraph
 
+from .. import sizes
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import unique_edges, voronoi_cells
 from ..mesh import Mesh, connected, ragged_arange
 from ..progress import Progress
 
-COARSE_POINTS = 2000  # of the coarse surface, about
-_MOST_CUTS, _MOST_ENDS = 4, 12  # earlier cuts, and points, that distances are computed from
+COARSE_POINTS = sizes.COARSE_VOLUME_POINTS  # of the coarse surface, about
 _PER_STEP = np.pi / 4  # mean of length over steps, for a straight line walked in steps
 
 
@@ -93,7 +93,7 @@ class Surface:
         largest[self.pieces(~outside)[0]] = True
         return largest
 
-    def distances_from_ends(self, rim: FloatArray, most: int = _MOST_ENDS) -> list[FloatArray]:
+    def distances_from_ends(self, rim: FloatArray, most: int = 12) -> list[FloatArray]:
         """Return distances (k,) from the ends of the surface; their level sets run across limbs.
 
         The first ends are the largest connected pieces of {rim > 0}, with *rim* (k,) the length of
@@ -104,7 +104,7 @@ class Surface:
         if rim.any():
             loops = self.pieces(rim > 0.0)
             loops.sort(key=lambda loop: -rim[loop].sum())
-            fields = [self.distance(loop) for loop in loops[:_MOST_CUTS]]
+            fields = [self.distance(loop) for loop in loops[:4]]
             nearest = np.min(fields, axis=0)
         for number in range(min(most, len(rim))):
             fields.append(self.distance(np.array([np.argmax(nearest)])))

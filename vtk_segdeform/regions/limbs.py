@@ -41,20 +41,11 @@ from .coarse import Surface
 
 _MOST_SCORE = 0.1  # of a neck, at most
 _LEAST_PROTRUSION = 2.5  # of a limb, at least
-_MOST_PROTRUSION = 6.0  # a larger protrusion does not make a limb more distinct
-_SHARPNESS_POWER = 6  # power of c
 _ROUGH_FACTOR = 3.0  # candidates may miss both limits by this factor before they are improved
-_TIPS = (16, 6, 6)  # of the surface, and of the surface without the limbs found before
-_MOST_BEHIND = 0.6  # area behind a level set, at most, relative to the surface
-_LEVELS = 100  # level sets of each distance, scored approximately
-_MOST_ROUGH, _MOST_IMPROVED = 3, 2  # candidates scored exactly, before and after their improvement
-_LEAST_DIFFERENCE = 0.1  # share of points in which two candidates differ that are not both improved
-_END_DISTANCE = 0.6  # the end of a limb is farther from the neck than this, relative to the tip
 _PARALLELS = np.array([0.5, 0.75, 1.0, 1.5, 2.0])  # distances of the parallel curves, in L / 2 pi
 _WIDER_AT = np.arange(0.5, 4.1, 0.5)  # where limb and body may be wider, in L / 2 pi
 _WIDER, _WIDER_INSIDE = 1.27, 1.5  # relative to a neck of the body, and of a limb
 _MOST_COMMON = 0.15  # limbs with less of the smaller one in common are disjoint
-_LEAST_OUTSIDE = 0.3  # share of a limb that is outside a limb inside it, at least
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -81,7 +72,7 @@ def find_limbs(surface: Surface, least: float) -> list[Limb]:
     Any two are disjoint, or one contains the other, up to a few points.
     """
     limbs: list[Limb] = []
-    for n_tips in _TIPS if surface.areas.any() else ():
+    for n_tips in (16, 6, 6) if surface.areas.any() else ():
         candidates = _candidates(surface, least, limbs, n_tips)
         before = len(limbs)
         for limb in sorted(candidates, key=attrgetter("score")):
@@ -118,21 +109,18 @@ def _candidates(surface: Surface, least: float, limbs: list[Limb], n_tips: int) 
             level[piece] = touch @ d / max(touch.sum(), _TINY)
         rough = [
             _limb(surface, least, level < t, 0.0 if limbs else length)
-            for t, length in _level_sets(body, least, d, _MOST_ROUGH)
+            for t, length in _level_sets(body, least, d, 3)
         ]
         found = [limb for limb in rough if limb is not None]
         candidates += [limb for limb in found if limb.found]
         if found:
             best = min(found, key=attrgetter("score"))
-            if any(
-                (best.inside != x.inside).sum() < _LEAST_DIFFERENCE * best.inside.sum()
-                for x in improved
-            ):
+            if any((best.inside != x.inside).sum() < 0.1 * best.inside.sum() for x in improved):
                 continue
             improved.append(best)
             away = np.where(best.inside, _distance(surface, best.inside), 0.0)
-            d = surface.distance(np.flatnonzero(away >= _END_DISTANCE * away.max()))
-            levels = _level_sets(surface, least, d, _MOST_IMPROVED)
+            d = surface.distance(np.flatnonzero(away >= 0.6 * away.max()))
+            levels = _level_sets(surface, least, d, 2)
             better = [_limb(surface, least, d < t, length) for t, length in levels]
             candidates += [limb for limb in better if limb is not None and limb.found]
     return candidates
@@ -142,7 +130,7 @@ def _level_sets(
     surface: Surface, least: float, d: FloatArray, most: int
 ) -> list[tuple[float, float]]:
     """Return (t, length) of the level sets {d = t} with the best approximate scores, apart."""
-    t = d.max() * np.arange(1, _LEVELS + 1) / (_LEVELS + 1)
+    t = d.max() * np.arange(1, 101) / 101
     exact = surface.level_lengths(surface.faces, d, t)
     length = np.convolve(np.pad(exact, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
     reach = length / (2.0 * np.pi)
@@ -156,7 +144,7 @@ def _level_sets(
     unlikely = (score > _ROUGH_FACTOR * _MOST_SCORE) | (
         _protrusion(area, length) < _LEAST_PROTRUSION / _ROUGH_FACTOR
     )
-    unfit = (area < least) | (area > _MOST_BEHIND * surface.areas.sum()) | (length <= 0.0)
+    unfit = (area < least) | (area > 0.6 * surface.areas.sum()) | (length <= 0.0)
     score[unlikely | unfit] = np.inf
     found: list[tuple[float, float]] = []
     while len(found) < most and np.isfinite(score).any():
@@ -202,8 +190,8 @@ def _score(limb: FloatArray, body: FloatArray, length: FloatArray, area: FloatAr
     """Return s from the lengths of parallels, (5, ...) each; those beyond a tip do not count."""
     mean = np.where(limb >= 0.3 * length, limb + body, 0.0).max(axis=0) / 2.0
     c = length / np.maximum(np.maximum(length, mean), _TINY)
-    protrusion = np.clip(_protrusion(area, length), _TINY, _MOST_PROTRUSION)
-    return np.asarray(2.0 * c**_SHARPNESS_POWER / protrusion)
+    protrusion = np.clip(_protrusion(area, length), _TINY, 6.0)
+    return np.asarray(2.0 * c**6 / protrusion)
 
 
 def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> bool:
@@ -223,7 +211,7 @@ def _divides(surface: Surface, least: float, limb: Limb, limbs: list[Limb]) -> b
             own &= ~other.inside
         else:  # the smallest such limb comes last
             rest = other.inside & ~limb.inside
-            least_rest, wider = max(least, _LEAST_OUTSIDE * other.area), _WIDER_INSIDE
+            least_rest, wider = max(least, 0.3 * other.area), _WIDER_INSIDE
     area = surface.areas[own].sum()
     if area < least or surface.areas[rest].sum() < least_rest:
         return False

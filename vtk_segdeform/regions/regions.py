@@ -21,14 +21,10 @@ from numpy.typing import ArrayLike
 from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from ..checks import Described, shown
 from ..errors import RegionError
-from ..freezing import Frozen
-from ..mesh import Mesh, counted, require_mesh
-from .blending import (
-    blend_weights,
-    border_distance,
-    distance_to_triangles,
-    overlap_weights,
-)
+from ..freezing import Frozen, read_only
+from ..mesh import Mesh, counted, distance_to_surface, require_mesh
+from .blending import blend_weights, border_distance, overlap_weights
+from .borders import within_rings
 
 _EQUAL_WEIGHT = 1e-9  # weights that differ by rounding only
 
@@ -93,8 +89,7 @@ class Regions(Described, Frozen):
             )
         if not (is_number(self.smoothness) and self.smoothness > 0.0):
             raise RegionError(f"smoothness must be a number above 0; got {shown(self.smoothness)}")
-        membership.flags.writeable = False
-        object.__setattr__(self, "membership", membership)
+        object.__setattr__(self, "membership", read_only(membership))
 
     @classmethod
     def single(cls, mesh: Mesh) -> Regions:
@@ -171,8 +166,7 @@ class Regions(Described, Frozen):
         else:
             counts = [np.bincount(component[each], minlength=count) for each in self.membership]
             found = np.array(counts) > 0
-        found.flags.writeable = False
-        return found
+        return read_only(found)
 
     @cached_property
     def border_distance(self) -> FloatArray:
@@ -180,7 +174,7 @@ class Regions(Described, Frozen):
 
         In the unit of the mesh; infinite where a region has no border.
         """
-        return _read_only(border_distance(self.mesh, self.membership))
+        return read_only(border_distance(self.mesh, self.membership))
 
     @cached_property
     def weights(self) -> FloatArray:
@@ -189,7 +183,7 @@ class Regions(Described, Frozen):
         Zero outside a region and on its border, except at vertices that are on the border of all
         their regions.
         """
-        return _read_only(overlap_weights(self.mesh, self.membership, self.smoothness))
+        return read_only(overlap_weights(self.mesh, self.membership, self.smoothness))
 
     @property
     def labels(self) -> IntArray:
@@ -207,17 +201,17 @@ class Regions(Described, Frozen):
         if not is_whole(rings, 0):
             raise RegionError(f"rings must be a whole number, 0 or more; got {shown(rings)}")
         membership = self.membership.copy()
-        graph, (i, j) = self.mesh.adjacency, self.mesh.edges.T
         for members in membership:
-            border = members[i] != members[j]
-            last = np.unique(np.where(members[i[border]], i[border], j[border]))
-            for _ in range(int(rings)):
-                near = graph[last].indices
-                last = np.unique(near[~members[near]])
-                if not len(last):
-                    break
-                members[last] = True
+            members[within_rings(self.mesh.adjacency, np.flatnonzero(members), int(rings))] = True
         return Regions(self.mesh, membership, self.smoothness)
+
+
+def usual_overlap(n_vertices: float) -> int:
+    """Return edge rings by which a region of *n_vertices* grows: a tenth of its width, at least 2.
+
+    So overlaps are equally wide on coarse and fine meshes.
+    """
+    return max(2, round(0.1 * float(np.sqrt(n_vertices))))
 
 
 def require_regions(regions: object, mesh: Mesh) -> None:
@@ -265,13 +259,8 @@ def cage_distance_weights(regions: Regions, cages: Sequence[CageSurface]) -> Flo
     for r, cage in enumerate(cages):
         inside = regions.members(r)
         points = regions.mesh.vertices[inside]
-        distance[r, inside] = distance_to_triangles(points, cage.vertices, cage.faces)
+        distance[r, inside] = distance_to_surface(points, cage.vertices, cage.faces)
     return blend_weights(regions.membership, distance)
-
-
-def _read_only(array: FloatArray) -> FloatArray:
-    array.flags.writeable = False
-    return array
 
 
 def _some(numbers: IntArray) -> str:

@@ -36,14 +36,11 @@ from ..progress import Progress, part, tell
 from .borders import connected_parts, smooth_borders
 from .coarse import COARSE_POINTS, Surface, coarsen
 from .limbs import find_limbs
-from .regions import Regions
+from .regions import Regions, usual_overlap
 from .slices import fair_slice, quotas
 
-_POINTS_PER_REGION = 16  # of the coarse surface, at least
 _TYPICAL_REGIONS = 16  # of an automatic segmentation, for the area of a region
 _LEAST_LIMB = SMALL_COMPONENT * _TYPICAL_REGIONS  # area of a limb, relative to that of a region
-_OVERLAP_WIDTH = 0.1  # rings, relative to the width of a region in edges
-_SHIFT = 1e-3  # of vertices, relative to an edge: no two distances are equal then
 
 
 @one_blas_thread()
@@ -110,7 +107,7 @@ def segment(
         labels = mesh.components
     else:
         n_regions = None if n_regions is None else int(n_regions)
-        points = max(COARSE_POINTS, _POINTS_PER_REGION * (n_regions or 1))
+        points = max(COARSE_POINTS, 16 * (n_regions or 1))
         cluster = None
         if mesh.n_vertices > max(sizes.DECIMATED, points):
             shape, _, cluster = decimated(mesh, max(sizes.DECIMATED_POINTS, points))
@@ -126,7 +123,7 @@ def segment(
             labels = labels[cluster]
     tell(progress, 0.95, "growing regions")
     if overlap is None:
-        overlap = max(2, round(_OVERLAP_WIDTH * np.sqrt(n / (labels.max() + 1))))
+        overlap = usual_overlap(n / (labels.max() + 1))
     regions = Regions.from_labels(whole, _with_others(whole, kept, labels, far), overlap)
     tell(progress, 1.0, "regions found")
     return regions
@@ -142,7 +139,7 @@ def _without_ties(mesh: Mesh) -> Mesh:
     joined = np.flatnonzero(start < end)  # all vertices, unless a mesh is decimated
     first = np.arange(mesh.n_vertices)
     first[joined] = mesh.adjacency.indices[start[joined]]
-    share = _SHIFT * np.random.default_rng(0).random((mesh.n_vertices, 1))
+    share = 1e-3 * np.random.default_rng(0).random((mesh.n_vertices, 1))
     return mesh.with_vertices(mesh.vertices + share * (mesh.vertices[first] - mesh.vertices))
 
 

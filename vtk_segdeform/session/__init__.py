@@ -3,7 +3,7 @@
 The files, in reading order:
 
     session        `Session`: the interface for widgets and scripts
-    groups         edits of handles and regions, as methods
+    handle_edits   edits of the handles
     state          immutable states
     timeline       undo and redo
     handles        named handles and their targets
@@ -26,10 +26,11 @@ The files, in reading order:
 from ..mesh import SurfacePoint
 from . import pulls
 from .finishing import FinishedPose
-from .groups import Handles, Painting
+from .handle_edits import Handles
 from .handles import require_handle
 from .listeners import Change
 from .naming import region_name
+from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .session import Session

@@ -10,13 +10,11 @@ follows from how the surface bends along its edges ij,
 
     k_ij = axial(R_i^T R_j),    f = clip(<k, k'> / <k, k>, 0, 1) smoothstep(cos(k, k'))
 
-1 when the pose moves rigidly or is bent further, 0 when it is back at rest or bent otherwise.  A
-hand finished at -40 degrees and bent to +40 has distortion 0.118, as without an offset, which alone
-makes it 0.148; bent back by half it has 0.034 instead of 0.043.  The cages are solved for as
-if nothing had been finished, so the next move of a handle continues from where the cages are, and
-nothing jumps.  The volume is restored along the normals of the free vertices, by far less than the
-offset.  If too few vertices are free for that, handles are moved as well, and finally fixed
-vertices: as in the solve for the cages, the volume takes precedence.
+1 when the pose moves rigidly or is bent further, 0 when it is back at rest or bent otherwise.  The
+cages are solved for as if nothing had been finished, so the next move of a handle continues from
+where the cages are, and nothing jumps.  The volume is restored along the normals of the free
+vertices.  If too few are free for that, handles are moved as well, and finally fixed vertices: as
+in the solve for the cages, the volume takes precedence.
 
 The finish of a pull starts from the mesh that is shown, because it keeps the surface beyond the
 reach, and so does that of a pose that is finished further; any other starts from W~ p, so that the
@@ -41,14 +39,12 @@ from ..mesh import Mesh, new_crossings
 from ..progress import Progress
 from ..solver import Solution, Status, VolumeConstraint, errors_at, moved_along, steps_to_volume
 from .handles import stacked
-from .poses import Poses
+from .poses import VOLUME_TOLERANCE, Poses
 from .pulls import localised
 from .state import Cages, Finished, Pose, State
 
-_EDGES = 20_000  # along which bending is compared, at most
 _ALIKE = 0.6, 0.85  # cosines between ways of bending for f = 0 and 1
 _GIVES = 0.02  # mesh sizes by which the correction of the volume moves vertices, at most
-_VOLUME_KEPT = 1e-9  # relative
 _TURNED = 3e-5  # mesh sizes by which shifts must turn before the targets of the cages follow
 
 
@@ -207,7 +203,7 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
             tried.append(_on_volumes(moved, constraints, stays))
-            if max(abs(each.relative(tried[-1])) for each in constraints) <= _VOLUME_KEPT:
+            if max(abs(each.relative(tried[-1])) for each in constraints) <= VOLUME_TOLERANCE:
                 exact.append(tried[-1])
                 if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
                     exact = exact[-1:]
@@ -251,7 +247,7 @@ def _offset(poses: Poses, state: State, cages: Cages, *, fades: bool) -> FloatAr
 def _some_edges(mesh: Mesh) -> IntArray:
     """Return edges (k, 2) all over *mesh*."""
     graph = mesh.adjacency
-    some = np.arange(0, graph.nnz, 1 + graph.nnz // _EDGES)
+    some = np.arange(0, graph.nnz, 1 + graph.nnz // 20_000)
     rows = np.searchsorted(graph.indptr, some, side="right") - 1
     return np.asarray(np.stack([rows, graph.indices[some]], axis=1), dtype=np.int64)
 

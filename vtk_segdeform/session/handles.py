@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, plain
 from ..checks import shown
-from ..deformer import FARTHEST_APART, checked_constraints, checked_point
+from ..deformer import FARTHEST_APART, checked_constraints
 from ..errors import CageError, ConstraintError
-from ..geometry import rigid_fit
 from ..mesh import Mesh
 from .naming import fault_of
 from .state import State, split_rows
@@ -49,20 +48,7 @@ def with_handle(mesh: Mesh, state: State, name: str, vertices: ArrayLike) -> Han
                 f"{len(both)} vertices (the first is {both[0]}) are already in {other!r}; "
                 "remove them from one of the two handles"
             )
-    own = ids.copy()
-    own.flags.writeable = False
-    return MappingProxyType({**state.handles, name: own})
-
-
-def without_handle(state: State, name: str) -> State:
-    """Return *state* without handle *name*; ConstraintError if there is no such handle."""
-    require_handle(state.handles, name)
-    others = {other: ids for other, ids in state.handles.items() if other != name}
-    state = replace(state, handles=MappingProxyType(others))
-    if name not in state.pivots:
-        return state
-    pivots = {other: point for other, point in state.pivots.items() if other != name}
-    return replace(state, pivots=MappingProxyType(pivots))
+    return MappingProxyType({**state.handles, name: frozen(ids.copy())})
 
 
 def with_fixed(mesh: Mesh, state: State, fixed: IntArray, vertices: FloatArray) -> State:
@@ -70,17 +56,15 @@ def with_fixed(mesh: Mesh, state: State, fixed: IntArray, vertices: FloatArray) 
 
     Vertices that are already fixed keep theirs.  Without a pose they are fixed at rest.
     """
-    own = fixed.copy()
-    frozen(own)
+    own = frozen(fixed.copy())
     if state.pose is None:
         return replace(state, fixed=own, fixed_at=None)
     places = vertices[own]
     _, new, old = np.intersect1d(own, state.fixed, return_indices=True)
     kept = mesh.vertices[state.fixed] if state.fixed_at is None else state.fixed_at
     places[new] = kept[old]
-    frozen(places)
     at_rest = np.array_equal(places, mesh.vertices[own])
-    return replace(state, fixed=own, fixed_at=None if at_rest else places)
+    return replace(state, fixed=own, fixed_at=None if at_rest else frozen(places))
 
 
 def renamed(state: State, name: str, new_name: str) -> State:
@@ -120,10 +104,7 @@ def require_handle(handles: Handles, name: str) -> None:
 
 def targets_at(handles: Handles, vertices: FloatArray) -> Targets:
     """Return the positions of the handles among *vertices* (n, 3)."""
-    places = {name: vertices[ids] for name, ids in handles.items()}
-    for points in places.values():
-        frozen(points)
-    return MappingProxyType(places)
+    return MappingProxyType({name: frozen(vertices[ids]) for name, ids in handles.items()})
 
 
 def stacked(targets: Targets) -> FloatArray:
@@ -135,38 +116,6 @@ def targets_of(mesh: Mesh, state: State) -> Targets:
     """Return the targets of all handles of *state*: of its pose, or at rest."""
     pose = state.pose
     return targets_at(state.handles, mesh.vertices) if pose is None else pose.targets
-
-
-def with_targets(before: State, after: State, vertices: FloatArray) -> State:
-    """Return *after*, which has a pose, with targets for its handles.
-
-    Handles that are also in *before* keep their targets; the targets of others are their positions
-    among *vertices* (n, 3).
-    """
-    assert before.pose is not None
-    assert after.pose is not None
-    here = targets_at(after.handles, vertices)
-    kept = {
-        name: before.pose.targets[name] if before.handles.get(name) is ids else here[name]
-        for name, ids in after.handles.items()
-    }
-    return replace(after, pose=replace(after.pose, targets=MappingProxyType(kept)))
-
-
-def with_pivot(mesh: Mesh, state: State, name: str, point: ArrayLike | None) -> State:
-    """Return *state* with the pivot of a handle at *point* (3,); None is the handle's centre.
-
-    ConstraintError if there is no such handle, or *point* is not a point or too far away.
-    """
-    require_handle(state.handles, name)
-    pivots = {other: at for other, at in state.pivots.items() if other != name}
-    if point is not None:
-        place = checked_point(point, "point")
-        require_near(mesh, place, "coordinates of point")
-        R, shift = rigid_fit(mesh.vertices[state.handles[name]], targets_of(mesh, state)[name])
-        pivots[name] = (place - shift) @ R
-        frozen(pivots[name])
-    return replace(state, pivots=MappingProxyType(pivots))
 
 
 def checked_targets(
@@ -194,11 +143,11 @@ def checked_targets(
         lengths = [len(ids) for ids in handles.values()]
         points = _checked_points(mesh, targets, sum(lengths), "all handles")
         pairs = zip(handles, split_rows(points, lengths), strict=True)
-        return {name: _frozen_copy(piece) for name, piece in pairs}
+        return {name: frozen(piece.copy()) for name, piece in pairs}
     for name in targets:
         require_handle(handles, name)
     return {
-        name: _frozen_copy(_checked_points(mesh, points, len(handles[name]), name))
+        name: frozen(_checked_points(mesh, points, len(handles[name]), name).copy())
         for name, points in targets.items()
     }
 
@@ -265,12 +214,5 @@ def _checked_points(mesh: Mesh, targets: ArrayLike, count: int, name: str) -> Fl
 
 
 def _check_name(name: str) -> None:
-    fault = fault_of(name)
-    if fault:
+    if fault := fault_of(name):
         raise ConstraintError(f"a handle{fault}")
-
-
-def _frozen_copy(points: FloatArray) -> FloatArray:
-    own = points.copy()
-    own.flags.writeable = False
-    return own

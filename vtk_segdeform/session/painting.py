@@ -18,11 +18,11 @@ from ..cages import Cage
 from ..checks import as_flag, require_sequence, shown
 from ..errors import RegionError
 from ..mesh import Mesh
-from ..regions import Regions, require_region
+from ..regions import Regions, require_region, usual_overlap, within_rings
 from . import naming
+from .poses import Poses
 from .state import State
-
-_OVERLAP = 0.1  # edge rings, as a fraction of the width of a new region in edges
+from .timeline import Timeline
 
 
 def with_regions(state: State, regions: Regions, names: naming.Names = ()) -> State:
@@ -53,128 +53,146 @@ def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
     )
 
 
-def renamed(state: State, region: int, name: str) -> tuple[str, State]:
-    """Return the label of the step, and *state* with a *region* renamed; "" removes its name.
+class Painting:
+    """Edits of the regions of a session, which keep their names.
 
-    Raises
-    ------
-    RegionError
-        If there is no such region, or *name* is invalid or that of another region.
+    The pose is reset, and the cages are kept if each still encloses its region.
     """
-    count = 0 if state.regions is None else state.regions.n_regions
-    if not is_whole(region, 0, count - 1):
-        raise RegionError(f"there is no region {shown(region)}; there are {count}, numbered from 0")
-    names = naming.renamed(state.region_names, int(region), name)
-    label = f"rename {naming.region_name(state.region_names, region)}"
-    return label, replace(state, region_names=names)
 
+    def __init__(self, history: Timeline, poses: Poses) -> None:
+        self._history, self._poses = history, poses
 
-def painted(
-    regions: Regions, region: int, vertices: ArrayLike, *, subtract: bool, name: str = ""
-) -> Regions:
-    """Return *regions* with *vertices* added to or removed from one of them.
+    def paint(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
+        """Add *vertices*, ids or a mask, to a region, or with *subtract* remove them.
 
-    Parameters
-    ----------
-    regions : Regions
-        r regions of n vertices.
-    region : int
-        In 0..r; r adds a new region.
-    vertices : (k,) int or (n,) bool
-        May include vertices that are already in the region, or not in it.
-    subtract : bool
-        Remove the vertices.
-    name : str, optional
-        The name of the region in error messages.
+        If *region* equals the number of regions, a new region is added.  If there are no regions
+        yet, the first one is created and contains all vertices.
 
-    Raises
-    ------
-    RegionError
-        If there is no such region, it would become empty, or a vertex would be in no region.
-    """
-    mesh, count = regions.mesh, regions.n_regions
-    mask = _mask(mesh, vertices)
-    if not as_flag(subtract, "subtract") and is_whole(region, count, count) and mask.any():
-        return Regions(mesh, np.vstack([regions.membership, mask]), regions.smoothness)
-    region = _checked(regions, region)
-    membership = regions.membership.copy()
-    membership[region] = membership[region] & ~mask if subtract else membership[region] | mask
-    uncovered = np.flatnonzero(~membership.any(axis=0))
-    name = name or f"region {region}"
-    if len(uncovered):
-        raise RegionError(
-            f"{len(uncovered)} of these vertices (the first is {uncovered[0]}) are only in {name}; "
-            "add them to another region first"
-        )
-    if not membership[region].any():
-        raise RegionError(f"{name} would become empty; merge it with another region instead")
-    return Regions(mesh, membership, regions.smoothness)
+        Raises
+        ------
+        RegionError
+            If there is no such region, it would become empty, or a vertex would be in no region.
+        """
+        regions, name = self._regions, self._name(region)
+        membership, count = regions.membership, regions.n_regions
+        mask = _mask(regions.mesh, vertices)
+        if not as_flag(subtract, "subtract") and is_whole(region, count, count) and mask.any():
+            membership = np.vstack([membership, mask])
+        else:
+            region = _checked(regions, region)
+            membership = membership.copy()
+            membership[region] = (
+                membership[region] & ~mask if subtract else membership[region] | mask
+            )
+            uncovered = np.flatnonzero(~membership.any(axis=0))
+            if len(uncovered):
+                raise RegionError(
+                    f"{len(uncovered)} of these vertices (the first is {uncovered[0]}) are only in "
+                    f"{name}; add them to another region first"
+                )
+            if not membership[region].any():
+                raise RegionError(
+                    f"{name} would become empty; merge it with another region instead"
+                )
+        self._step(f"paint {name}", membership, self._names)
 
+    def merge(self, which: Sequence[int]) -> None:
+        """Merge two or more regions into the first of them, which keeps the first name.
 
-def merged(regions: Regions, which: Sequence[int]) -> Regions:
-    """Return *regions* with the regions *which* merged into the first of them.
+        Raises
+        ------
+        RegionError
+            If there is no such region, or *which* has fewer than two.
+        """
+        regions = self._regions
+        require_sequence(which, "which")
+        numbers = sorted({_checked(regions, region) for region in which})
+        if len(numbers) < 2:
+            raise RegionError(f"merging requires two or more regions; got {shown(which)}")
+        membership = regions.membership.copy()
+        membership[numbers[0]] = membership[numbers].any(axis=0)
+        names = naming.merged(self._names, numbers)
+        self._step("merge regions", np.delete(membership, numbers[1:], axis=0), names)
 
-    Raises
-    ------
-    RegionError
-        If there is no such region, or *which* has fewer than two.
-    """
-    require_sequence(which, "which")
-    numbers = sorted({_checked(regions, region) for region in which})
-    if len(numbers) < 2:
-        raise RegionError(f"merging requires two or more regions; got {shown(which)}")
-    membership = regions.membership.copy()
-    membership[numbers[0]] = membership[numbers].any(axis=0)
-    return Regions(regions.mesh, np.delete(membership, numbers[1:], axis=0), regions.smoothness)
+    def split(
+        self, region: int, vertices: ArrayLike | None = None, *, overlap: int | None = None
+    ) -> None:
+        """Split a region in two.
 
+        The first part keeps the name.  The second comes last; next to "arm" it is "arm 2".
 
-def split(
-    regions: Regions,
-    region: int,
-    vertices: ArrayLike | None = None,
-    *,
-    overlap: int | None = None,
-    name: str = "",
-) -> Regions:
-    """Return *regions* with one of them split in two; the second part comes last.
+        Parameters
+        ----------
+        region : int
+            The region.
+        vertices : (k,) int or (n,) bool, optional
+            The second part; vertices outside the region are ignored.  By default the region is
+            split half way between its two ends, measured along the surface.
+        overlap : int, optional
+            Edge rings by which both parts grow across the border, within the region.  By default a
+            tenth of their width, as in `segment`, and at least 2.
 
-    Parameters
-    ----------
-    regions : Regions
-        r regions of n vertices.
-    region : int
-        In 0..r-1.
-    vertices : (k,) int or (n,) bool, optional
-        The second part; vertices outside the region are ignored.  By default the region is split
-        half way between its two ends, measured along the surface.
-    overlap : int, optional
-        Edge rings by which both parts grow across the border, within the region.  By default a
-        tenth of their width, as in `segment`, and at least 2.
-    name : str, optional
-        The name of the region in error messages.
+        Raises
+        ------
+        RegionError
+            If there is no such region, or a part would be empty.
+        """
+        regions, name = self._regions, self._name(region)
+        region = _checked(regions, region)
+        mesh, whole = regions.mesh, regions.membership[region]
+        second = _far_half(mesh, whole) if vertices is None else _mask(mesh, vertices) & whole
+        first = whole & ~second
+        if not first.any() or not second.any():
+            raise RegionError(
+                f"{name} cannot be split: {'all' if second.any() else 'none'} "
+                "of its vertices would be in the second part; choose some of them"
+            )
+        if overlap is None:
+            overlap = usual_overlap(np.count_nonzero(whole) / 2)
+        elif not is_whole(overlap, 0):
+            raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
+        membership = regions.membership.copy()
+        for part in (first, second):
+            part[within_rings(mesh.adjacency, np.flatnonzero(part), int(overlap))] = True
+        membership[region] = first & whole
+        names = naming.split(self._names, region, regions.n_regions)
+        self._step(f"split {name}", np.vstack([membership, second & whole]), names)
 
-    Raises
-    ------
-    RegionError
-        If there is no such region, or a part would be empty.
-    """
-    region = _checked(regions, region)
-    mesh, whole = regions.mesh, regions.membership[region]
-    second = _far_half(mesh, whole) if vertices is None else _mask(mesh, vertices) & whole
-    first = whole & ~second
-    if not first.any() or not second.any():
-        raise RegionError(
-            f"{name or f'region {region}'} cannot be split: {'all' if second.any() else 'none'} "
-            "of its vertices would be in the second part; choose some of them"
-        )
-    if overlap is None:
-        overlap = max(2, round(_OVERLAP * np.sqrt(np.count_nonzero(whole) / 2)))
-    elif not is_whole(overlap, 0):
-        raise RegionError(f"overlap must be a whole number, 0 or more; got {shown(overlap)}")
-    membership = regions.membership.copy()
-    membership[region] = _grown(mesh, first, overlap) & whole
-    second = _grown(mesh, second, overlap) & whole
-    return Regions(mesh, np.vstack([membership, second]), regions.smoothness)
+    def rename(self, region: int, name: str) -> None:
+        """Rename a region; "" removes its name.
+
+        Painting, merging and splitting keep names; `segment` and `set_regions` remove them.
+
+        Raises
+        ------
+        RegionError
+            If there is no such region, *name* is the name of another region, or it is not printable
+            text of at most 80 characters.
+        """
+        state = self._history.state
+        count = 0 if state.regions is None else state.regions.n_regions
+        if not is_whole(region, 0, count - 1):
+            raise RegionError(
+                f"there is no region {shown(region)}; there are {count}, numbered from 0"
+            )
+        names = naming.renamed(self._names, int(region), name)
+        self._history.step(f"rename {self._name(region)}", replace(state, region_names=names))
+
+    @property
+    def _regions(self) -> Regions:
+        return self._history.state.regions or Regions.single(self._poses.mesh)
+
+    @property
+    def _names(self) -> naming.Names:
+        return self._history.state.region_names
+
+    def _name(self, region: int) -> str:
+        return naming.region_name(self._names, region)
+
+    def _step(self, label: str, membership: BoolArray, names: naming.Names) -> None:
+        regions = self._regions
+        after = Regions(regions.mesh, membership, regions.smoothness)
+        self._history.step(label, with_regions(self._history.state, after, names))
 
 
 def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
@@ -194,18 +212,6 @@ def _far_half(mesh: Mesh, whole: BoolArray) -> BoolArray:
     from_other_end = distance_from(int(np.argmax(from_one_end)))
     second[ids[from_other_end < from_one_end]] = True
     return second
-
-
-def _grown(mesh: Mesh, mask: BoolArray, rings: int) -> BoolArray:
-    """Return *mask* extended by a number of edge rings."""
-    mask = mask.copy()
-    i, j = mesh.edges.T
-    for _ in range(int(rings)):
-        touched = mask[i] != mask[j]
-        if not touched.any():
-            break
-        mask[i[touched]] = mask[j[touched]] = True
-    return mask
 
 
 def _mask(mesh: Mesh, vertices: ArrayLike) -> BoolArray:

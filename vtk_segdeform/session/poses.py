@@ -38,11 +38,8 @@ from .handles import stacked
 from .memo import Memo
 from .state import Cages, Pose, State
 
-_MAX_BOUND = 3  # bound deformers in memory: undo of new cages or options needs no new binding
-_MAX_ROTATIONS = 3  # of the finished pose, the last one and the next
-_MAX_SURFACES = 2  # of the pose that is shown, and of another one
-_BIND_SHARE = 0.95  # share of binding in the progress of `prepare`; the rest adds constraints
-_VOLUME_TOLERANCE = 1e-9  # relative; a pose with a larger error does not meet a new constraint
+_KEPT = 3  # bound deformers, rotations and surfaces of the last poses
+VOLUME_TOLERANCE = 1e-9  # relative; a pose with a larger error does not meet a new constraint
 
 
 class Shown(NamedTuple):
@@ -132,15 +129,15 @@ class Poses:
                 progress=progress,
             )
 
-        return self.memo.get("bound", _binding(state), bound, _MAX_BOUND)
+        return self.memo.get("bound", _binding(state), bound, _KEPT)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
-        self.memo.keep("bound", _binding(state), deformer, _MAX_BOUND)
+        self.memo.keep("bound", _binding(state), deformer, _KEPT)
 
     def prepare(self, state: State, progress: Progress | None = None) -> None:
         """Bind, and constrain the fixed vertices and handles of *state* if there are any."""
-        self.bind(state, part(progress, 0.0, _BIND_SHARE))
+        self.bind(state, part(progress, 0.0, 0.95))
         if len(state.fixed) or state.handles:
             self.constrained(state)
         tell(progress, 1.0, "ready")
@@ -209,7 +206,7 @@ class Poses:
 
     def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
         x = self.surface(state, pose.cage_vertices)
-        return all(abs(v.relative(x)) <= _VOLUME_TOLERANCE for v in deformer.preserved_volumes)
+        return all(abs(v.relative(x)) <= VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     # Surfaces.
 
@@ -255,17 +252,15 @@ class Poses:
     def surface(self, state: State, cages: Cages) -> FloatArray:
         """Return W~ p, (n, 3) float, read-only; *cages* are p."""
         mapped = partial(self._mapped, state, cages)
-        return self.memo.get("surface", (state.regions, state.cages, cages), mapped, _MAX_SURFACES)
+        return self.memo.get("surface", (state.regions, state.cages, cages), mapped, _KEPT)
 
     def _mapped(self, state: State, cages: Cages) -> FloatArray:
-        x = self.bind(state).surface(cages)
-        frozen(x)
-        return x
+        return frozen(self.bind(state).surface(cages))
 
     def rotations(self, state: State, cages: Cages) -> FloatArray:
         """Return `Deformer.rotations`, (n, 3, 3) float."""
         rotations = partial(self.bind(state).rotations, cages)
-        return self.memo.get("rotations", (state.regions, cages), rotations, _MAX_ROTATIONS)
+        return self.memo.get("rotations", (state.regions, cages), rotations, _KEPT)
 
     def shift(self, state: State) -> FloatArray | None:
         """Return `Finished.shifted` (n, 3) of the pose; None if it is not finished."""

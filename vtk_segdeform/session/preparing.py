@@ -66,6 +66,4 @@ def fitted(mesh: Mesh, state: State, progress: Progress | None = None) -> tuple[
     wanted = options.n_cage_vertices
     size = suggested_size(regions) if wanted == Options().n_cage_vertices else wanted
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
-    return fit_cages(
-        mesh, regions, size, fixed=state.fixed, offset=options.offset, progress=progress
-    )
+    return fit_cages(mesh, regions, size, offset=options.offset, progress=progress)

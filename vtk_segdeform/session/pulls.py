@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import deformer
-from ..arrays import FloatArray, IntArray, frozen, plain
+from ..arrays import FloatArray, IntArray, plain
 from ..deformer import (
     SPREAD,
     Deformer,
@@ -49,9 +49,6 @@ from .handles import (
     with_handle,
 )
 from .state import Locality, Pose, State
-
-_ROOM = 0.5  # share of the distance from a patch to the nearest point that stays
-_SAME_POINT = 0.25  # of the radius: a pulled point so close is grabbed again
 
 
 class Grip(NamedTuple):
@@ -129,7 +126,7 @@ def grabbed(
         away = float(np.linalg.norm(x[ids] - point.at(x), axis=1).min())
         if away == 0.0 or point.vertex in ids:
             return name
-        if name in state.pulls and away < _SAME_POINT * radius:
+        if name in state.pulls and away < 0.25 * radius:
             near.append((away, name))
     return min(near, key=lambda each: each[0])[1] if near else None
 
@@ -316,7 +313,7 @@ def _free_patch(
     staying = [ids for other, ids in others.items() if other not in along]
     ids = np.concatenate([state.fixed, *staying])
     away = np.linalg.norm(mesh.vertices[ids] - mesh.vertices[vertex], axis=1)
-    radius = min(radius, _ROOM * float(away.min(initial=np.inf)))
+    radius = min(radius, 0.5 * float(away.min(initial=np.inf)))
     patch = np.union1d(_patch(mesh, vertex, radius), mesh.adjacency[[vertex]].indices)
     return np.setdiff1d(patch, np.concatenate([state.fixed, *others.values()]))
 
@@ -330,6 +327,4 @@ def _patch(mesh: Mesh, vertex: int, radius: float) -> IntArray:
         near = np.unique(mesh.adjacency[front].indices)
         front = np.setdiff1d(near[inside[near]], found, assume_unique=True)
         found = np.concatenate([found, front])
-    own = np.sort(found)
-    frozen(own)
-    return own
+    return np.sort(found)

@@ -54,8 +54,9 @@ from ..regions import Regions, segment
 from ..solver import Solution, Status
 from . import finishing, handles, naming, output, painting, preparing, pulls, solving
 from .finishing import FinishedPose
-from .groups import Handles, Painting
+from .handle_edits import Handles
 from .listeners import Listener
+from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .state import (
@@ -335,7 +336,7 @@ class Session(Described):
         """
         require(label, str, "label")
         options = self._options_with(n_cage_vertices)
-        cages = self._fitting(cages)
+        cages = fitting_cages(self.regions, cages, self.state.region_names)
         if posed is not None:
             require_sequence(posed, "posed")
             if len(posed) != len(cages):
@@ -366,9 +367,10 @@ class Session(Described):
         The mesh is nearly where it is now.  This may run in another thread, as `fitted_cages`; pass
         the result to `set_cages`.
         """
-        options, cages = self._options_with(n_cage_vertices), self._fitting(cages)
+        cages = fitting_cages(self.regions, cages, self.state.region_names)
         if self.state.pose is None:
             return None
+        options = self._options_with(n_cage_vertices)
         state = replace(self.state, cages=cages, options=options).at_rest()
         return solving.carried(self.poses, state, self.vertices, progress)
 
@@ -382,8 +384,7 @@ class Session(Described):
         these have another number than the default one, it follows the number of regions.
         """
         state = replace(self.state, options=self._options_with(n_cage_vertices))
-        cages = preparing.fitted(self.mesh, state, progress)
-        return self.poses.memo.keep("fitting", (state.regions, cages), cages)
+        return preparing.fitted(self.mesh, state, progress)
 
     def fit_cages(self, progress: Progress | None = None) -> None:
         """Fit cages to the regions; if cancelled, nothing changes."""
@@ -770,13 +771,6 @@ class Session(Described):
         """Tell whether the cages of two poses differ by rounding only."""
         p, q = np.concatenate(a.cage_vertices), np.concatenate(b.cage_vertices)
         return bool(np.abs(p - q).max() <= _ROUNDING * self.mesh.diagonal)
-
-    def _fitting(self, cages: Sequence[Cage]) -> tuple[Cage, ...]:
-        """Return *cages* as a tuple; CageError if they do not fit the regions."""
-        known: tuple[Cage, ...] | None = self.poses.memo.find("fitting", (self.regions, cages))
-        if known is not None:
-            return known
-        return fitting_cages(self.regions, cages, self.state.region_names)
 
     def _options_with(self, n_cage_vertices: int | None) -> Options:
         if n_cage_vertices is None:

@@ -24,9 +24,6 @@ from .handles import require_near, stacked, targets_at
 from .poses import Aim, Path, Poses, Shown
 from .state import Cages, Pose, State
 
-_CARRIED = 4000  # about as many vertices, at most, to which cages are carried
-_HELD, _DAMPING = 30.0, 1e-6  # weights of fixed vertices and handles, and of cages at rest
-
 
 def solve(
     poses: Poses,
@@ -134,13 +131,13 @@ def carried(poses: Poses, state: State, x: FloatArray, progress: Progress | None
     deformer, mesh = poses.bind(state, progress), poses.mesh
     held = np.concatenate([state.fixed, state.handle])
     every = np.arange(mesh.n_vertices)
-    some = [each[:: max(1, len(each) // _CARRIED)] for each in (every, held)]
+    some = [each[:: max(1, len(each) // 4000)] for each in (every, held)]
     ids, counts = np.concatenate(some), [len(each) for each in some]
-    weights = np.repeat([1.0, _HELD], counts)[:, None]
+    weights = np.repeat([1.0, 30.0], counts)[:, None]
     rows = weights * deformer.subspace.at(ids)
     moved = rows.T @ (weights * (x - mesh.vertices)[ids])
     normal = rows.T @ rows
-    normal[np.diag_indices_from(normal)] += _DAMPING * np.trace(normal) / len(normal)
+    normal[np.diag_indices_from(normal)] += 1e-6 * np.trace(normal) / len(normal)
     rest = np.concatenate([cage.vertices for cage in state.cages])
     p = rest + np.linalg.solve(normal, moved)
     return tuple(p[columns] for columns in deformer.subspace.columns)

@@ -25,10 +25,6 @@ from ..subspace import Subspace, cage_subspace
 from . import pulls
 from .session import Session
 
-_CAGE_VERTICES = 60
-_FITTED, _MAPPED = 0.5, 0.7  # of the progress
-_MOST_STEPS = 5  # of the solver in one call; the next one continues
-
 
 @dataclass(frozen=True, eq=False)
 class StandIn:
@@ -66,14 +62,14 @@ class StandIn:
         if mesh.n_vertices <= sizes.STAND_IN_POINTS:
             return None
         whole = Regions.single(mesh)
-        cages = fit_cages(mesh, whole, _CAGE_VERTICES, progress=part(progress, 0.0, _FITTED))
-        mapped = part(progress, _FITTED, _MAPPED)
+        cages = fit_cages(mesh, whole, 60, progress=part(progress, 0.0, 0.5))
+        mapped = part(progress, 0.5, 0.7)
         subspace = cage_subspace(whole, cages, rough=True, progress=mapped)
         coarse, cluster = _decimated(mesh)
         session = Session(coarse)
         session.set_regions(Regions.single(coarse))
         session.set_cages(cages)
-        session.bind(part(progress, _MAPPED, 1.0))
+        session.bind(part(progress, 0.7, 1.0))
         return cls(mesh, cluster, session, subspace, total_volume(mesh, lids_of(mesh, lids)))
 
     def pulled(
@@ -89,9 +85,7 @@ class StandIn:
         own = int(self.cluster[point.vertex])
         if motion.shape == (3,):
             motion = self.session.mesh.vertices[own] + (motion - point.at(self.mesh.vertices))
-        solution = self.session.pull(
-            own, motion, radius=radius, locality=locality, max_steps=_MOST_STEPS
-        )
+        solution = self.session.pull(own, motion, radius=radius, locality=locality, max_steps=5)
         moves = np.concatenate(solution.cage_vertices) - self._rest_cage
         x = self.subspace.map(moves, self.mesh.vertices)
         if self.volume.has_volume:

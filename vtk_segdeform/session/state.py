@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
-from ..cages import Cage
+from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import checked_constraints, checked_place
 from ..errors import CageError, ConstraintError, RegionError, SessionError
@@ -284,8 +284,8 @@ def checked_state(mesh: Mesh, state: State) -> State:
     if locality is not None:
         locality = _checked_locality(mesh, cages, require(locality, Locality, "state.locality"))
     pivots = _checked_pivots(mesh, handles, require(state.pivots, Mapping, "state.pivots"))
-    owned = MappingProxyType({name: _frozen_copy(ids) for name, ids in handles.items()})
-    constraints = _frozen_copy(fixed), owned
+    owned = MappingProxyType({name: frozen(ids.copy()) for name, ids in handles.items()})
+    constraints = frozen(fixed.copy()), owned
     places = None if pose is None else _checked_places(mesh, fixed, state)
     return State(
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places
@@ -315,8 +315,7 @@ def fitting_cages(
     if len(cages) != regions.n_regions:
         raise CageError(f"{regions.n_regions} regions need as many cages; got {len(cages)}")
     for r, cage in enumerate(cages):
-        members = regions.mesh.vertices[regions.membership[r]]
-        cage.require_encloses(members, f"vertices of {region_name(names, r)}")
+        require_enclosed(cage, regions, r, region_name(names, r))
     return cages
 
 
@@ -349,8 +348,8 @@ def _checked_pose(
     targets = {name: as_points(points, "targets") for name, points in pose.targets.items()}
     if [len(points) for points in targets.values()] != list(lengths):
         raise ConstraintError("the pose must have one target for each vertex of each handle")
-    owned = MappingProxyType({name: _frozen_copy(points) for name, points in targets.items()})
-    return Pose(tuple(_frozen_copy(points) for points in places), owned)
+    owned = MappingProxyType({name: frozen(points.copy()) for name, points in targets.items()})
+    return Pose(tuple(frozen(points.copy()) for points in places), owned)
 
 
 def _checked_finished(
@@ -372,8 +371,13 @@ def _checked_finished(
         raise ConstraintError("the finished pose must have a shift for each held vertex")
     then = _checked_pose(cages, [], [], Pose(finished.cage_vertices, {}))
     _require_plausible(mesh, then)
-    vertices, held, shifts, offset = map(_frozen_copy, (vertices, held, shifts, offset))
-    return Finished(vertices, held, shifts, then.cage_vertices, offset)
+    return Finished(
+        frozen(vertices.copy()),
+        frozen(held.copy()),
+        frozen(shifts.copy()),
+        then.cage_vertices,
+        frozen(offset.copy()),
+    )
 
 
 def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> Locality:
@@ -399,10 +403,8 @@ def _checked_places(mesh: Mesh, fixed: IntArray, state: State) -> FloatArray | N
         raise ConstraintError(
             "state.fixed_at must have a place for each of state.fixed, as numbers"
         )
-    away = np.abs(places - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
-    if not away <= _FARTHEST:
-        raise ConstraintError(f"the fixed vertices are {away:.0e} mesh diagonals away")
-    return np.asarray(_frozen_copy(places))
+    _require_near(mesh, places, "the fixed vertices are")
+    return frozen(places.copy())
 
 
 def _checked_pivots(
@@ -414,21 +416,19 @@ def _checked_pivots(
     found = {}
     for name in pivots.keys() & handles.keys():
         (point,) = as_points([pivots[name]], f"pivot of {name}")
-        away = np.abs(point - mesh.vertices.mean(axis=0)).max() / mesh.diagonal
-        if not away <= _FARTHEST:
-            raise ConstraintError(f"the pivot of {name} is {away:.0e} mesh diagonals away")
-        found[name] = _frozen_copy(point)
+        _require_near(mesh, point, f"the pivot of {name} is")
+        found[name] = frozen(point.copy())
     return MappingProxyType(found)
 
 
 def _require_plausible(mesh: Mesh, pose: Pose) -> None:
-    """Raise a CageError if *pose* is so far away that vertices could overflow."""
+    """Raise a ConstraintError if *pose* is so far away that vertices could overflow."""
     own = [] if pose.finished is None else [pose.finished.vertices]
     every = np.concatenate([*pose.cage_vertices, *pose.targets.values(), *own])
-    away = np.abs(every - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
+    _require_near(mesh, every, "the pose is damaged: it is")
+
+
+def _require_near(mesh: Mesh, points: FloatArray, what: str) -> None:
+    away = np.abs(points - mesh.vertices.mean(axis=0)).max(initial=0.0) / mesh.diagonal
     if not away <= _FARTHEST:
-        raise CageError(f"the pose is damaged: it is {away:.0e} mesh diagonals away from the mesh")
-
-
-def _frozen_copy(array: Any) -> Any:
-    return frozen(array.copy())
+        raise ConstraintError(f"{what} {away:.0e} mesh diagonals away from the mesh")

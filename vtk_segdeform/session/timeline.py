@@ -9,10 +9,9 @@ there is nothing to redo then.
 from __future__ import annotations
 
 import sys
-from collections import deque
-from collections.abc import Callable, MutableSequence
-from dataclasses import dataclass
-from typing import Any, TypeAlias, final
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, final
 
 from ..arrays import is_whole
 from ..checks import as_callable, require, shown
@@ -21,7 +20,6 @@ from .listeners import Change, Listener, Listeners
 from .state import State
 
 _NOTHING = Change(0)
-_Steps: TypeAlias = MutableSequence[tuple[str, State]]  # the nearest to the current state last
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,15 +59,15 @@ class Timeline:
     def __init__(self, state: State, limit: int) -> None:
         if not is_whole(limit, 1, sys.maxsize):
             raise SessionError(f"history must be a number of steps, 1 or more; got {shown(limit)}")
+        self._limit = int(limit)
         self._state = state
         self._drag: Drag | None = None
-        self._past: deque[tuple[str, State]] = deque(maxlen=int(limit))  # labels of the steps after
-        self._future: list[tuple[str, State]] = []  # labels of the steps before; the next one last
-        self._oldest = "opened"  # the label of the step that led to the oldest state
+        # All states but that of an ongoing drag, and the label of the step that led to each.
+        self._states, self._labels, self._position = [state], ["opened"], 0
         self._listeners = Listeners()
 
     def __getstate__(self) -> dict[str, Any]:
-        own = vars(self) | {"_past": self._past.copy(), "_future": self._future.copy()}
+        own = vars(self) | {"_states": self._states.copy(), "_labels": self._labels.copy()}
         del own["_listeners"]
         return own
 
@@ -89,14 +87,13 @@ class Timeline:
     @property
     def undo_label(self) -> str | None:
         """The label of the step that `undo` would revert, or None."""
-        if self._drag is not None:
-            return self._drag.label
-        return self._past[-1][0] if self._past else None
+        return self.labels[self.position] if self.position else None
 
     @property
     def redo_label(self) -> str | None:
         """The label of the step that `redo` would repeat, or None."""
-        return self._future[-1][0] if self._future and self._drag is None else None
+        labels = self.labels
+        return labels[self.position + 1] if self.position + 1 < len(labels) else None
 
     @property
     def can_undo(self) -> bool:
@@ -115,15 +112,14 @@ class Timeline:
         The first one is "opened", unless steps beyond the limit were discarded.  An ongoing drag is
         the last one.
         """
-        past = self._oldest, *(label for label, _ in self._past)
-        if self._drag is not None:
-            return *past, self._drag.label
-        return *past, *(label for label, _ in reversed(self._future))
+        if self._drag is None:
+            return tuple(self._labels)
+        return *self._labels[: self._position + 1], self._drag.label
 
     @property
     def position(self) -> int:
         """The index of the current state in `labels`."""
-        return len(self._past) + (self._drag is not None)
+        return self._position + (self._drag is not None)
 
     def state_at(self, position: int) -> State:
         """Return the state at *position* of `labels`.
@@ -134,12 +130,7 @@ class Timeline:
             If there is no such state.
         """
         self._require_position(position)
-        if position == self.position:
-            return self._state
-        if self._drag is not None and position == len(self._past):
-            return self._drag.start
-        ahead = int(position) - len(self._past)
-        return self._past[position][1] if ahead < 0 else self._future[-ahead][1]
+        return self._state if position == self.position else self._states[int(position)]
 
     def jump(self, position: int) -> None:
         """Undo or redo as many steps as lead to the state at *position* of `labels`.
@@ -153,27 +144,22 @@ class Timeline:
         """
         self._require_position(position)
         ended = self._end_drag()
-        if ended or position != self.position:
-            now = self._state
-            while len(self._past) > position:
-                now = _shifted(self._past, self._future, now)
-            while len(self._past) < position:
-                now = _shifted(self._future, self._past, now)
-            self._set(now, Change.HISTORY)
+        if ended or position != self._position:
+            self._go(int(position))
 
     def undo(self) -> str | None:
         """Undo the last step; return its label, or None if there is none."""
         label = self.undo_label
         self._end_drag()
         if label is not None:
-            self._set(_shifted(self._past, self._future, self._state), Change.HISTORY)
+            self._go(self._position - 1)
         return label
 
     def redo(self) -> str | None:
         """Redo the last step undone; return its label, or None if there is none."""
         label = self.redo_label
         if label is not None:
-            self._set(_shifted(self._future, self._past, self._state), Change.HISTORY)
+            self._go(self._position + 1)
         return label
 
     def commit(self, label: str | None = None) -> str | None:
@@ -209,7 +195,7 @@ class Timeline:
         """Record a step to *after*, unless nothing changes."""
         if self._state.changes(after):
             self._end_drag()
-            self._record(label, self._state, after)
+            self._record(label, after)
             self._set(after, Change.HISTORY)
 
     def move(self, after: State, *moved: str, grip: object = None) -> None:
@@ -228,16 +214,23 @@ class Timeline:
 
     def amend(self, change: Callable[[State], State]) -> None:
         """Apply *change* to the current state and to all others, which adds no step."""
-        for steps in (self._past, self._future):
-            for k, (label, state) in enumerate(steps):
-                steps[k] = label, change(state)
+        self._states = [change(state) for state in self._states]
         if self._drag is not None:
-            self._drag = Drag(change(self._drag.start), self._drag.moved, self._drag.grip)
+            self._drag = replace(self._drag, start=self._states[self._position])
         self._set(change(self._state))
+
+    def _go(self, position: int) -> None:
+        """Change to the state at another position, or the same one after a drag."""
+        state = self._states[position]
+        _drop_weights(self._state, state)
+        self._position = position
+        self._set(state, Change.HISTORY)
 
     def _set(self, state: State, change: Change = _NOTHING) -> None:
         change |= self._state.changes(state)
         self._state = state
+        if self._drag is None:
+            self._states[self._position] = state
         self._listeners.notify(change)
 
     def _require_position(self, position: int) -> None:
@@ -249,24 +242,18 @@ class Timeline:
         if self._drag is None:
             return None
         label = label or self._drag.label
-        self._record(label, self._drag.start, self._state)
         self._drag = None
+        self._record(label, self._state)
         return label
 
-    def _record(self, label: str, before: State, after: State) -> None:
-        if len(self._past) == self._past.maxlen:
-            self._oldest = self._past[0][0]
-        self._past.append((label, before))
-        self._future.clear()
-        _drop_weights(before, after)
-
-
-def _shifted(source: _Steps, sink: _Steps, now: State) -> State:
-    """Move the last step from *source* to *sink*, and return its state; *now* is the current."""
-    label, state = source.pop()
-    sink.append((label, now))
-    _drop_weights(now, state)
-    return state
+    def _record(self, label: str, after: State) -> None:
+        """Add a step to *after*, in place of those that were undone."""
+        _drop_weights(self._states[self._position], after)
+        end = self._position + 1
+        self._states[end:], self._labels[end:] = [after], [label]
+        self._position = min(end, self._limit)
+        discarded = slice(0, end - self._position)
+        del self._states[discarded], self._labels[discarded]
 
 
 def _drop_weights(stored: State, current: State) -> None:

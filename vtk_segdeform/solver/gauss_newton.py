@@ -293,7 +293,7 @@ class GaussNewton:
 
     def evaluate(self, p: FloatArray, x: FloatArray) -> _Iterate:
         """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
-        rows = self.volumes.surface.adjoints(gradients(self.volumes.constraints, x))
+        rows = [self.volumes.surface.adjoint(g) for g in gradients(self.volumes.constraints, x)]
         energy, slope = self.energy.value_and_slope(p)
         value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
         here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)

@@ -1,11 +1,10 @@
-"""Operations on the whole mesh on a GPU: the map, the volume and the normals.
+"""Operations on the whole mesh on a GPU: the map and the exact volume.
 
     arrays = gpu_arrays()             cupy, or else torch, if a GPU works with it; or None
 
     x = rest + W~ moves               `GPUSurface.map`               x stays on the GPU
     V(x)                              `GPUSurface.volume`            as `volume.signed_volume`
     c + s (x - c)                     `GPUSurface.scale_to_volume`   as in `exact_volume`
-    n(x)                              `GPUSurface.normals`
 
 Each pass is written once, with functions that numpy, cupy and torch share, so that the tests run
 the lines that a GPU runs: with numpy, with torch on the processor where it is installed, and on a
@@ -16,14 +15,10 @@ Both libraries are optional; ``pip install 'vtk-segdeform[gpu]'`` installs cupy.
 queried first: without a GPU neither library is imported, which would take seconds, and nothing is
 logged.  ``SEGDEFORM_GPU=0`` turns the GPU off.
 
-For n vertices, m faces and N numbers in the blocks of W~ the GPU stores 8 N + 24 n + 24 m bytes,
-and 60 m more once normals are computed.  A call takes, its result included,
-
-    map 80 n        volume 8 m + 300 MB at most        normals 100 m + 300 MB at most
-
-which for a million vertices and 155 cage vertices is 1.1 gigabytes in all.  W~ is in double
-precision on the GPU even where `subspace` has it in single precision: converting it in every frame
-would take longer than reading it.
+For n vertices, m faces and N numbers in the blocks of W~ the GPU stores 8 N + 24 n + 24 m bytes.
+`GPUSurface.map` takes 80 n bytes, its result included, and `GPUSurface.volume` 8 m and at most 300
+megabytes.  W~ is in double precision on the GPU even where `subspace` has it in single precision:
+converting it in every frame would take longer than reading it.
 """
 
 from __future__ import annotations
@@ -35,7 +30,6 @@ import logging
 import os
 import sys
 from collections.abc import Iterator
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -158,29 +152,6 @@ class GPUSurface:
         return scale
 
     @_faults_named()
-    def normals(self, x: GPUArray) -> GPUArray:
-        """Return the unit normals (n, 3) of *x* (n, 3), on the GPU.
-
-        The normal of a vertex is the sum of the cross products of the faces around it, so that
-        faces are weighted by area.  Where the sum is zero, as in a fan that has shrunk to a point,
-        the normal is zero.
-        """
-        rounds, owners, places = self._fans
-        sums = self._arrays.empty((len(self._host_faces), 3))
-        for piece, _, e, f in self._corners_and_edges(x):
-            sums[piece] = self._arrays.cross(e, f)
-        for kept, added in rounds:
-            longer, sums = sums, self._arrays.take(sums, kept, axis=0)
-            sums[: len(added)] += self._arrays.take(longer, added, axis=0)
-        normals = self._arrays.zeros(tuple(x.shape))
-        normals[owners] = self._arrays.take(sums, places, axis=0)
-        # Scaled to size 1 first, so that their squares neither overflow nor vanish.
-        largest = self._arrays.amax(abs(normals), 1)
-        normals /= (largest + (largest == 0.0))[:, None]
-        normals /= ((normals * normals).sum(1) + (largest == 0.0))[:, None] ** 0.5
-        return normals
-
-    @_faults_named()
     def host(self, x: GPUArray) -> Any:
         """Return *x* as a numpy array, once the GPU has computed it."""
         return x if isinstance(x, np.ndarray) else self._arrays.asnumpy(x)
@@ -203,36 +174,6 @@ class GPUSurface:
             wide[piece] = self._arrays.asarray(block[piece])
         return wide
 
-    @cached_property
-    def _fans(self) -> tuple[list[tuple[GPUArray, GPUArray]], GPUArray, GPUArray]:
-        rounds, owners, places = _pairwise(self._host_faces)
-        there = [(self._ids(kept), self._ids(added)) for kept, added in rounds]
-        return there, self._ids(owners), self._ids(places)
-
-
-def _pairwise(faces: IntArray) -> tuple[list[tuple[IntArray, IntArray]], IntArray, IntArray]:
-    """Return how to sum a value of each of *faces* (m, 3) over the faces around each vertex.
-
-    The sum is pairwise, in rounds: the numbers *kept* are the list of the next round, and the
-    numbers *added* are added to the first of them.  Each round halves the fans.  In the end the
-    sums at *places* are those of the vertices *owners*.
-    """
-    order = np.argsort(faces, axis=None, kind="stable")
-    owners, places = faces.ravel()[order], order // 3
-    rounds: list[tuple[IntArray, IntArray]] = []
-    while True:
-        here = np.arange(len(owners))
-        begins = np.diff(owners, prepend=-1) != 0
-        is_added = (here - np.maximum.accumulate(np.where(begins, here, 0))) % 2 == 1
-        if not is_added.any():
-            return rounds, owners, places
-        is_added_to = np.append(is_added[1:], False)
-        is_alone = ~is_added & ~is_added_to
-        kept = np.concatenate([np.flatnonzero(is_added_to), np.flatnonzero(is_alone)])
-        rounds.append((places[kept], places[is_added]))
-        places = np.argsort(kept, kind="stable")  # by vertex again
-        owners = owners[kept][places]
-
 
 class TorchArrays:
     """*torch* with the names of numpy that `GPUSurface` uses; *device* is "cuda" or "cpu"."""
@@ -241,7 +182,7 @@ class TorchArrays:
         self.asarray = functools.partial(torch.tensor, device=device)
         self.empty = functools.partial(torch.empty, dtype=torch.float64, device=device)
         self.zeros = functools.partial(torch.zeros, dtype=torch.float64, device=device)
-        self.cross, self.amax = torch.linalg.cross, torch.amax
+        self.cross = torch.linalg.cross
         self._index_select = torch.index_select
 
     def take(self, x: GPUArray, ids: GPUArray, axis: int) -> GPUArray:
@@ -305,8 +246,7 @@ def _test(arrays: Any) -> None:
     surface = GPUSurface(subspace, corners, faces, arrays)
     x = surface.map(corners)  # twice the size
     surface.scale_to_volume(x, 1.0 / 6.0, np.zeros(3))
-    normal = surface.host(surface.normals(x))[0]
-    if not (abs(surface.volume(x) - 1.0 / 6.0) < 1e-15 and np.ptp(normal) < 1e-15 > normal.max()):
+    if not abs(surface.volume(x) - 1.0 / 6.0) < 1e-15:
         raise GPUError("it computes wrong results")
 
 

@@ -32,14 +32,13 @@ from scipy import sparse
 from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage, mean_value_coordinates
-from ..kernels import compiled_kernels, inputs
+from ..kernels import ROWS_AT_ONCE, compiled_kernels, inputs
 from ..progress import Progress, part
 
 _SPACING = 0.08  # h, relative to sqrt(area of the cage / its vertices)
 _ROUGH = 2.0  # times the spacing of rough rows, whose error is of third order
 _CHECKED, _TOLERANCE = 256, 0.01  # vertices; largest sum of the errors in a row
 _MOST_NODES = 0.5  # per vertex; with more, the coordinates themselves are as fast
-_ROWS_AT_ONCE = 1 << 15  # of nodes or vertices
 _MARGIN = 3  # nodes around those of the vertices: B-splines and second differences need two
 
 
@@ -123,8 +122,8 @@ class InterpolatedBlock:
         if len(nodes) > _MOST_NODES * len(points):
             return None
         w = np.empty((len(nodes), cage.n_vertices))
-        for start in range(0, len(nodes), _ROWS_AT_ONCE):
-            some = nodes[start : start + _ROWS_AT_ONCE]
+        for start in range(0, len(nodes), ROWS_AT_ONCE):
+            some = nodes[start : start + ROWS_AT_ONCE]
             stop = start + len(some)
             at = origin + spacing * np.stack(np.unravel_index(some, shape), axis=1)
             share = part(progress, start / len(nodes), stop / len(nodes))
@@ -154,8 +153,8 @@ class InterpolatedBlock:
             kernels.interpolated_rows(out, *inputs(*own, self.lines, self.values))
             return out
         pieces = [
-            self._weights(slice(start, start + _ROWS_AT_ONCE), own) @ self.values
-            for start in range(0, len(own[0]), _ROWS_AT_ONCE)
+            self._weights(slice(start, start + ROWS_AT_ONCE), own) @ self.values
+            for start in range(0, len(own[0]), ROWS_AT_ONCE)
         ]
         return np.concatenate([np.empty((0, self.values.shape[1])), *pieces])
 
@@ -168,8 +167,8 @@ class InterpolatedBlock:
         by_column = operator.tocsc()
         met = np.flatnonzero(np.diff(by_column.indptr))
         out = np.zeros((operator.shape[0], self.values.shape[1]))
-        for start in range(0, len(met), _ROWS_AT_ONCE):
-            some = met[start : start + _ROWS_AT_ONCE]
+        for start in range(0, len(met), ROWS_AT_ONCE):
+            some = met[start : start + ROWS_AT_ONCE]
             weights = self._weights(slice(None), self._of(some))
             out += (by_column[:, some] @ weights) @ self.values
         return out
@@ -180,8 +179,8 @@ class InterpolatedBlock:
         if kernels := compiled_kernels(len(self.blend)):
             kernels.add_interpolated_adjoint(at_nodes, *inputs(y, *own, self.lines))
             return np.asarray(self.values.T @ at_nodes)
-        for start in range(0, len(y), _ROWS_AT_ONCE):
-            piece = slice(start, start + _ROWS_AT_ONCE)
+        for start in range(0, len(y), ROWS_AT_ONCE):
+            piece = slice(start, start + ROWS_AT_ONCE)
             at_nodes += self._weights(piece, own).T @ y[piece]
         return np.asarray(self.values.T @ at_nodes)
 

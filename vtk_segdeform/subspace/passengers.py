@@ -32,16 +32,13 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, as_numbers, as_points
-from ..cages import Cage, mean_value_coordinates
+from ..cages import FARTHEST_POINT, Cage, mean_value_coordinates
 from ..checks import all_of, require_sequence
 from ..errors import ArgumentError, CageError
 from ..freezing import Frozen, read_only
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part
 from .subspace import Subspace
-
-_NEIGHBOURS = 24  # K
-_FARTHEST_POINT = 1e60  # sizes of the mesh; beyond it, distances overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +124,10 @@ def blend_at(vertices: FloatArray, weights: FloatArray, points: FloatArray) -> F
             f"weights must have shape (r, {len(vertices)}), a column for each vertex; "
             f"got {weights.shape}"
         )
-    if (
-        np.abs(points - vertices[0]).max(initial=0.0)
-        > _FARTHEST_POINT * np.ptp(vertices, axis=0).max()
-    ):
-        raise ArgumentError(f"points are more than {_FARTHEST_POINT:.0e} sizes of the mesh away")
-    count = min(_NEIGHBOURS, len(vertices))
+    size = np.ptp(vertices, axis=0).max()
+    if np.abs(points - vertices[0]).max(initial=0.0) > FARTHEST_POINT * size:
+        raise ArgumentError(f"points are more than {FARTHEST_POINT:.0e} sizes of the mesh away")
+    count = min(24, len(vertices))  # K
     distance, near = map(np.asarray, cKDTree(vertices).query(points, k=np.arange(1, count + 1)))
     farthest = distance[:, -1:]
     on_vertex = distance[:, 0] <= 1e-12 * farthest[:, 0]

@@ -31,23 +31,19 @@ from scipy import sparse
 
 from .. import sizes
 from ..arrays import FloatArray, IntArray, as_numbers
-from ..cages import MOST_CAGE_VERTICES, Cage, encloses_region, mean_value_coordinates
+from ..cages import MOST_CAGE_VERTICES, Cage, mean_value_coordinates, require_enclosed
 from ..errors import CageError, RegionError
 from ..freezing import Frozen
-from ..kernels import compiled_kernels, in_parallel, inputs, writable
+from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs, writable
 from ..progress import Progress, part
 from ..regions import Regions
 from .interpolated import InterpolatedBlock
 
 _LARGEST_CAGE = 1e3  # diagonals of the mesh
-_VERTICES_AT_ONCE = 1 << 15  # vertices whose mean value coordinates are computed together
 _REGION_BITS = 32  # regions that are encoded in one integer
 NUMBERS_PER_FACE = 16  # numbers whose product takes about as long as a face of a volume
 _CACHED_NUMBERS = 1 << 17  # of a block, that are multiplied together: a megabyte
-_MOST_TASKS = 16  # of a block at most, for compiled kernels: each call takes some microseconds
 _DENSE_NUMBERS = 1 << 22  # of a dense piece: 32 megabytes
-_SAMPLED = 16  # interpolated rows for each one whose squares are summed
-_NOTHING = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,16 +79,6 @@ class Subspace(Frozen):
         return compiled_kernels(size) is not None
 
     @cached_property
-    def _is_packed(self) -> bool:
-        """Whether W~ has few enough numbers for one call of a kernel."""
-        size = sum(block.size for block in self.blocks)
-        return self._is_compiled and 0 < size <= sizes.ONE_CALL
-
-    @cached_property
-    def _packed(self) -> _PackedBlocks:
-        return _PackedBlocks.of([(ids, *self.nonzeros(ids)) for ids in self.sets_by_cages()])
-
-    @cached_property
     def _rows_of(self) -> sparse.csr_array:
         """(n, r) int: 1 + the row of each vertex in the block of each region; 0 is outside."""
         each = [np.arange(1, len(rows) + 1) for rows in self.rows]
@@ -105,8 +91,6 @@ class Subspace(Frozen):
 
         A *base* (n, 3) is added to the first three columns.
         """
-        if self._is_packed and p.shape[1] % 3 == 0 and (kernels := compiled_kernels()):
-            return self._packed.map(p, base, kernels)
         make = np.zeros if base is None else np.empty
         x = make((self.n_vertices, p.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
@@ -119,8 +103,6 @@ class Subspace(Frozen):
 
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
-        if self._is_packed and y.shape[1] == 3 and (kernels := compiled_kernels()):
-            return self._packed.adjoints([y], self.n_columns, kernels)[0]
         p = np.empty((self.n_columns, y.shape[1]))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             if isinstance(block, InterpolatedBlock):
@@ -128,12 +110,6 @@ class Subspace(Frozen):
             else:
                 p[columns] = _adjoint_product(rows, block, y, compiled=self._is_compiled)
         return p
-
-    def adjoints(self, ys: Sequence[FloatArray]) -> list[FloatArray]:
-        """Return `adjoint` of each of *ys* (n, 3); a small W~ is read once for two of them."""
-        if self._is_packed and (kernels := compiled_kernels()):
-            return self._packed.adjoints(ys, self.n_columns, kernels)
-        return [self.adjoint(y) for y in ys]
 
     def at(self, vertices: IntArray) -> FloatArray:
         """Return the rows of W~ for some mesh *vertices*, dense (k, m)."""
@@ -211,64 +187,13 @@ class Subspace(Frozen):
         out = np.zeros((int(clusters.max()) + 1, self.n_columns))
         for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
             if isinstance(block, InterpolatedBlock):
-                rows, block = rows[::_SAMPLED], block[::_SAMPLED]
+                rows, block = rows[::16], block[::16]
             for piece in row_pieces(len(rows), block.shape[1]):
                 size = piece.stop - piece.start
                 places = (clusters[rows[piece]], np.arange(size))
                 member = sparse.csr_array((np.ones(size), places), (len(out), size))
                 out[:, columns] += member @ _double(block[piece]) ** 2
         return out
-
-
-@dataclass(frozen=True, eq=False)
-class _PackedBlocks(Frozen):
-    """A small W~ end to end in memory, so that one call of a kernel multiplies by all of it.
-
-    One dense block for each set of vertices that the same cages move; so each vertex is in one
-    block only, and there is no call per region.
-
-    Parameters
-    ----------
-    rows, columns, weights : (n,) int, (sum c,) int, (sum k c,) float
-        For each block its vertices, the cage vertices that move them, and W~ there.
-    starts : (blocks + 1, 3) int
-        Where each block begins in these arrays.
-    """
-
-    rows: IntArray
-    columns: IntArray
-    weights: FloatArray
-    starts: IntArray
-
-    @classmethod
-    def of(cls, blocks: Sequence[tuple[IntArray, IntArray, FloatArray]]) -> _PackedBlocks:
-        """Return *blocks* of (rows (k,), columns (c,), weights (k, c)) end to end."""
-        lengths = [[array.size for array in arrays] for arrays in blocks]
-        starts = np.concatenate([np.zeros((1, 3), dtype=np.int64), np.cumsum(lengths, axis=0)])
-        parts = (np.concatenate([a.ravel() for a in each]) for each in zip(*blocks, strict=True))
-        return cls(*inputs(*parts, starts))
-
-    def map(self, p: FloatArray, base: FloatArray | None, kernels: Any) -> FloatArray:
-        """Return `Subspace.map` of *p* (m, k), k a multiple of 3."""
-        x = np.empty((len(self.rows), p.shape[1]))
-        (added,) = inputs(_NOTHING if base is None else base)
-        kernels.map_packed(
-            x, added, writable(p), self.rows, self.columns, self.weights, self.starts
-        )
-        return x
-
-    def adjoints(self, ys: Sequence[FloatArray], n_columns: int, kernels: Any) -> list[FloatArray]:
-        """Return `Subspace.adjoint` of each of *ys* (n, 3), two at a time."""
-        result = []
-        for k in range(0, len(ys), 2):
-            y, z = ys[k], (ys[k + 1] if k + 1 < len(ys) else None)
-            p = np.zeros((6 if z is not None else 3, n_columns))
-            beside = _NOTHING if z is None else writable(z)
-            kernels.add_packed_adjoint(
-                p, writable(y), beside, self.rows, self.columns, self.weights, self.starts
-            )
-            result += [p[d : d + 3].T for d in range(0, len(p), 3)]
-        return result
 
 
 def _add_product(
@@ -289,7 +214,7 @@ def _add_product(
     size = max(_CACHED_NUMBERS // block.shape[1], 1)
     if kernels:
         arguments = *inputs(rows, block), writable(p.T)
-        size = max(8 * size, -(-len(rows) // _MOST_TASKS))
+        size = max(8 * size, -(-len(rows) // 16))  # a call takes some microseconds
 
     def add(start: int, stop: int) -> None:
         _begin_rows(x, rows, base, start, stop)
@@ -325,9 +250,9 @@ def _add_interpolated(
     in_parallel(
         move,
         len(at_nodes),
-        max(_CACHED_NUMBERS // block.shape[1], -(-len(at_nodes) // _MOST_TASKS)),
+        max(_CACHED_NUMBERS // block.shape[1], -(-len(at_nodes) // 16)),
     )
-    in_parallel(add, len(rows), max(_CACHED_NUMBERS // 27, -(-len(rows) // _MOST_TASKS)))
+    in_parallel(add, len(rows), max(_CACHED_NUMBERS // 27, -(-len(rows) // 16)))
 
 
 def _begin_rows(
@@ -418,8 +343,8 @@ def cage_subspace(
             continue
         is_large = np.count_nonzero(weights) * cage.n_vertices > sizes.SINGLE_PRECISION
         block = np.empty((len(members), cage.n_vertices), np.float32 if is_large else np.float64)
-        for start in range(0, len(members), _VERTICES_AT_ONCE):
-            piece = slice(start, min(start + _VERTICES_AT_ONCE, len(members)))
+        for start in range(0, len(members), ROWS_AT_ONCE):
+            piece = slice(start, min(start + ROWS_AT_ONCE, len(members)))
             ways = part(share, start / len(members), piece.stop / len(members))
             w = mean_value_coordinates(points[piece], cage.vertices, cage.faces, progress=ways)
             w *= weights[r, members[piece]][:, None]
@@ -458,6 +383,4 @@ def _check_cages(regions: Regions, cages: Sequence[Cage]) -> None:
                 f"the cage of region {r} is more than {_LARGEST_CAGE:.0f} times as large as the "
                 "mesh and hardly moves it; fit it more tightly"
             )
-        if not encloses_region(cage, regions, r):
-            members = mesh.vertices[regions.membership[r]]
-            cage.require_encloses(members, f"vertices of region {r}")
+        require_enclosed(cage, regions, r, f"region {r}")

@@ -1,7 +1,6 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
-    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`,
-                    `local_volume.LocalVolume`
+    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -13,7 +12,6 @@
     half_edges      `topology.HalfEdges`, `grouping.connected`, `grouping.first_equal_row`
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
-    paths           `blending.border_distance`
     shells          `shells.shell_volumes`, `shells.shell_depths`
     text            `number_lines.numbers_of`, `number_lines.Lines`, `ply_tables.tables_of`
 
@@ -37,8 +35,7 @@ from .interpolated import add_interpolated, add_interpolated_adjoint, interpolat
 from .mean_value import weights
 from .normals import ring_normals, rings
 from .pairs import facing_pairs, opposite_pairs
-from .paths import distances_inside
-from .products import add_adjoint, add_packed_adjoint, add_product, map_packed
+from .products import add_adjoint, add_product
 from .rotations import rotations
 from .shells import shell_extremes, shell_sums, shells_around
 from .text import (
@@ -49,7 +46,6 @@ from .text import (
 )
 from .volumes import (
     determinants,
-    opposite_volumes,
     volume_along_sums,
     volume_gradient,
     volume_sums,
@@ -59,7 +55,6 @@ __all__ = [
     "add_adjoint",
     "add_interpolated",
     "add_interpolated_adjoint",
-    "add_packed_adjoint",
     "add_product",
     "add_upper",
     "border_half_edges",
@@ -68,20 +63,17 @@ __all__ = [
     "collapse_costs",
     "corners_of_lines",
     "determinants",
-    "distances_inside",
     "facing_pairs",
     "first_equal_points",
     "grow_tree",
     "independent_edges",
     "interpolated_rows",
     "link",
-    "map_packed",
     "may_meet",
     "number_trees",
     "numbers_of_lines",
     "one_fan_each",
     "opposite_pairs",
-    "opposite_volumes",
     "pair_half_edges",
     "plain_numbers",
     "ring_normals",

@@ -1,7 +1,7 @@
 """A round of edge collapses, for `cages.simplify`; to the bit what its numpy does.
 
-Row v of *sums* (n, 12) is accumulated in vertex v: the entries xx, xy, xz, yy, yz, zz of A, then b,
-c, the area and the need.
+Row v of *sums* (n, 11) is accumulated in vertex v: the entries xx, xy, xz, yy, yz, zz of A, then b,
+c and the area.
 """
 
 from __future__ import annotations
@@ -94,11 +94,7 @@ def collapse_costs(
             sums[v, 7] + sums[w, 7],
             sums[v, 8] + sums[w, 8],
         )
-        c, area, need = (
-            sums[v, 9] + sums[w, 9],
-            sums[v, 10] + sums[w, 10],
-            sums[v, 11] + sums[w, 11],
-        )
+        c, area = sums[v, 9] + sums[w, 9], sums[v, 10] + sums[w, 10]
         x = 0.5 * (points[v, 0] + points[w, 0])
         y = 0.5 * (points[v, 1] + points[w, 1])
         z = 0.5 * (points[v, 2] + points[w, 2])
@@ -121,9 +117,7 @@ def collapse_costs(
             points[v, 1] - points[w, 1],
             points[v, 2] - points[w, 2],
         )
-        long = square * area * ((dx * dx + dy * dy) + dz * dz)
-        dense = need / area
-        cost[e] = (error + long) * (dense * dense)
+        cost[e] = error + square * area * ((dx * dx + dy * dy) + dz * dz)
         place[e, 0], place[e, 1], place[e, 2] = x, y, z
 
 

@@ -1,4 +1,4 @@
-"""Products of W~ with a few columns, for `products`; accumulated in double precision.
+"""Products of W~ with a few columns, for `subspace.Subspace`; accumulated in double precision.
 
 Several rows are processed at a time, so that the columns are read less often.
 """
@@ -10,7 +10,6 @@ import numpy as np
 from .kernels import kernel
 
 _compile = kernel(fastmath={"reassoc", "contract"})
-_IN_A_ROW = 1 << 14  # numbers that are read in forward order, for prefetching
 
 
 @_compile(
@@ -131,77 +130,3 @@ def add_adjoint(p, rows, block, y):
             px[j] += t * x0
             py[j] += t * y0
             pz[j] += t * z0
-
-
-@_compile()
-def _add_adjoints(p, rows, block, y, z):
-    """Do `add_adjoint` for both *y* and *z*, to *p* (6, m), reading the block once."""
-    m = block.shape[1]
-    p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
-    two = len(rows) // 2 * 2
-    for i in range(0, two, 2):
-        b, c, q, r = block[i], block[i + 1], np.uint64(rows[i]), np.uint64(rows[i + 1])
-        s0, s1, s2, s3, s4, s5 = y[q, 0], y[q, 1], y[q, 2], z[q, 0], z[q, 1], z[q, 2]
-        t0, t1, t2, t3, t4, t5 = y[r, 0], y[r, 1], y[r, 2], z[r, 0], z[r, 1], z[r, 2]
-        for j in range(m):
-            s, t = float(b[j]), float(c[j])
-            p0[j] += s * s0 + t * t0
-            p1[j] += s * s1 + t * t1
-            p2[j] += s * s2 + t * t2
-            p3[j] += s * s3 + t * t3
-            p4[j] += s * s4 + t * t4
-            p5[j] += s * s5 + t * t5
-    if two < len(rows):
-        add_adjoint(p[:3], rows[two:], block[two:], y)
-        add_adjoint(p[3:], rows[two:], block[two:], z)
-
-
-@_compile("f8[:,:], const f8[:,:], f8[:,:], const i8[:], const i8[:], const f8[:], const i8[:,:]")
-def map_packed(x, base, p, rows, columns, weights, starts):
-    """Put W~ @ p into *x* for all packed blocks of `subspace.Subspace`; *p* is (m, k), k by threes.
-
-    *base* (n, 3) is added to the first three columns unless empty.
-    """
-    here, k = np.empty(p.size), p.shape[1]
-    first = np.int64(0)  # a literal would compile `add_product` once more
-    for g in range(len(starts) - 1):
-        ids = rows[starts[g, 0] : starts[g + 1, 0]]
-        own = columns[starts[g, 1] : starts[g + 1, 1]]
-        n, c = len(ids), len(own)
-        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
-        some = here[: k * c].reshape((k, c))
-        for j in range(c):
-            for d in range(k):
-                some[d, j] = p[own[j], d]
-        for i in ids:
-            for d in range(k):
-                x[i, d] = base[i, d] if d < 3 and len(base) > 0 else 0.0
-        add_product(x, ids, block, some, first, n)
-
-
-@_compile("f8[:,:], f8[:,:], f8[:,:], const i8[:], const i8[:], const f8[:], const i8[:,:]")
-def add_packed_adjoint(p, y, z, rows, columns, weights, starts):
-    """Add (W~.T @ y).T to *p* (3, m), for *y* (n, 3); or of *y* and *z*, one below the other.
-
-    Without a second one, *z* is empty.
-    From the last group to the first, and in each from its last rows on: these are what
-    `map_packed` has left in the cache, as this leaves it the first.
-    """
-    here = np.empty(p.size)
-    for g in range(len(starts) - 2, -1, -1):
-        ids = rows[starts[g, 0] : starts[g + 1, 0]]
-        own = columns[starts[g, 1] : starts[g + 1, 1]]
-        n, c = len(ids), len(own)
-        block = weights[starts[g, 2] : starts[g + 1, 2]].reshape((n, c))
-        some = here[: len(p) * c].reshape((len(p), c))
-        some[:] = 0.0
-        step = max(_IN_A_ROW // c, 4)
-        for k in range((n - 1) // step, -1, -1):
-            piece = slice(k * step, min((k + 1) * step, n))
-            if len(z) == 0:
-                add_adjoint(some, ids[piece], block[piece], y)
-            else:
-                _add_adjoints(some, ids[piece], block[piece], y, z)
-        for d in range(len(p)):
-            for j in range(c):
-                p[d, own[j]] += some[d, j]

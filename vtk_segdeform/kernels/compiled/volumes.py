@@ -1,4 +1,4 @@
-"""Sums over triangles, for `volume` and `local_volume`."""
+"""Sums over triangles, for `volume`."""
 
 from __future__ import annotations
 
@@ -80,20 +80,3 @@ def volume_gradient(x, faces, out):
             out[corner, 0] += nx
             out[corner, 1] += ny
             out[corner, 2] += nz
-
-
-@_compile("const f8[:,:], const i8[:,:], const i8[:], f8[:]")
-def opposite_volumes(x, faces, opposite, out):
-    """Add the volumes of the tetrahedra from the faces at each vertex to its opposite to *out*.
-
-    A third of each, for *out* (n,) and *opposite* (n,).
-    """
-    for f in range(len(faces)):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-        nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
-        for corner in (i, j, k):
-            o = opposite[corner]
-            height = (x[i, 0] - x[o, 0]) * nx + (x[i, 1] - x[o, 1]) * ny + (x[i, 2] - x[o, 2]) * nz
-            out[corner] += height / 18.0

@@ -1,21 +1,24 @@
-"""Edits of a session by subject: its handles and its regions, each edit one undo step."""
+"""Edits of the handles of a session, each one undo step."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray
-from ..deformer import checked_radius
+from ..arrays import FloatArray, IntArray, frozen
+from ..deformer import checked_point, checked_radius
 from ..geometry import rigid_fit
-from ..regions import Regions
-from . import handles, naming, painting, pulls
+from . import handles, pulls
 from .poses import Poses
 from .state import State
 from .timeline import Timeline
+
+_T = TypeVar("_T")
 
 
 class Handles(Mapping[str, IntArray]):
@@ -64,12 +67,15 @@ class Handles(Mapping[str, IntArray]):
 
     def remove(self, *names: str) -> None:
         """Remove one or more handles, in one undo step."""
-        after = self._state
+        state = self._state
         for name in names:
-            after = handles.without_handle(after, name)
+            handles.require_handle(state.handles, name)
+            state = replace(
+                state, handles=_without(state.handles, name), pivots=_without(state.pivots, name)
+            )
         if names:
             label = names[0] if len(names) == 1 else f"{len(names)} handles"
-            self._step(f"remove {label}", after)
+            self._step(f"remove {label}", state)
 
     def rename(self, name: str, new_name: str) -> None:
         """Rename a handle."""
@@ -121,8 +127,7 @@ class Handles(Mapping[str, IntArray]):
         ids, at_rest = state.handles[name], state.pivots.get(name)
         if at_rest is None:
             return np.asarray(self._vertices[ids].mean(axis=0))
-        at = handles.targets_of(self._poses.mesh, state)
-        R, shift = rigid_fit(self._poses.mesh.vertices[ids], at[name])
+        R, shift = self._motion(name)
         return np.asarray(R @ at_rest + shift)
 
     def set_pivot(self, name: str, point: ArrayLike | None) -> None:
@@ -137,9 +142,22 @@ class Handles(Mapping[str, IntArray]):
         """
         if point is None and name in self._state.handles and name not in self._state.pivots:
             return
-        after = handles.with_pivot(self._poses.mesh, self._state, name, point)
+        handles.require_handle(self._state.handles, name)
+        pivots = dict(self._state.pivots)
+        if point is None:
+            del pivots[name]
+        else:
+            place = checked_point(point, "point")
+            handles.require_near(self._poses.mesh, place, "coordinates of point")
+            R, shift = self._motion(name)
+            pivots[name] = frozen((place - shift) @ R)
         label = f"{'reset' if point is None else 'move'} the pivot of {name}"
-        self._history.step(label, after)
+        self._history.step(label, replace(self._state, pivots=MappingProxyType(pivots)))
+
+    def _motion(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return the rotation (3, 3) and the shift (3,) of a handle's targets since rest."""
+        mesh, state = self._poses.mesh, self._state
+        return rigid_fit(mesh.vertices[state.handles[name]], handles.targets_of(mesh, state)[name])
 
     @property
     def _state(self) -> State:
@@ -150,67 +168,23 @@ class Handles(Mapping[str, IntArray]):
         return self._poses.vertices(self._state, live=self._history.drag is not None)
 
     def _step(self, label: str, after: State) -> None:
-        """Record a step to *after* with targets for its handles; the mesh does not move."""
+        """Record a step to *after*; the mesh does not move.
+
+        Handles that were there keep their targets; those of others are where they are now.
+        """
         if after.pose is not None:
-            after = handles.with_targets(self._state, after, self._vertices)
+            own, kept = self._state.handles, after.pose.targets
+            here = handles.targets_at(after.handles, self._vertices)
+            targets = {
+                name: kept[name] if own.get(name) is ids else here[name]
+                for name, ids in after.handles.items()
+            }
+            pose = replace(after.pose, targets=MappingProxyType(targets))
+            after = replace(after, pose=pose)
         self._history.step(label, after)
 
 
-class Painting:
-    """Edits of the regions of a session, which keep their names.
-
-    The pose is reset, and the cages are kept if each still encloses its region.
-    """
-
-    def __init__(self, history: Timeline, poses: Poses) -> None:
-        self._history, self._poses = history, poses
-
-    def paint(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
-        """Add vertices to a region, or with *subtract* remove them; see `painting.painted`.
-
-        If *region* equals the number of regions, a new region is added.  If there are no regions
-        yet, the first one is created and contains all vertices.
-        """
-        names, name = self._state.region_names, naming.region_name(self._state.region_names, region)
-        after = painting.painted(self._regions, region, vertices, subtract=subtract, name=name)
-        self._history.step(f"paint {name}", painting.with_regions(self._state, after, names))
-
-    def merge(self, which: Sequence[int]) -> None:
-        """Merge two or more regions into the first of them, which keeps the first name."""
-        after = painting.merged(self._regions, which)
-        names = naming.merged(self._state.region_names, [int(region) for region in which])
-        self._history.step("merge regions", painting.with_regions(self._state, after, names))
-
-    def split(
-        self, region: int, vertices: ArrayLike | None = None, *, overlap: int | None = None
-    ) -> None:
-        """Split *vertices* off a region, by default half of it; see `painting.split`.
-
-        The remaining part keeps the name.  The new region comes last; next to "arm" it is "arm 2".
-        """
-        regions, name = self._regions, naming.region_name(self._state.region_names, region)
-        after = painting.split(regions, region, vertices, overlap=overlap, name=name)
-        names = naming.split(self._state.region_names, int(region), regions.n_regions)
-        self._history.step(f"split {name}", painting.with_regions(self._state, after, names))
-
-    def rename(self, region: int, name: str) -> None:
-        """Rename a region; "" removes its name.
-
-        Painting, merging and splitting keep names; `segment` and `set_regions` remove them.
-
-        Raises
-        ------
-        RegionError
-            If there is no such region, *name* is the name of another region, or it is not printable
-            text of at most 80 characters.
-        """
-        label, after = painting.renamed(self._state, region, name)
-        self._history.step(label, after)
-
-    @property
-    def _state(self) -> State:
-        return self._history.state
-
-    @property
-    def _regions(self) -> Regions:
-        return self._state.regions or Regions.single(self._poses.mesh)
+def _without(mapping: Mapping[str, _T], name: str) -> Mapping[str, _T]:
+    if name not in mapping:
+        return mapping
+    return MappingProxyType({other: each for other, each in mapping.items() if other != name})
