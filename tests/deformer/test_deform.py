@@ -61,12 +61,16 @@ def test_a_way_is_solved_target_by_target():
 
 
 def test_a_body_is_wound_up_the_way_through_which_it_is_led():
-    """Three quarters of a turn at once would be a quarter the other way."""
+    """Three quarters of a turn at once would be a quarter the other way.
+
+    With half as many cage vertices the body springs back.
+    """
+    options = {**OPTIONS, "n_cage_vertices": 80}
     axis = (1.0, 0.0, 0.0)
     way = [SCENE.turned(degrees, axis) for degrees in (90, 180, 270)]
     given = SCENE.mesh, SCENE.fixed, SCENE.handle
-    wound = deform(*given, way[-1], through=way[:-1], **OPTIONS).vertices
-    short = deform(*given, way[-1], **OPTIONS).vertices
+    wound = deform(*given, way[-1], through=way[:-1], **options).vertices
+    short = deform(*given, way[-1], **options).vertices
     middle = np.flatnonzero(np.abs(X[:, 0]) < 0.3)
 
     def turned(x):
