@@ -417,8 +417,6 @@ def test_mean_value_coordinates_agree_at_any_point(twin):
     assert_allclose(quick @ p, points, atol=1e-11)
 
 
-
-
 def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
     pytest.importorskip("numba")
     from vtk_segdeform.kernels.compiled import add_adjoint, solve_factored

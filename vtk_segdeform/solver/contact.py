@@ -265,7 +265,7 @@ class Contact:
         n, e = self.surface.normals(y), y[a] - y[b]
         in_front = np.asarray(np.einsum("ij,ij->i", n[b], e) > 0.0)
         in_front &= np.einsum("ij,ij->i", n[a], e) < 0.0
-        return pairs[in_front]
+        return np.asarray(pairs[in_front])
 
     def _active(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> _Pairs | None:
         """Return the active pairs at *p*, if there are any."""
