@@ -36,7 +36,7 @@ _TEXT = """\
 A hand turns the end of a limb by 84 degrees, turns back through the start to 48 degrees on the \
 other side, flicks, hesitates and returns; or it pulls the tip as far. *Random limbs* is a solid \
 made at run time. A frame is one call of `Session.drag` or `Session.pull` with as many steps as \
-the widgets take (3 to 8, by the time of the last ones), or while the hand hesitates of \
+the widgets take (8 at most), or while the hand hesitates of \
 `Session.refine`, until the pose has settled. All times are of the processor, summed over its \
 cores. *ARAP* is one iteration of libigl's as-rigid-as-possible deformation of the same mesh, in \
 the same process. *Away* is the largest distance of a shown pose from the converged one, in \

@@ -451,8 +451,8 @@ class Session(Described):
             Targets by the name of the handle, where other handles keep theirs; or the targets of
             all handles, concatenated.
         max_steps : int, optional
-            Stop after this number of solver steps; the next move, or `refine`, continues.  3 to 8
-            are enough for the frames of a drag.
+            Stop after this number of solver steps; the next move, or `refine`, continues.  8 are
+            enough for the frames of a drag.
 
         Returns
         -------

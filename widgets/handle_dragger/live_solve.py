@@ -16,8 +16,8 @@ from vtk_segdeform.solver import Solution
 
 from ..scene import Draft, Stop, View
 
-STEPS = 5
-"""Steps at an event or a tick, at most: some 50 ms where a body buckles."""
+STEPS = 8
+"""Steps at an event or a tick, at most: with 5, some frames of a pull are 1 % of the diagonal away."""
 _PERIOD = 40  # milliseconds between two refinements
 
 
