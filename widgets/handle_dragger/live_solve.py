@@ -17,7 +17,9 @@ from vtk_segdeform.solver import Solution
 from ..scene import Draft, Stop, View
 
 STEPS = 8
-"""Steps at an event or a tick, at most: with 5, some frames of a pull are 1 % of the diagonal away."""
+"""Steps at an event or a tick, at most.
+
+With 5, a pull has frames that are 1 % of the diagonal away from their poses, and takes as long."""
 _PERIOD = 40  # milliseconds between two refinements
 
 
