@@ -247,7 +247,7 @@ class Timeline:
         return label
 
     def _record(self, label: str, after: State) -> None:
-        """Add a step to *after*, in place of those that were undone."""
+        """Append a step that ends in *after*; steps that were undone are discarded."""
         _drop_weights(self._states[self._position], after)
         end = self._position + 1
         self._states[end:], self._labels[end:] = [after], [label]

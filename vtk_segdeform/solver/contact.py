@@ -57,7 +57,7 @@ _OF_MOTION = 0.5  # of a gap, which closes by motion; the rest by rotation of th
 _LARGEST = 2.0  # times the median: radii of samples, at most
 _SLACK = 2.5  # median (h_a + h_b): additional distance of a search
 _PARTS = 16  # of that distance, by which pairs are sorted
-_FARTHEST_SOUGHT = 0.1  # mesh sizes: distance of samples that are sought before a step
+_FARTHEST_SOUGHT = 0.1  # mesh sizes: distance up to which samples are checked before a step
 _ROOM = 50  # pairs per sample for which a search makes room
 _STIFFNESS = 1.5e5  # k, times the scale of the shape energy
 _TINY = 1e-30
@@ -233,8 +233,9 @@ class Contact:
     def share(self, p: FloatArray, step: FloatArray) -> float:
         """Return the share of a *step* (m, 3) from *p*, at most 1, for which pairs stay in reach.
 
-        Two samples that face each other may approach by their distance and D_ab, in whatever
-        direction, so that no step takes parts through each other, however far it leads.
+        Two samples that face each other may move, relative to each other, by their distance and a
+        typical D_ab.  A longer step could take them so far through each other that the term no
+        longer separates them.
         """
         surface = self.surface
         motion, room = surface.rows @ step, _DEPTH * surface.spacing
