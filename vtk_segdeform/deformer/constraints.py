@@ -5,13 +5,14 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..freezing import read_only
 from ..mesh import SurfacePoint
 from ..solver import (
@@ -27,6 +28,7 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
+from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -40,6 +42,8 @@ class HoldOptions:
     preserve_region_volumes: bool
     avoid_contact: bool
     lids: bool | None
+    goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
+    parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +123,11 @@ class Constraints:
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         preserved = enclosed.preserved(
-            handle, whole=options.preserve_volume, by_region=options.preserve_region_volumes
+            handle,
+            whole=options.preserve_volume,
+            by_region=options.preserve_region_volumes,
+            goals=options.goals,
+            parts=options.parts,
         )
         contact = _contact(problem, ids) if options.avoid_contact else None
         terms: tuple[Term, ...] = () if contact is None else (contact,)
@@ -143,6 +151,11 @@ class Constraints:
         vars(self).update(state)
         for each in (self.fixed, self.handle):
             each.setflags(write=False)
+
+    @property
+    def n_bounds(self) -> int:
+        """Number of volumes that are bounded only."""
+        return sum(each.bound != 0 for each in self.preserved.constraints)
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -35,7 +35,7 @@ from types import EllipsisType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, is_number, largest_length
+from ..arrays import FloatArray, IntArray, as_points, is_number, largest_length
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..errors import ArgumentError, ConstraintError
@@ -50,6 +50,7 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_parts,
     checked_place,
     checked_targets,
     require_together,
@@ -62,6 +63,7 @@ from .finishing import finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
+from .volume_goals import Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
@@ -96,6 +98,13 @@ class Deformer:
         each connected part: a bottle does, a sheet does not (`geometry.lids`).  True: all do.
         False: only closed ones do.  Without any volume, as `has_volume` tells, nothing is
         preserved and volume changes are 0.
+    volumes : mapping of str to str or float, optional
+        Goals by the names of volumes, as ``{"cavity": "-40%", "whole": "keep", "body 1": 2.5}``;
+        see `volume_goals` and `volume_names`.  They take precedence over what is preserved by
+        default.
+    parts : mapping of str to (k,) int or (n,) bool, optional
+        Vertices by the names of parts of the surface, whose volumes are those under a lid over
+        their borders; for *volumes*.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -141,6 +150,8 @@ class Deformer:
         preserve_volume: bool = True,
         preserve_region_volumes: bool = False,
         lids: bool | None = None,
+        volumes: Goals | None = None,
+        parts: Mapping[str, ArrayLike] | None = None,
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -160,6 +171,8 @@ class Deformer:
             preserve_region_volumes=as_flag(preserve_region_volumes, "preserve_region_volumes"),
             avoid_contact=as_flag(avoid_contact, "avoid_contact"),
             lids=as_lids(lids),
+            goals=checked_goals(volumes),
+            parts=checked_parts(mesh, parts),
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -200,12 +213,13 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        volumes: Goals | None = None,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
-        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
+        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``, ``volumes=None``
+        and ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
         *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
         flags = {
@@ -215,6 +229,8 @@ class Deformer:
         }
         given = {name: as_flag(flag, name) for name, flag in flags.items() if flag is not None}
         options = replace(self._options, **given)
+        if volumes is not None:
+            options = replace(options, goals=checked_goals(volumes))
         other = self._shared()
         if lids is not ... and as_lids(lids) is not options.lids:
             options = replace(options, lids=as_lids(lids))
@@ -316,6 +332,24 @@ class Deformer:
     def has_volume(self) -> bool:
         """Whether the mesh encloses a volume, with its lids if it is open."""
         return self._enclosed.total.has_volume
+
+    @property
+    def volume_names(self) -> tuple[str, ...]:
+        """The names of volumes, for *volumes*.
+
+        "whole"; "body 0", "body 1" ..., if there are several; of hollow bodies "cavity 0" ..., or
+        "cavity" and "wall" if there is one only; "component 0" ... of `Mesh.components`, if they
+        are several; "region 0" ... of the regions that enclose some; and the *parts*.
+        """
+        return (*self._enclosed.volume_names, *self._options.parts)
+
+    @one_blas_thread()
+    def volumes(self, vertices: ArrayLike | None = None) -> dict[str, float]:
+        """Return all volumes by name, in the mesh's unit cubed, at *vertices* (n, 3) or at rest."""
+        rest = self.mesh.vertices
+        x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
+        x = self._problem.frame.about_origin(x)
+        return self._enclosed.volumes(x, self._options.parts)
 
     @property
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:

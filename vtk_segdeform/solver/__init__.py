@@ -35,8 +35,12 @@ from .volume_constraints import (
     Bodies,
     VolumeConstraint,
     Volumes,
+    gradients,
     region_volumes,
     total_volume,
+    violations,
+    volumes_by_label,
+    with_same_points,
 )
 from .waypoints import LONGEST_MOVE, waypoints
 
@@ -63,6 +67,7 @@ __all__ = [
     "connected_sets",
     "constrained_step",
     "errors_at",
+    "gradients",
     "minimise",
     "moved_along",
     "position_term",
@@ -70,5 +75,8 @@ __all__ = [
     "scale_to_volume",
     "steps_to_volume",
     "total_volume",
+    "violations",
+    "volumes_by_label",
     "waypoints",
+    "with_same_points",
 ]

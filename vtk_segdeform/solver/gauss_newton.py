@@ -312,6 +312,20 @@ class GaussNewton:
         """Return H^-1 of *rows* (m, 3) each, with the H of (21), as directions of volumes."""
         return self._factor.solve_all([np.asarray(row) for row in rows])
 
+    def landed(self, p: FloatArray, targets: FloatArray) -> FloatArray:
+        """Return cages *p* (m, 3) moved onto the volumes, for positions *targets* (k, 3)."""
+        if not self.volumes.constraints:
+            return p
+        here = self._at(p, targets)
+        at = self.moved(p, self.directions(here.rows)).at
+        return at if np.isfinite(at).all() else p
+
+    def multipliers(self, p: FloatArray, targets: FloatArray) -> FloatArray:
+        """Return lambda (c,) at *p*: minus the change of half the minimum with each volume."""
+        here = self._at(p, targets)
+        still = np.zeros(len(here.rows))
+        return constrained_step(self._state.factor.solve_all, here.slope, here.rows, still)[1]
+
     def steadying(self, p: FloatArray, least: float) -> float:
         """Return the weight of anchors over the surface that make *p* a firm minimum.
 
