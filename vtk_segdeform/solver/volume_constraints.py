@@ -364,7 +364,7 @@ def volumes_by_label(
     n = mesh.n_vertices + len(lids.component)
     halves, owner = _borders(faces, face_labels, n)
     extension, centre = _with_centres(halves, n)
-    if lids.used.any():
+    if len(lids.component):
         extension = sparse.csr_array(extension @ lids.extension)
     constraints = {}
     for label in np.unique(face_labels).tolist():
