@@ -171,6 +171,13 @@ class Constraints:
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
 
+    def held_volumes(self, x: FloatArray) -> tuple[dict[str, float], float]:
+        """Return `Solution.volumes` and `volume_error`, of *x* (n, 3)."""
+        x = self.problem.frame.about_origin(x)
+        volumes = self.preserved.constraints
+        named = {each.name: each.target + each.violation(x) for each in volumes if each.name}
+        return named, max((each.missed(x) for each in volumes), default=0.0)
+
     @property
     def unmoved(self) -> IntArray:
         """`Solution.unmoved`."""

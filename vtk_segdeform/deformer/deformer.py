@@ -59,7 +59,7 @@ from .arguments import (
 from .as_printed import PaperDeformer
 from .constraints import Constraints, HoldOptions
 from .enclosed_volume import EnclosedVolume
-from .finishing import finish_of
+from .finishing import VOLUME_MET, finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
@@ -436,7 +436,7 @@ class Deformer:
         if self._is_plausible(solution.vertices, goal, before.p):
             return solution
         self._path = before
-        return self._missed(goal, solution)
+        return self._far(goal, solution)
 
     @one_blas_thread()
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
@@ -499,7 +499,7 @@ class Deformer:
             unfinished=unfinished,
             unmoved=self._constraints.unmoved,
         )
-        return replace(finished, status=self._missed_status if _is_off(finished) else found.status)
+        return replace(finished, status=self._missed(finished) or found.status)
 
     def _inward(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the *cage_vertices* of all cages in the coordinates of the solver, (m, 3)."""
@@ -578,7 +578,7 @@ class Deformer:
         at = problem.frame.in_scene(problem.map(before))
         return largest_length(x[some] - rest) <= largest_length(at[some] - rest)
 
-    def _missed(self, goal: FloatArray, solution: Solution) -> Solution:
+    def _far(self, goal: FloatArray, solution: Solution) -> Solution:
         """Return the current pose instead of *solution*, which is far from every reasonable one."""
         x = self._problem.frame.in_scene(self._problem.map(self._path.p))
         return replace(
@@ -592,18 +592,17 @@ class Deformer:
         )
 
     def _or_missed(self, status: Status, solution: Solution) -> Status:
-        """Return *status*, but that handles are off if a converged *solution* misses its places."""
-        return self._missed_status if status is Status.CONVERGED and _is_off(solution) else status
+        """Return *status*, or what a converged *solution* misses."""
+        return (self._missed(solution) if status is Status.CONVERGED else None) or status
 
-    @property
-    def _missed_status(self) -> Status:
-        is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
-        return Status.MISSED if is_free else Status.ALL_HELD
-
-
-def _is_off(solution: Solution) -> bool:
-    """Return whether handles or fixed vertices of *solution* are off their places."""
-    return max(solution.handle_error, solution.fixed_error) > _MET
+    def _missed(self, solution: Solution) -> Status | None:
+        """Return the status of a *solution* whose handles or volumes are off, or None."""
+        if max(solution.handle_error, solution.fixed_error) > _MET:
+            is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
+            return Status.MISSED if is_free else Status.ALL_HELD
+        has_goals = any(each.name for each in self.preserved_volumes)
+        is_off = has_goals and solution.volume_error > VOLUME_MET
+        return Status.VOLUME_MISSED if is_off else None
 
 
 def _counting(progress: Progress | None) -> Progress | None:

@@ -12,7 +12,8 @@ from ..progress import Progress
 from .constraints import Constraints
 from .path import Path
 
-_VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
+VOLUME_MET = 1e-9
+"""Relative error of a volume, at most; a finish with a larger error is not used."""
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -38,19 +39,25 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
-    finisher = Finisher(
-        problem.rest_pose,
-        problem.cell_energy,
-        held,
-        preserved,
-        problem.cage_weights,
-        progress,
-        avoid_contact=constraints.contact is not None,
-    )
-    found = finisher.run(pose, places[held], progress, start=start)
+    active = set(path.active_volumes)
+    while True:
+        finisher = Finisher(
+            problem.rest_pose,
+            problem.cell_energy,
+            held,
+            [preserved[k] for k in sorted(active)],
+            problem.cage_weights,
+            progress,
+            avoid_contact=constraints.contact is not None,
+        )
+        found = finisher.run(pose, places[held], progress, start=start)
+        off = [each.missed(found.vertices) for each in preserved]
+        missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
+        if not missed:
+            break
+        active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    off = [abs(each.relative(found.vertices)) for each in preserved]
-    return replace(found, vertices=start) if max(off, default=0.0) > _VOLUME_KEPT else found
+    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

@@ -57,7 +57,7 @@ class Path:
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
     targets: FloatArray  # (k, 3)
-    active: tuple[int, ...] = ()  # the volumes that hold: all but bounds that the pose is within
+    active: tuple[int, ...] = ()  # `active_volumes`, of a mesh that is not scaled
     is_on_volumes: bool = True
 
     @classmethod
@@ -125,18 +125,19 @@ class Path:
     def _continue_from(self, p: FloatArray) -> None:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
-        volumes = self.constraints.preserved.volumes.among(self._all_active)
+        volumes = self.constraints.preserved.volumes.among(self.active_volumes)
         self.solver.volumes = volumes.preserved_at(p)
 
     @property
-    def _all_active(self) -> tuple[int, ...]:
+    def active_volumes(self) -> tuple[int, ...]:
+        """The numbers of the volumes that hold: all but bounds that the pose is within."""
         preserved, _, scaled = self.constraints.preserved
         return self.active if scaled is None else tuple(range(len(preserved)))
 
     @property
     def _preserved(self) -> list[VolumeConstraint]:
         """The volumes that hold."""
-        return [self.constraints.preserved.constraints[k] for k in self._all_active]
+        return [self.constraints.preserved.constraints[k] for k in self.active_volumes]
 
     def _missed(self) -> list[bool]:
         """Return which volumes the pose misses."""

@@ -43,6 +43,10 @@ class Status(enum.Enum):
         "the cages cannot reach this pose: add cage vertices, move less, or leave more room "
         "between handle and fixed vertices"
     )
+    VOLUME_MISSED = (
+        "a volume cannot be reached: change it less, set another one free, or leave more room "
+        "between handle and fixed vertices"
+    )
     ALL_HELD = (
         "all vertices are fixed or in handles, so nothing is free to move: subdivide the mesh, or "
         "leave vertices between handle and fixed vertices free"
@@ -82,6 +86,10 @@ class Solution(Described):
     solve with ``max_steps`` that has not converged."""
     unfinished: FloatArray | None = None
     """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
+    held_volumes: Callable[[FloatArray], tuple[dict[str, float], float]] = field(
+        default=lambda _: ({}, 0.0), repr=False
+    )
+    """Computes `volumes` and `volume_error`."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(k,) int: the connected parts of the mesh, numbered as in `Mesh.components`, that stay where
     they are: they have no handle and no fixed vertices, and share no region with a part that has
@@ -108,6 +116,7 @@ class Solution(Described):
             "errors": partial(_known, self._errors),
             "volume": partial(_known, self.volume_change),
             "region_volumes": partial(_known, self.region_volume_change),
+            "held_volumes": partial(_known, self._held_volumes),
         }
         return {each.name: vars(self)[each.name] for each in fields(self)} | measured
 
@@ -133,6 +142,20 @@ class Solution(Described):
     def fixed_error(self) -> float:
         """Largest distance of a fixed vertex from its place, in diagonals of the mesh."""
         return self._errors[1]
+
+    @cached_property
+    def _held_volumes(self) -> tuple[dict[str, float], float]:
+        return self.held_volumes(self.vertices)
+
+    @property
+    def volumes(self) -> dict[str, float]:
+        """The volumes with goals, by name, in the mesh's unit cubed; see `Deformer`."""
+        return self._held_volumes[0]
+
+    @property
+    def volume_error(self) -> float:
+        """Largest error of a volume that is preserved, set or bounded, relative to it."""
+        return self._held_volumes[1]
 
     @cached_property
     def volume_change(self) -> float:
