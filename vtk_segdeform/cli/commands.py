@@ -33,6 +33,7 @@ from .outputs import (
     coloured_cages,
     coloured_regions,
     report_cages,
+    report_goals,
     report_pose,
     report_regions,
     report_session,
@@ -58,8 +59,11 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     if not mesh.is_closed:
         enclosed = lids_of(mesh, LIDS[options.lids])
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
-    fixed = _selected(options.fixed, surface, "fixed")
-    handle, path = _handles(options.handles, surface, fixed)
+    fixed = np.zeros(0, dtype=np.int64)
+    if options.fixed is not None:
+        fixed = _selected(options.fixed, surface, "fixed")
+    has_goals = bool(options.volume)
+    handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
     found = _regions(options, surface, part(progress, 0.0, 0.18))
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
@@ -72,7 +76,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options),
+        **_settings(options), **volume_settings(options, surface),
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
@@ -81,6 +85,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options.output, LIDS[options.lids])
     report_solution(stored, seconds, say)
+    report_goals(stored, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")
     if options.picture is not None:
@@ -208,8 +213,27 @@ def _settings(options: Namespace) -> dict[str, Any]:
     return settings
 
 
+def volume_settings(options: Namespace, surface: Surface) -> dict[str, Any]:
+    """Return the goals of ``--volume`` and the parts of ``--part``, as `Deformer` takes them."""
+    goals = dict(_named("--volume", text) for text in options.volume)
+    parts = dict(_named("--part", text) for text in options.part)
+    return {
+        "volumes": goals or None,
+        "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
+    }
+
+
+def _named(option: str, text: str) -> tuple[str, str]:
+    """Return the name and the value of an *option* "name=value"."""
+    name, equals, value = (word.strip() for word in text.partition("="))
+    if not (name and equals and value):
+        example = "whole=+10%" if option == "--volume" else "tip=z>90%"
+        raise ConstraintError(f"{option} must be a name and a value, as {example}; got {text!r}")
+    return name, value
+
+
 def _handles(
-    handles: list[dict[str, str]], surface: Surface, fixed: IntArray
+    handles: list[dict[str, str]], surface: Surface, fixed: IntArray, *, has_goals: bool
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the vertices (k,) of all handles, and their targets (k, 3): on the way, and last."""
     ids, mesh = [], surface.mesh
@@ -220,10 +244,17 @@ def _handles(
                 "after it"
             )
         ids.append(_selected(handle["select"], surface, "handle"))
+    if not ids:
+        if not has_goals:
+            raise ConstraintError("nothing would move: add --handle SEL with a motion, or --volume")
+        return np.zeros(0, dtype=np.int64), [np.empty((0, 3))]
     together = np.concatenate(ids)
     if len(np.unique(together)) < len(together):
         raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
-    at_rest, centre = [mesh.vertices[own] for own in ids], mesh.vertices[fixed].mean(axis=0)
+    at_rest, centre = (
+        [mesh.vertices[own] for own in ids],
+        mesh.vertices[fixed if len(fixed) else slice(None)].mean(axis=0),
+    )
     pairs = list(zip(at_rest, handles, strict=True))
     return together, [
         np.concatenate([_moved(points, handle, centre, share) for points, handle in pairs])

@@ -19,6 +19,7 @@ from ..solver import (
     Anchors,
     Contact,
     GaussNewton,
+    HeldVolumes,
     ScaledSurface,
     Term,
     connected_sets,
@@ -171,12 +172,14 @@ class Constraints:
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
 
-    def held_volumes(self, x: FloatArray) -> tuple[dict[str, float], float]:
-        """Return `Solution.volumes` and `volume_error`, of *x* (n, 3)."""
+    def held_volumes(self, x: FloatArray) -> HeldVolumes:
+        """Return the volumes of *x* (n, 3) that have goals."""
         x = self.problem.frame.about_origin(x)
         volumes = self.preserved.constraints
-        named = {each.name: each.target + each.violation(x) for each in volumes if each.name}
-        return named, max((each.missed(x) for each in volumes), default=0.0)
+        now = {each.name: each.target + each.violation(x) for each in volumes if each.name}
+        shares = {each.name: each.share * (1.0 + each.relative(x)) for each in volumes if each.name}
+        changes = {name: share - 1.0 for name, share in shares.items()}
+        return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
 
     @property
     def unmoved(self) -> IntArray:

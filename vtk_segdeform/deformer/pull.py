@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, require_cage_vertices, suggested_size
@@ -25,6 +27,7 @@ from .arguments import (
 )
 from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
+from .volume_goals import Goals
 
 
 def pull(
@@ -37,6 +40,8 @@ def pull(
     locality: float | None = None,
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
+    volumes: Goals | None = None,
+    parts: Mapping[str, ArrayLike] | None = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
     refine: bool | None = None,
@@ -67,6 +72,8 @@ def pull(
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
         Total number of cage vertices; by default it follows the number of regions.
+    volumes, parts : mappings, optional
+        Goals for volumes, by name, and named parts of the surface; see `Deformer`.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
@@ -119,8 +126,8 @@ def pull(
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
-        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,
-        progress=next(stages),
+        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, volumes=volumes, parts=parts,
+        avoid_contact=avoid_contact, progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)

@@ -29,7 +29,7 @@ from .exact_volume import (
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .newton import Step, constrained_step, minimise
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
-from .solution import CONVERGED, Solution, Status
+from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .terms import Term
 from .volume_constraints import (
     Bodies,
@@ -54,6 +54,7 @@ __all__ = [
     "Contact",
     "ContactSurface",
     "GaussNewton",
+    "HeldVolumes",
     "ScaledSurface",
     "Solution",
     "SolverOptions",

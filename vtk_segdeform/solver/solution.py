@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from ..mesh import Mesh
 
 _T = TypeVar("_T")
 _NAMED = 3  # parts in a sentence
+_NOTHING: dict[str, float] = {}
 
 
 CONVERGED = 1e-4
@@ -56,6 +58,14 @@ class Status(enum.Enum):
         return self.value
 
 
+class HeldVolumes(NamedTuple):
+    """The volumes of a pose that have goals, by name, their changes, and the largest error."""
+
+    volumes: Mapping[str, float] = _NOTHING
+    changes: Mapping[str, float] = _NOTHING
+    error: float = 0.0
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Described):
     """A pose of the mesh, in the coordinates of the mesh."""
@@ -86,10 +96,10 @@ class Solution(Described):
     solve with ``max_steps`` that has not converged."""
     unfinished: FloatArray | None = None
     """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
-    held_volumes: Callable[[FloatArray], tuple[dict[str, float], float]] = field(
-        default=lambda _: ({}, 0.0), repr=False
+    held_volumes: Callable[[FloatArray], HeldVolumes] = field(
+        default=lambda _: HeldVolumes(), repr=False
     )
-    """Computes `volumes` and `volume_error`."""
+    """Computes `volumes`, `volume_changes` and `volume_error`."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(k,) int: the connected parts of the mesh, numbered as in `Mesh.components`, that stay where
     they are: they have no handle and no fixed vertices, and share no region with a part that has
@@ -144,18 +154,23 @@ class Solution(Described):
         return self._errors[1]
 
     @cached_property
-    def _held_volumes(self) -> tuple[dict[str, float], float]:
+    def _held_volumes(self) -> HeldVolumes:
         return self.held_volumes(self.vertices)
 
     @property
     def volumes(self) -> dict[str, float]:
         """The volumes with goals, by name, in the mesh's unit cubed; see `Deformer`."""
-        return self._held_volumes[0]
+        return dict(self._held_volumes.volumes)
+
+    @property
+    def volume_changes(self) -> dict[str, float]:
+        """(V - V0) / V0 of the same, signed."""
+        return dict(self._held_volumes.changes)
 
     @property
     def volume_error(self) -> float:
         """Largest error of a volume that is preserved, set or bounded, relative to it."""
-        return self._held_volumes[1]
+        return self._held_volumes.error
 
     @cached_property
     def volume_change(self) -> float:
