@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from ..cages import Cage
 from ..energy import (
     Energy,
     Interior,
+    grown_gradients,
+    interior_weights,
     shape_energy,
     with_cage_stiffness,
     with_interior,
@@ -33,7 +35,7 @@ from ..regions import Regions
 from ..solver import CoarseVolume
 from ..subspace import cage_subspace
 
-_FORMAT = 14  # increment whenever the content of a binding changes
+_FORMAT = 15  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,7 @@ class Binding:
 
     energy: Energy
     coarse_volume: CoarseVolume
+    interior: FloatArray  # (k,): the weights of the points inside the body
 
     @classmethod
     def compute(cls, inputs: BindingInputs, progress: Progress | None = None) -> Binding:
@@ -112,9 +115,24 @@ class Binding:
         energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
         faces = [cage.faces for cage in cages]
         energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
-        energy = _with_interior(inputs, energy)
+        gradients, volumes = _interior(inputs, energy)
+        weights = interior_weights(energy, gradients, volumes)
+        energy = with_interior(energy, gradients, weights)
         coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
-        return cls(energy, coarse)
+        return cls(energy, coarse, weights)
+
+    def grown(self, inputs: BindingInputs, p: FloatArray) -> Binding:
+        """Return this binding of *inputs* with another shape to keep: that with cages *p* (m, 3).
+
+        The mesh depends on its cages as before, and its volumes are computed as before.
+        """
+        rest, subspace, clusters = inputs.rest, self.energy.subspace, _clusters(inputs)
+        shape = rest.with_vertices(subspace.map(p - inputs.rest_cages, rest.vertices))
+        energy = shape_energy(shape, subspace, inputs.stretch, clusters)
+        faces = [cage.faces for cage in inputs.cages]
+        energy = with_cage_stiffness(energy, p, faces, clusters)
+        gradients = grown_gradients(self.energy, self.interior, p)
+        return replace(self, energy=with_interior(energy, gradients, self.interior))
 
 
 def _clusters(inputs: BindingInputs) -> IntArray:
@@ -129,12 +147,11 @@ def _clusters(inputs: BindingInputs) -> IntArray:
     return cluster_within_parts(*some, shares=inputs.shares)[of_vertex]
 
 
-def _with_interior(inputs: BindingInputs, energy: Energy) -> Energy:
-    """Return *energy* with the rotations inside the bodies of the mesh."""
+def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatArray]:
+    """Return the gradients (k, 3, m) at points inside the bodies, and the volumes (k,) there."""
     mesh, regions = inputs.rest, inputs.regions
     ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
     p = np.split(inputs.rest_cages, ends)
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
     interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses)
-    gradients = interior.gradients(cages, energy.subspace)
-    return with_interior(energy, gradients, interior.volumes)
+    return interior.gradients(cages, energy.subspace), interior.volumes

@@ -103,9 +103,16 @@ class Constraints:
 
         By default at rest.  Raises a ConstraintError if they are no sets of vertices.
         """
-        problem = enclosed.problem
-        mesh, energy = problem.mesh, problem.energy
+        mesh = enclosed.problem.mesh
         fixed, handle = map(read_only, checked_constraints(mesh, fixed, handle))
+        preserved = enclosed.preserved(
+            handle,
+            whole=options.preserve_volume,
+            by_region=options.preserve_region_volumes,
+            goals=options.goals,
+            parts=options.parts,
+        )
+        problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(fixed), "fixed_at", "fixed")
@@ -123,13 +130,6 @@ class Constraints:
             start = problem.rest_cages
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved = enclosed.preserved(
-            handle,
-            whole=options.preserve_volume,
-            by_region=options.preserve_region_volumes,
-            goals=options.goals,
-            parts=options.parts,
-        )
         contact = _contact(problem, ids) if options.avoid_contact else None
         terms: tuple[Term, ...] = () if contact is None else (contact,)
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
@@ -152,6 +152,16 @@ class Constraints:
         vars(self).update(state)
         for each in (self.fixed, self.handle):
             each.setflags(write=False)
+
+    @property
+    def rest_cages(self) -> FloatArray:
+        """(m, 3): the cages of the shape without handles and fixed vertices."""
+        return self.preserved.rest_cages
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether volumes are set or bounded."""
+        return any(each.name for each in self.preserved.constraints)
 
     @property
     def n_bounds(self) -> int:

@@ -509,7 +509,7 @@ class Deformer:
     def _hold(self, constraints: Constraints) -> None:
         """Begin at rest, held by *constraints*."""
         rest = self._problem.rest.vertices[constraints.handle]
-        self._path = Path.begin(constraints, self._problem.rest_cages, rest)
+        self._path = Path.begin(constraints, constraints.rest_cages, rest)
 
     def _take_trial_step(self) -> None:
         """Compile the kernels, or load them, before the first frame needs them."""
@@ -602,8 +602,7 @@ class Deformer:
         if max(solution.handle_error, solution.fixed_error) > _MET:
             is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
             return Status.MISSED if is_free else Status.ALL_HELD
-        has_goals = any(each.name for each in self.preserved_volumes)
-        is_off = has_goals and solution.volume_error > VOLUME_MET
+        is_off = self._constraints.has_goals and solution.volume_error > VOLUME_MET
         return Status.VOLUME_MISSED if is_off else None
 
 

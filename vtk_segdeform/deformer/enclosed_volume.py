@@ -25,6 +25,7 @@ from ..solver import (
     volumes_by_label,
     with_same_points,
 )
+from .growth import grown_cages
 from .problem import Problem
 from .volume_goals import VolumeGoal, consistent, with_goal
 
@@ -43,6 +44,10 @@ class Preserved(NamedTuple):
     """On the surface of the steps."""
     scaled: ScaledSurface | None
     """If poses are scaled to their exact volume."""
+    problem: Problem
+    """With the shape that has these volumes; see `growth`."""
+    rest_cages: FloatArray
+    """(m, 3): its cages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +101,10 @@ class EnclosedVolume:
             body = numbers[of_component][problem.mesh.components]
             rest = problem.rest_pose.vertices
             scaled = ScaledSurface.of(problem.subspace, rest, preserved, body)
-        found = Preserved(preserved, volumes, scaled)
+        cages = problem.rest_cages
+        if goals and (grown := grown_cages(problem, volumes)) is not cages:
+            problem, cages = problem.grown(grown), grown
+        found = Preserved(preserved, volumes, scaled, problem, cages)
         if not goals:
             self._known[key] = found
         return found

@@ -24,6 +24,7 @@ from ..solver import (
     waypoints,
 )
 from .constraints import Constraints
+from .growth import VOLUME_LEG
 from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
@@ -31,7 +32,6 @@ _SOLVES_PER_SCALING = 4  # at most
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
-_VOLUME_LEG = 0.05  # of the logarithm of a volume, between waypoints
 _MISSED = 1e-9  # relative error of a volume that is not met
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
@@ -64,14 +64,14 @@ class Path:
     def begin(cls, constraints: Constraints, p: FloatArray, targets: FloatArray) -> Path:
         """Return a path that begins at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
         path = cls(constraints, constraints.solver.fresh(), p, p, targets)
-        preserved, _, scaled = constraints.preserved
-        is_rest = p is constraints.problem.rest_cages
+        preserved, scaled = constraints.preserved.constraints, constraints.preserved.scaled
+        is_rest = p is constraints.rest_cages
         if scaled is not None:
             if not is_rest:
                 path._continue_from(p)
             return path
         path.active = tuple(k for k, each in enumerate(preserved) if not each.bound)
-        off = () if is_rest and all(each.share == 1.0 for each in preserved) else path._missed()
+        off = () if is_rest and not constraints.has_goals else path._missed()
         path.is_on_volumes = not any(off)
         if len(path.active) < len(preserved) or not path.is_on_volumes:
             path._continue_from(p)
@@ -131,7 +131,8 @@ class Path:
     @property
     def active_volumes(self) -> tuple[int, ...]:
         """The numbers of the volumes that hold: all but bounds that the pose is within."""
-        preserved, _, scaled = self.constraints.preserved
+        scaled = self.constraints.preserved.scaled
+        preserved = self.constraints.preserved.constraints
         return self.active if scaled is None else tuple(range(len(preserved)))
 
     @property
@@ -146,14 +147,14 @@ class Path:
 
     def _change_volumes(self, options: SolverOptions) -> int:
         """Change the volumes to their targets, in legs; return the number of steps."""
-        preserved, volumes, _ = self.constraints.preserved
+        preserved, volumes, *_ = self.constraints.preserved
         x = self._problem.map(self.p)
         missed = {k for k, each in enumerate(preserved) if each.missed(x) > _MISSED}
         self.active = tuple(sorted({*self.active, *missed}))
         begin = volumes.among(self.active).preserved_at(self.p)
         ratios = [1.0 / (1.0 + preserved[k].relative(x)) for k in self.active]
         farthest = max(abs(math.log(ratio)) if ratio > 0.0 else 1.0 for ratio in ratios)
-        legs, steps = math.ceil(farthest / _VOLUME_LEG), 0
+        legs, steps = math.ceil(farthest / VOLUME_LEG), 0
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
         for leg in range(1, legs + 1):
             share = leg / legs
@@ -171,7 +172,7 @@ class Path:
         """Let the active volumes have the targets of *constraints*, and move the cages there."""
         volumes = self.constraints.preserved.volumes.among(self.active)
         self.solver.volumes = replace(volumes, constraints=tuple(constraints))
-        self.p = self.end = self.solver.landed(self.end, self.constraints.places(self.targets))
+        self.p = self.end = self.solver.landed(self.end)
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
         """Let bounds hold that the mesh *x* (n, 3) misses, or release those that it pulls against.

@@ -6,7 +6,7 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 
@@ -44,6 +44,8 @@ class Problem:
     rest: Mesh  # in the coordinates of the solver
     rest_pose: Mesh  # in those of poses
     rest_cages: FloatArray  # (m, 3), stacked
+    shape: Mesh  # whose detail and lengths are kept, in the coordinates of poses: at rest or grown
+    inputs: BindingInputs
     binding: Binding
 
     @classmethod
@@ -67,7 +69,17 @@ class Problem:
         binding = cached_binding(inputs, cache, progress)
         at_origin = frame.about_origin(mesh.vertices)
         rest_pose = mesh.with_vertices(at_origin) if frame.is_far else mesh
-        return cls(mesh, regions, cages, frame, rest, rest_pose, rest_cages, binding)
+        parts = mesh, regions, cages, frame, rest, rest_pose, rest_cages
+        return cls(*parts, shape=rest_pose, inputs=inputs, binding=binding)
+
+    def grown(self, p: FloatArray) -> Problem:
+        """Return the problem whose shape to keep is that of cages *p* (m, 3); see `growth`."""
+        shape = self.rest_pose.with_vertices(self.map(p))
+        other = replace(self, shape=shape, binding=self.binding.grown(self.inputs, p))
+        for name in ("samples", "linked_parts", "cage_weights"):
+            if name in vars(self):
+                vars(other)[name] = vars(self)[name]
+        return other
 
     @property
     def energy(self) -> Energy:
@@ -140,7 +152,7 @@ class Problem:
     @cached_property
     def cell_energy(self) -> CellEnergy:
         """The energy of the finish."""
-        return CellEnergy.of(self.rest_pose, self.mesh.n_vertices / len(self.rest_cages))
+        return CellEnergy.of(self.shape, self.mesh.n_vertices / len(self.rest_cages))
 
     @cached_property
     def cage_weights(self) -> FloatArray:
