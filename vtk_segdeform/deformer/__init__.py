@@ -44,17 +44,20 @@ from .deform import deform, finished, solved_along
 from .deformer import Deformer
 from .problem import Problem
 from .pull import pull
+from .volume_goals import Goals, checked_goals
 
 __all__ = [
     "FARTHEST_APART",
     "LOCALITY",
     "SPREAD",
     "Deformer",
+    "Goals",
     "PaperDeformer",
     "PaperSolution",
     "Problem",
     "automatic_locality",
     "checked_constraints",
+    "checked_goals",
     "checked_locality",
     "checked_place",
     "checked_point",

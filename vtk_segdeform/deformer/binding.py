@@ -13,6 +13,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -82,6 +83,18 @@ class BindingInputs:
         weight = np.array([cage.n_vertices for cage in self.cages]) / np.maximum(each, 1)
         return np.asarray(np.bincount(numbers, weight[labels]))
 
+    @cached_property
+    def clusters(self) -> IntArray:
+        """The rotation cluster of each vertex, (n,): vertices that lie together."""
+        n, x, parts = self.rest.n_vertices, self.rest.vertices, self.parts
+        if self.n_clusters >= n:
+            return np.arange(n)
+        if n <= sizes.DECIMATED:
+            return cluster_within_parts(x, parts, self.n_clusters, shares=self.shares)
+        _, kept, of_vertex = decimated(self.regions.mesh, sizes.DECIMATED_POINTS)
+        some = x[kept], parts[kept], self.n_clusters
+        return cluster_within_parts(*some, shares=self.shares)[of_vertex]
+
     def digest(self) -> str:
         """Return 40 hexadecimal digits that are equal exactly for equal inputs."""
         regions = self.regions
@@ -110,7 +123,7 @@ class Binding:
         share = part(progress, 0.0, 0.38)  # shares of the time for 5,000 to 300,000 vertices
         subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
-        clusters = _clusters(inputs)
+        clusters = inputs.clusters
         share = part(progress, 0.4, 0.9)
         energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
         faces = [cage.faces for cage in cages]
@@ -126,25 +139,13 @@ class Binding:
 
         The mesh depends on its cages as before, and its volumes are computed as before.
         """
-        rest, subspace, clusters = inputs.rest, self.energy.subspace, _clusters(inputs)
+        rest, subspace, clusters = inputs.rest, self.energy.subspace, inputs.clusters
         shape = rest.with_vertices(subspace.map(p - inputs.rest_cages, rest.vertices))
         energy = shape_energy(shape, subspace, inputs.stretch, clusters)
         faces = [cage.faces for cage in inputs.cages]
         energy = with_cage_stiffness(energy, p, faces, clusters)
         gradients = grown_gradients(self.energy, self.interior, p)
         return replace(self, energy=with_interior(energy, gradients, self.interior))
-
-
-def _clusters(inputs: BindingInputs) -> IntArray:
-    """Return the rotation cluster of each vertex, (n,): vertices that lie together."""
-    n, x, parts = inputs.rest.n_vertices, inputs.rest.vertices, inputs.parts
-    if inputs.n_clusters >= n:
-        return np.arange(n)
-    if n <= sizes.DECIMATED:
-        return cluster_within_parts(x, parts, inputs.n_clusters, shares=inputs.shares)
-    _, kept, of_vertex = decimated(inputs.regions.mesh, sizes.DECIMATED_POINTS)
-    some = x[kept], parts[kept], inputs.n_clusters
-    return cluster_within_parts(*some, shares=inputs.shares)[of_vertex]
 
 
 def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatArray]:

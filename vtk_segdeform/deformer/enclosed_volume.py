@@ -57,7 +57,7 @@ class EnclosedVolume:
     problem: Problem
     lids: Lids
     total: VolumeConstraint
-    _known: dict[bytes | bool, Preserved] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[object, ...], Preserved] = field(default_factory=dict, repr=False)
 
     @classmethod
     def under(cls, problem: Problem, lids: bool | None) -> EnclosedVolume:
@@ -84,8 +84,10 @@ class EnclosedVolume:
         count = len(self.bodies.volumes) if whole else 0
         named = [k for k in range(count) if f"body {k}" in goals]
         numbers = self.bodies.numbers(handle, named) if whole else _NONE
-        key = numbers.tobytes() if whole else by_region
-        if not goals and (found := self._known.get(key)) is not None:
+        key: tuple[object, ...] = numbers.tobytes() if whole else by_region, ()
+        if goals:
+            key = key[0], tuple(goals.items()), *(mask.tobytes() for mask in parts.values())
+        if (found := self._known.get(key)) is not None:
             return found
         problem = self.problem
         preserved = self.regions if by_region else ()
@@ -105,8 +107,9 @@ class EnclosedVolume:
         if goals and (grown := grown_cages(problem, volumes)) is not cages:
             problem, cages = problem.grown(grown), grown
         found = Preserved(preserved, volumes, scaled, problem, cages)
-        if not goals:
-            self._known[key] = found
+        for old in [old for old in self._known if goals and old[1]]:
+            del self._known[old]  # one set of goals is enough
+        self._known[key] = found
         return found
 
     def _with_goals(

@@ -612,6 +612,33 @@ class Session(Described):
         grip = _Placed(pose, tuple(places))
         self.history.move(replace(self.state, pose=pose), name, grip=grip)
 
+    def volumes(self) -> dict[str, float]:
+        """Return all volumes of the pose by name, in the mesh's unit cubed; see `Deformer`."""
+        return self.deformer.volumes(self.vertices)
+
+    def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
+        """Change the volume called *name*, as part of a drag, like `drag`.
+
+        Parameters
+        ----------
+        name : str
+            One of `Deformer.volume_names`, as of `deformer`.
+        goal : str or float
+            As "keep", "free", "-40%", "at most 2.5" or 2.5; see `Deformer`.
+        max_steps : int, optional
+            As in `drag`.
+
+        Raises
+        ------
+        SessionError, ConstraintError
+            If it is no goal, there is no such volume, or it contradicts others that are set.
+        """
+        state = self._released(self.state)
+        options = replace(state.options, volumes={**dict(state.options.volumes), name: goal})
+        state = replace(state, options=options)
+        places = handles.targets_of(self.mesh, state)
+        return self._drag(state, places, [f"the volume of {name}"], max_steps)
+
     def refine(
         self,
         *,

@@ -21,7 +21,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
-from ..deformer import checked_constraints, checked_place
+from ..deformer import checked_constraints, checked_goals, checked_place
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
 from ..mesh import Mesh, SurfacePoint
@@ -41,6 +41,7 @@ _WORDS = {
     "offset": "cage offset",
     "preserve_volume": "volume preservation",
     "preserve_region_volumes": "volume preservation per region",
+    "volumes": "volumes",
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
@@ -65,6 +66,8 @@ class Options:
     lids : bool, optional
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    volumes : mapping of str to str or float
+        Goals by the names of volumes, as `Deformer` takes them; kept as pairs.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int
@@ -86,8 +89,10 @@ class Options:
     stretch: float = 1.0
     rotation_groups: int = 300
     avoid_contact: bool = False
+    volumes: tuple[tuple[str, str | float], ...] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "volumes", _pairs(self.volumes))
         flags = "preserve_volume", "preserve_region_volumes", "avoid_contact"
         for name in flags:
             value = getattr(self, name)
@@ -100,6 +105,16 @@ class Options:
         if self.offset is not None:
             _require_number("offset", self.offset, _TINY)
         _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
+    try:
+        goals = dict(volumes)  # type: ignore[call-overload]
+        checked_goals(goals)
+    except (TypeError, ValueError) as fault:
+        text = str(fault) if isinstance(fault, ConstraintError) else f"got {shown(volumes)}"
+        raise SessionError(f"volumes must be goals by name: {text}") from None
+    return tuple(goals.items())
 
 
 def label_of_change(before: Options, after: Options) -> str:
@@ -219,8 +234,9 @@ class State(Described, Frozen):
         return np.concatenate([np.empty(0, dtype=np.int64), *self.handles.values()])
 
     def at_rest(self) -> State:
-        """Return the state without its pose."""
-        return replace(self, pose=None, locality=None, fixed_at=None)
+        """Return the state without its pose and goals for volumes."""
+        options = replace(self.options, volumes=())
+        return replace(self, pose=None, locality=None, fixed_at=None, options=options)
 
     def changes(self, other: State) -> Change:
         """Return the parts in which *other* differs."""

@@ -73,6 +73,7 @@ VERSION = 2
 _LATER = {
     "lids": None,
     "avoid_contact": False,
+    "volumes": (),
 }  # options that version 1 does not have, and their defaults
 
 # Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
