@@ -31,6 +31,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from types import EllipsisType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -227,10 +228,12 @@ class Deformer:
             "preserve_region_volumes": preserve_region_volumes,
             "avoid_contact": avoid_contact,
         }
-        given = {name: as_flag(flag, name) for name, flag in flags.items() if flag is not None}
-        options = replace(self._options, **given)
+        given: dict[str, Any] = {
+            name: as_flag(flag, name) for name, flag in flags.items() if flag is not None
+        }
         if volumes is not None:
-            options = replace(options, goals=checked_goals(volumes))
+            given["goals"] = checked_goals(volumes)
+        options = replace(self._options, **given)
         other = self._shared()
         if lids is not ... and as_lids(lids) is not options.lids:
             options = replace(options, lids=as_lids(lids))

@@ -250,7 +250,6 @@ class Path:
         scaled, preserved = self.constraints.preserved.scaled, self._preserved
         if scaled is not None:
             return self._scaled(scaled)
-        before = self.p
         lengths = np.array([np.abs(each).max() for each in directions])
         if lengths.min() > _VANISHED * lengths.max():
             x = self._moved_to_volume(preserved, directions)
@@ -261,10 +260,7 @@ class Path:
             slopes = [each.gradient(x) / self._problem.frame.size for each in preserved]
             rows = [self._problem.subspace.adjoint(slope) for slope in slopes]
             x = self._moved_to_volume(preserved, self.solver.directions(rows))
-        moved_by = largest_length(self.p - before)
-        if moved_by > _SCALED:
-            self._continue_from(self.p)
-        return x, moved_by
+        return x, 0.0
 
     def _moved_to_volume(
         self, preserved: Sequence[VolumeConstraint], directions: Sequence[FloatArray]

@@ -143,4 +143,4 @@ def grown_gradients(energy: Energy, weights: FloatArray, p: FloatArray) -> Float
     at_rest = rows.reshape(len(weights), 3, -1) / weights[:, None, None]
     jacobian = at_rest @ p
     jacobian[np.linalg.det(jacobian) <= 0.0] = np.eye(3)
-    return np.linalg.solve(jacobian, at_rest)
+    return np.asarray(np.linalg.solve(jacobian, at_rest), dtype=np.float64)

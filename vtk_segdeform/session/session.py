@@ -634,7 +634,8 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         state = self._released(self.state)
-        options = replace(state.options, volumes={**dict(state.options.volumes), name: goal})
+        goals = {**dict(state.options.volumes), name: goal}
+        options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
         return self._drag(state, places, [f"the volume of {name}"], max_steps)

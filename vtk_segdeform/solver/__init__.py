@@ -5,6 +5,7 @@ The files, in reading order:
     newton                  the iteration of both levels, eqs. (11) to (14) and (21)
     gauss_newton            its objective over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
+    bodies                  the volume of each body
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
     anderson                Anderson acceleration
@@ -17,6 +18,7 @@ The files, in reading order:
 """
 
 from .anderson import Anderson
+from .bodies import Bodies
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
 from .exact_volume import (
@@ -32,7 +34,6 @@ from .position_constraints import Anchors, connected_sets, errors_at, position_t
 from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .terms import Term
 from .volume_constraints import (
-    Bodies,
     VolumeConstraint,
     Volumes,
     gradients,
