@@ -5,6 +5,7 @@ The files, in reading order:
     deformer         `Deformer`: targets in, `Solution` out
     problem          the mesh, its cages and its energy, made once
     enclosed_volume  the volume under its lids, and what of it is preserved
+    stiffness        stiff and rigid parts
     volume_goals     goals for volumes, as texts
     growth           the shape that has the volumes that are set
     constraints      fixed vertices, handles and volumes, made once for a set of them

@@ -40,6 +40,7 @@ def deform(
     *,
     volumes: Goals | None = None,
     parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
     through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
@@ -67,6 +68,8 @@ def deform(
         With some, there need be no handle.
     parts : mapping of str to (k,) int or (n,) bool, optional
         Vertices by the names of parts of the surface, for *volumes*.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
     through : sequence of (len(handle), 3) float
         Targets on the way, such as those of a quarter and of half a turn before those of
         three quarters; each less than half a turn from the last ones.
@@ -140,6 +143,7 @@ def deform(
         lids=lids,
         volumes=volumes,
         parts=parts,
+        stiffness=stiffness,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

@@ -64,6 +64,7 @@ from .finishing import VOLUME_MET, finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
+from .stiffness import Stiffness
 from .volume_goals import Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
@@ -106,6 +107,9 @@ class Deformer:
     parts : mapping of str to (k,) int or (n,) bool, optional
         Vertices by the names of parts of the surface, whose volumes are those under a lid over
         their borders; for *volumes*.
+    stiffness : (n,) float, optional
+        How stiff the surface is at each vertex, relative to elsewhere; infinite where it is rigid.
+        See `stiffness`.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -153,6 +157,7 @@ class Deformer:
         lids: bool | None = None,
         volumes: Goals | None = None,
         parts: Mapping[str, ArrayLike] | None = None,
+        stiffness: ArrayLike | None = None,
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -182,6 +187,7 @@ class Deformer:
             cages,
             stretch=stretch,
             rotation_groups=rotation_groups,
+            stiffness=Stiffness.of(mesh, stiffness),
             cache=None if cache is None else as_path(cache, "cache"),
             progress=part(progress, 0.0, _BOUND),
         )

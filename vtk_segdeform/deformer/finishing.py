@@ -11,9 +11,11 @@ from ..finish import Finish, Finisher
 from ..progress import Progress
 from .constraints import Constraints
 from .path import Path
+from .stiffness import rigid_places
 
 VOLUME_MET = 1e-9
 """Relative error of a volume, at most; a finish with a larger error is not used."""
+_FIRM = 1e6  # weight of a handle or fixed vertex in the place of a rigid part
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -39,6 +41,7 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
+    _place_rigid_parts(path, places, held, pose)
     active = set(path.active_volumes)
     while True:
         finisher = Finisher(
@@ -58,6 +61,19 @@ def finish_of(
         active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
     return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
+
+
+def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:
+    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices."""
+    problem = path.constraints.problem
+    stiff = problem.inputs.stiffness
+    for ids in () if stiff is None else stiff.rigid:
+        own = held[ids]
+        near = np.where(own[:, None], places[ids], pose[ids])
+        weights = np.where(own, _FIRM, 1.0)
+        moved = rigid_places(problem.rest_pose.vertices[ids], near, weights)
+        places[ids[~own]] = moved[~own]
+        held[ids] = True
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

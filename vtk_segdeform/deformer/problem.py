@@ -24,6 +24,7 @@ from .binding import Binding, BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
 from .locality import SurfaceSamples
+from .stiffness import Stiffness
 
 _NO_POINTS = np.empty((0, 3))
 # l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
@@ -57,6 +58,7 @@ class Problem:
         *,
         stretch: float,
         rotation_groups: int,
+        stiffness: Stiffness | None = None,
         cache: FilePath | None = None,
         progress: Progress | None = None,
     ) -> Problem:
@@ -65,7 +67,8 @@ class Problem:
         rest = mesh.with_vertices(frame.inward(mesh.vertices))
         inside = [frame.inward(cage.vertices) for cage in cages]
         rest_cages = np.concatenate([_NO_POINTS, *inside])
-        inputs = BindingInputs(rest, regions, cages, rest_cages, stretch, rotation_groups)
+        given = rest, regions, cages, rest_cages, stretch, rotation_groups
+        inputs = BindingInputs(*given, stiffness=stiffness)
         binding = cached_binding(inputs, cache, progress)
         at_origin = frame.about_origin(mesh.vertices)
         rest_pose = mesh.with_vertices(at_origin) if frame.is_far else mesh
@@ -152,7 +155,9 @@ class Problem:
     @cached_property
     def cell_energy(self) -> CellEnergy:
         """The energy of the finish."""
-        return CellEnergy.of(self.shape, self.mesh.n_vertices / len(self.rest_cages))
+        per_cage = self.mesh.n_vertices / len(self.rest_cages)
+        stiff = self.inputs.stiffness
+        return CellEnergy.of(self.shape, per_cage, None if stiff is None else stiff.factors)
 
     @cached_property
     def cage_weights(self) -> FloatArray:
@@ -161,4 +166,6 @@ class Problem:
         counts = np.array([len(cage.vertices) for cage in self.cages])
         areas = own.sum(axis=1)
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
-        return np.asarray(density @ own) / _SPACINGS**2
+        weights = np.asarray(density @ own) / _SPACINGS**2
+        stiff = self.inputs.stiffness
+        return weights if stiff is None else weights * stiff.factors

@@ -42,6 +42,7 @@ def pull(
     n_cage_vertices: int | None = None,
     volumes: Goals | None = None,
     parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
     refine: bool | None = None,
@@ -74,6 +75,8 @@ def pull(
         Total number of cage vertices; by default it follows the number of regions.
     volumes, parts : mappings, optional
         Goals for volumes, by name, and named parts of the surface; see `Deformer`.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
@@ -127,7 +130,7 @@ def pull(
     cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, volumes=volumes, parts=parts,
-        avoid_contact=avoid_contact, progress=next(stages),
+        stiffness=stiffness,         avoid_contact=avoid_contact, progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)
