@@ -5,6 +5,7 @@ The files, in reading order:
     deformer         `Deformer`: targets in, `Solution` out
     problem          the mesh, its cages and its energy, made once
     enclosed_volume  the volume under its lids, and what of it is preserved
+    slides           vertices that slide along a plane, a line or a surface
     stiffness        stiff and rigid parts
     volume_goals     goals for volumes, as texts
     growth           the shape that has the volumes that are set
@@ -45,6 +46,7 @@ from .deform import deform, finished, solved_along
 from .deformer import Deformer
 from .problem import Problem
 from .pull import pull
+from .slides import Slide
 from .volume_goals import Goals, checked_goals
 
 __all__ = [
@@ -56,6 +58,7 @@ __all__ = [
     "PaperDeformer",
     "PaperSolution",
     "Problem",
+    "Slide",
     "automatic_locality",
     "checked_constraints",
     "checked_goals",

@@ -21,6 +21,7 @@ from ..solver import (
     GaussNewton,
     HeldVolumes,
     ScaledSurface,
+    Sliding,
     Term,
     connected_sets,
     errors_at,
@@ -29,6 +30,7 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
+from .slides import Guide, Slide, guides
 from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
@@ -43,6 +45,7 @@ class HoldOptions:
     preserve_region_volumes: bool
     avoid_contact: bool
     lids: bool | None
+    slides: tuple[Slide, ...] = ()
     goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
     parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
@@ -86,6 +89,7 @@ class Constraints:
     preserved: Preserved
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
+    guides: tuple[Guide, ...] = ()  # of sliding vertices, in the coordinates of poses
     pulled: PulledPoints = field(default_factory=PulledPoints)
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
@@ -131,7 +135,11 @@ class Constraints:
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         contact = _contact(problem, ids) if options.avoid_contact else None
-        terms: tuple[Term, ...] = () if contact is None else (contact,)
+        sliding = [
+            Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
+            for each in guides(options.slides, problem.rest, few=True)
+        ]
+        terms: tuple[Term, ...] = (*sliding, *(() if contact is None else (contact,)))
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
         return cls(
             problem=problem,
@@ -146,6 +154,7 @@ class Constraints:
             preserved=preserved,
             solver=GaussNewton(energy, positions, preserved.volumes, terms=terms),
             contact=contact,
+            guides=guides(options.slides, problem.rest_pose),
         )
 
     def __setstate__(self, state: dict[str, object]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -22,6 +22,7 @@ from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
 from .clamping import clamped
 from .deformer import Deformer
+from .slides import Slide
 from .volume_goals import Goals, checked_goals
 
 _log = logging.getLogger(__name__)
@@ -41,6 +42,7 @@ def deform(
     volumes: Goals | None = None,
     parts: Mapping[str, ArrayLike] | None = None,
     stiffness: ArrayLike | None = None,
+    slides: Iterable[Slide] = (),
     through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
@@ -70,6 +72,8 @@ def deform(
         Vertices by the names of parts of the surface, for *volumes*.
     stiffness : (n,) float, optional
         Of each vertex, relative to the others; infinite where the surface is rigid.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only.
     through : sequence of (len(handle), 3) float
         Targets on the way, such as those of a quarter and of half a turn before those of
         three quarters; each less than half a turn from the last ones.
@@ -144,6 +148,7 @@ def deform(
         volumes=volumes,
         parts=parts,
         stiffness=stiffness,
+        slides=slides,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

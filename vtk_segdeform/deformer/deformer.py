@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -64,6 +64,7 @@ from .finishing import VOLUME_MET, finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
+from .slides import Slide, checked_slides
 from .stiffness import Stiffness
 from .volume_goals import Goals, checked_goals
 
@@ -110,6 +111,8 @@ class Deformer:
     stiffness : (n,) float, optional
         How stiff the surface is at each vertex, relative to elsewhere; infinite where it is rigid.
         See `stiffness`.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only; see `slides`.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -158,6 +161,7 @@ class Deformer:
         volumes: Goals | None = None,
         parts: Mapping[str, ArrayLike] | None = None,
         stiffness: ArrayLike | None = None,
+        slides: Iterable[Slide] = (),
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -179,6 +183,7 @@ class Deformer:
             lids=as_lids(lids),
             goals=checked_goals(volumes),
             parts=checked_parts(mesh, parts),
+            slides=checked_slides(mesh, slides),
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -221,12 +226,12 @@ class Deformer:
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
         volumes: Goals | None = None,
+        slides: Iterable[Slide] | None = None,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``, ``volumes=None``
-        and ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
+        None, and ``lids=...``, are the values of this deformer.  The fixed vertices stay at
         *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
         """
         flags = {
@@ -239,6 +244,8 @@ class Deformer:
         }
         if volumes is not None:
             given["goals"] = checked_goals(volumes)
+        if slides is not None:
+            given["slides"] = checked_slides(self.mesh, slides)
         options = replace(self._options, **given)
         other = self._shared()
         if lids is not ... and as_lids(lids) is not options.lids:

@@ -34,6 +34,11 @@ def finish_of(
     places = np.array(problem.rest_pose.vertices)
     places[constraints.fixed] = frame.about_origin(constraints.fixed_at)
     places[constraints.handle] = frame.about_origin(frame.outward(path.targets))
+    for guide in constraints.guides:
+        free = ~held[guide.vertices]
+        places[guide.vertices[free]] = guide.track(pose[guide.vertices])[0][free]
+        held[guide.vertices] = True
+    _place_rigid_parts(path, places, held, pose)
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
@@ -41,7 +46,6 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
-    _place_rigid_parts(path, places, held, pose)
     active = set(path.active_volumes)
     while True:
         finisher = Finisher(

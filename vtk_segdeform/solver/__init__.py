@@ -12,6 +12,7 @@ The files, in reading order:
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
+    sliding                 vertices that stay on a plane, a line or a surface
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
@@ -31,6 +32,7 @@ from .exact_volume import (
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .newton import Step, constrained_step, minimise
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
+from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .terms import Term
 from .volume_constraints import (
@@ -57,12 +59,14 @@ __all__ = [
     "GaussNewton",
     "HeldVolumes",
     "ScaledSurface",
+    "Sliding",
     "Solution",
     "SolverOptions",
     "SolverResult",
     "Status",
     "Step",
     "Term",
+    "Track",
     "VolumeConstraint",
     "Volumes",
     "are_met",
