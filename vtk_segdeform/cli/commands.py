@@ -18,7 +18,7 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, clamped, finished, solved_along
+from ..deformer import Deformer, Slide, clamped, finished, solved_along
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -76,7 +76,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options), **volume_settings(options, surface),
+        **_settings(options), **constraints_of(options, surface),
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
@@ -213,14 +213,45 @@ def _settings(options: Namespace) -> dict[str, Any]:
     return settings
 
 
-def volume_settings(options: Namespace, surface: Surface) -> dict[str, Any]:
-    """Return the goals of ``--volume`` and the parts of ``--part``, as `Deformer` takes them."""
+def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
+    """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
     goals = dict(_named("--volume", text) for text in options.volume)
     parts = dict(_named("--part", text) for text in options.part)
     return {
         "volumes": goals or None,
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
+        "stiffness": _stiffness(options, surface),
+        "slides": [_slide(text, surface) for text in options.slide],
     }
+
+
+def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:
+    """Return the stiffness (n,) of the vertices; None if it is the same everywhere."""
+    if not (options.stiffness or options.rigid):
+        return None
+    stiffness = np.ones(surface.mesh.n_vertices)
+    for text in options.stiffness:
+        selection, _, times = text.rpartition("=")
+        try:
+            value = float(times)
+        except ValueError:
+            value = math.nan
+        if not (selection and value > 0.0):
+            raise ConstraintError(
+                f"--stiffness must be a selection and how many times stiffer it is, as z>80%=5; "
+                f"got {text!r}"
+            )
+        stiffness[_selected(selection, surface, "handle")] = value
+    for text in options.rigid:
+        stiffness[_selected(text, surface, "handle")] = math.inf
+    return stiffness
+
+
+def _slide(text: str, surface: Surface) -> Slide:
+    selection, colon, along = text.rpartition(":")
+    if not colon or along not in ("plane", "line", "surface"):
+        selection, along = text, "plane"
+    return Slide(_selected(selection, surface, "handle"), along)
 
 
 def _named(option: str, text: str) -> tuple[str, str]:

@@ -395,7 +395,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--regions", type=_count, default=None, metavar="N", help=text)
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
-    _volumes(parser)
+    _constraints(parser)
     _contact_and_lids(parser)
     _refine(parser, "with --avoid-contact")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
@@ -418,7 +418,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
         handle.add_argument(f"--{name}", action=_HandleOption, metavar=metavar, help=text)
     parser.set_defaults(handles=[])
     add("--no-volume", action="store_true", help="do not preserve the volume")
-    _volumes(parser)
+    _constraints(parser)
     _contact_and_lids(parser)
     text = "stretch resistance relative to detail preservation (default: 1)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
@@ -428,7 +428,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
-def _volumes(parser: argparse.ArgumentParser) -> None:
+def _constraints(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     text = (
         "a volume: keep, free, 2.5 (in the mesh's unit, cubed), 40%%, +10%% or -40%%, also after "
@@ -438,6 +438,15 @@ def _volumes(parser: argparse.ArgumentParser) -> None:
     add("--volume", action="append", default=[], metavar="NAME=GOAL", help=text)
     text = "a part of the surface, whose volume is that under a lid; may be repeated"
     add("--part", action="append", default=[], metavar="NAME=SEL", help=text)
+    text = "points that move as one body, as bones and buttons; may be repeated"
+    add("--rigid", action="append", default=[], metavar="SEL", help=text)
+    text = "points that are so many times stiffer than others; may be repeated"
+    add("--stiffness", action="append", default=[], metavar="SEL=TIMES", help=text)
+    text = (
+        "points that move along a plane only, the nearest to them; with :line or :surface after "
+        "SEL along a line, or along the surface; may be repeated"
+    )
+    add("--slide", action="append", default=[], metavar="SEL", help=text)
 
 
 def _contact_and_lids(parser: argparse.ArgumentParser) -> None:

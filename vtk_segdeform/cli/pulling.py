@@ -15,7 +15,7 @@ from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
-from .commands import LIDS, volume_settings
+from .commands import LIDS, constraints_of
 from .motion import parse_vector
 from .outputs import (
     HANDLE_TOLERANCE,
@@ -54,7 +54,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         lids=lids,
-        **volume_settings(options, surface),
+        **constraints_of(options, surface),
         avoid_contact=options.avoid_contact,
         refine=options.refine,
         progress=progress,

@@ -46,7 +46,8 @@ from .deform import deform, finished, solved_along
 from .deformer import Deformer
 from .problem import Problem
 from .pull import pull
-from .slides import Slide
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
 from .volume_goals import Goals, checked_goals
 
 __all__ = [
@@ -59,6 +60,7 @@ __all__ = [
     "PaperSolution",
     "Problem",
     "Slide",
+    "Stiffness",
     "automatic_locality",
     "checked_constraints",
     "checked_goals",
@@ -66,6 +68,7 @@ __all__ = [
     "checked_place",
     "checked_point",
     "checked_radius",
+    "checked_slides",
     "checked_targets",
     "checked_vertex",
     "clamped",

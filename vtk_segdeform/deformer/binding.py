@@ -118,25 +118,25 @@ class Binding:
     """The subspace, energy and volumes with which a `Deformer` solves."""
 
     energy: Energy
-    coarse_volume: CoarseVolume
     interior: FloatArray  # (k,): the weights of the points inside the body
+    coarse_volume: CoarseVolume
 
     @classmethod
     def compute(cls, inputs: BindingInputs, progress: Progress | None = None) -> Binding:
         """Return the binding of *inputs*."""
         tell(progress, 0.0, "checking cages")
-        rest, regions, cages = inputs.rest, inputs.regions, inputs.cages
+        regions, cages = inputs.regions, inputs.cages
         share = part(progress, 0.0, 0.38)  # shares of the time for 5,000 to 300,000 vertices
         subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
         _ = inputs.clusters
-        share = part(progress, 0.4, 0.9)
-        energy = _surface_energy(inputs, rest, inputs.rest_cages, subspace, progress=share)
-        gradients, volumes = _interior(inputs, energy)
-        weights = interior_weights(energy, gradients, volumes)
-        energy = with_interior(energy, gradients, weights)
+        energy, weights = _energy(inputs, subspace, part(progress, 0.4, 0.9))
         coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
-        return cls(energy, coarse, weights)
+        return cls(energy, weights, coarse)
+
+    def stiffened(self, inputs: BindingInputs) -> Binding:
+        """Return the binding of *inputs* that differ in their stiffness only."""
+        return Binding(*_energy(inputs, self.energy.subspace), self.coarse_volume)
 
     def grown(self, inputs: BindingInputs, p: FloatArray) -> Binding:
         """Return this binding of *inputs* with another shape to keep: that with cages *p* (m, 3).
@@ -148,6 +148,16 @@ class Binding:
         energy = _surface_energy(inputs, shape, p, subspace)
         gradients = grown_gradients(self.energy, self.interior, p)
         return replace(self, energy=with_interior(energy, gradients, self.interior))
+
+
+def _energy(
+    inputs: BindingInputs, subspace: Subspace, progress: Progress | None = None
+) -> tuple[Energy, FloatArray]:
+    """Return the energy at rest, and the weights of the points inside the body."""
+    energy = _surface_energy(inputs, inputs.rest, inputs.rest_cages, subspace, progress=progress)
+    gradients, volumes = _interior(inputs, energy)
+    weights = interior_weights(energy, gradients, volumes)
+    return with_interior(energy, gradients, weights), weights
 
 
 def _surface_energy(

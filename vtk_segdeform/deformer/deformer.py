@@ -258,6 +258,18 @@ class Deformer:
         return other
 
     @one_blas_thread()
+    def stiffened(self, stiffness: ArrayLike | None) -> Deformer:
+        """Return a deformer at rest without constraints, with another *stiffness* (n,).
+
+        It has the options of this one and shares its subspace, which takes most of the time.
+        """
+        other = self._shared()
+        other._problem = self._problem.stiffened(Stiffness.of(self.mesh, stiffness))
+        other._enclosed = EnclosedVolume.under(other._problem, self._options.lids)
+        other._hold(Constraints.of(other._enclosed, self._options, fixed=(), handle=()))
+        return other
+
+    @one_blas_thread()
     def local(
         self, vertex: int | SurfacePoint, reach: float, spread: float, *, follows: float = 0.0
     ) -> Deformer:

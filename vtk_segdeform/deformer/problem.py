@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 
@@ -75,13 +76,22 @@ class Problem:
         parts = mesh, regions, cages, frame, rest, rest_pose, rest_cages
         return cls(*parts, shape=rest_pose, inputs=inputs, binding=binding)
 
+    def stiffened(self, stiffness: Stiffness | None) -> Problem:
+        """Return the problem with another stiffness."""
+        inputs = replace(self.inputs, stiffness=stiffness)
+        return self._with(inputs=inputs, binding=self.binding.stiffened(inputs))
+
     def grown(self, p: FloatArray) -> Problem:
         """Return the problem whose shape to keep is that of cages *p* (m, 3); see `growth`."""
         shape = self.rest_pose.with_vertices(self.map(p))
-        other = replace(self, shape=shape, binding=self.binding.grown(self.inputs, p))
-        for name in ("samples", "linked_parts", "cage_weights"):
-            if name in vars(self):
-                vars(other)[name] = vars(self)[name]
+        return self._with(shape=shape, binding=self.binding.grown(self.inputs, p))
+
+    def _with(self, **changes: Any) -> Problem:
+        """Return the problem with *changes* on which `samples` and `linked_parts` do not depend."""
+        other = replace(self, **changes)
+        vars(other).update(
+            {name: vars(self)[name] for name in ("samples", "linked_parts") if name in vars(self)}
+        )
         return other
 
     @property

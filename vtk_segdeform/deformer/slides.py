@@ -77,7 +77,7 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
             raise ConstraintError(str(fault)) from None
         direction = None
         if slide.direction is not None:
-            direction = np.asarray(slide.direction, dtype=np.float64)
+            direction = np.array(slide.direction, dtype=np.float64)
             length = np.linalg.norm(direction)
             if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
                 raise ConstraintError(
@@ -85,7 +85,7 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
                     f"got {shown(slide.direction)}"
                 )
         if len(ids):
-            found.append(Slide(ids, slide.along, direction))
+            found.append(Slide(ids, slide.along, None if direction is None else direction.tolist()))
     return tuple(found)
 
 
@@ -102,7 +102,7 @@ def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[G
 def _track(slide: Slide, mesh: Mesh, some: IntArray) -> Track:
     if slide.along == "surface":
         return _Surface(mesh)
-    points = mesh.vertices[slide.vertices]
+    points = mesh.vertices[np.asarray(slide.vertices)]
     axes = np.linalg.svd(points - points.mean(axis=0))[2]
     nearest = axes[2] if slide.along == "plane" else axes[0]
     direction = nearest if slide.direction is None else np.asarray(slide.direction)

@@ -26,7 +26,7 @@ Long because it is the interface of one class; the implementation is in the othe
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -40,6 +40,7 @@ from ..cages import Cage
 from ..checks import Described, require, require_sequence, shown
 from ..deformer import (
     Deformer,
+    Slide,
     checked_constraints,
     checked_locality,
     checked_place,
@@ -65,9 +66,11 @@ from .state import (
     Pose,
     State,
     checked_state,
+    checked_stiffness,
     fitting_cages,
     label_of_change,
     of_mesh,
+    owned_slides,
 )
 from .timeline import Timeline
 
@@ -436,6 +439,22 @@ class Session(Described):
             self.history.step("set fixed vertices", after)
 
     # The pose.
+
+    def set_stiffness(self, stiffness: ArrayLike | None) -> None:
+        """Let the surface have a *stiffness* (n,), as `Deformer` takes it; None: the same all over.
+
+        The pose stays; call `refine` to apply it.
+        """
+        checked = checked_stiffness(self.mesh, stiffness)
+        self.history.step("set stiffness", replace(self.state, stiffness=checked))
+
+    def set_slides(self, slides: Iterable[Slide]) -> None:
+        """Let vertices slide along planes, lines or the surface at rest only; see `Slide`.
+
+        The pose stays; call `refine` to apply them.
+        """
+        owned = owned_slides(self.mesh, slides)
+        self.history.step("set slides", replace(self.state, slides=owned))
 
     def drag(
         self,

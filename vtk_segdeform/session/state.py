@@ -11,17 +11,25 @@ Long because each part of a state is checked here, where it enters.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
-from ..deformer import checked_constraints, checked_goals, checked_place
+from ..deformer import (
+    Slide,
+    Stiffness,
+    checked_constraints,
+    checked_goals,
+    checked_place,
+    checked_slides,
+)
 from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
 from ..mesh import Mesh, SurfacePoint
@@ -205,6 +213,10 @@ class State(Described, Frozen):
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
     fixed_at: FloatArray | None = None
     """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
+    stiffness: FloatArray | None = None
+    """(n,) float: as `Deformer` takes it."""
+    slides: tuple[Slide, ...] = ()
+    """As `Deformer` takes them, with read-only arrays."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -248,7 +260,9 @@ class State(Described, Frozen):
                 Change.CONSTRAINTS,
                 self.fixed is other.fixed
                 and self.handles is other.handles
-                and self.fixed_at is other.fixed_at,
+                and self.fixed_at is other.fixed_at
+                and self.stiffness is other.stiffness
+                and self.slides is other.slides,
             ),
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
@@ -304,8 +318,25 @@ def checked_state(mesh: Mesh, state: State) -> State:
     constraints = frozen(fixed.copy()), owned
     places = None if pose is None else _checked_places(mesh, fixed, state)
     return State(
-        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places
-    )
+        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
+        checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
+    )  # fmt: skip
+
+
+def checked_stiffness(mesh: Mesh, stiffness: ArrayLike | None) -> FloatArray | None:
+    """Return a read-only copy of *stiffness* (n,); ConstraintError if it is none."""
+    if stiffness is None:
+        return None
+    Stiffness.of(mesh, stiffness)
+    return frozen(np.array(stiffness, dtype=np.float64))
+
+
+def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
+    """Return checked *slides* with read-only arrays; ConstraintError if they are none."""
+    checked = checked_slides(mesh, slides)
+    for each in checked:
+        frozen(np.asarray(each.vertices))
+    return checked
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
