@@ -7,6 +7,7 @@ The files, in reading order:
     enclosed_volume  the volume under its lids, and what of it is preserved
     slides           vertices that slide along a plane, a line or a surface
     stiffness        stiff and rigid parts
+    symmetry         motions that are mirrored about a plane
     volume_goals     goals for volumes, as texts
     growth           the shape that has the volumes that are set
     constraints      fixed vertices, handles and volumes, made once for a set of them

@@ -31,9 +31,11 @@ from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
 from .slides import Guide, Slide, guides
+from .symmetry import Mirror
 from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
+_MIRROR_SHARE = 0.1  # weight of the symmetry of the cages, as a share of that of a handle
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
@@ -46,6 +48,7 @@ class HoldOptions:
     avoid_contact: bool
     lids: bool | None
     slides: tuple[Slide, ...] = ()
+    mirror: Mirror | None = None
     goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
     parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
@@ -90,6 +93,9 @@ class Constraints:
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
     guides: tuple[Guide, ...] = ()  # of sliding vertices, in the coordinates of poses
+    mirror: Mirror | None = None
+    mates: IntArray = field(default_factory=lambda: _NONE)
+    """(e,): the handle vertices whose mates are the last e ones of `handle`."""
     pulled: PulledPoints = field(default_factory=PulledPoints)
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
@@ -108,7 +114,12 @@ class Constraints:
         By default at rest.  Raises a ConstraintError if they are no sets of vertices.
         """
         mesh = enclosed.problem.mesh
-        fixed, handle = map(read_only, checked_constraints(mesh, fixed, handle))
+        fixed, handle = checked_constraints(mesh, fixed, handle)
+        mirror, mates, fixed_mates = options.mirror, _NONE, _NONE
+        if mirror is not None:
+            fixed, fixed_mates = mirror.with_mates(fixed, handle)
+            handle, mates = mirror.with_mates(handle, fixed)
+        fixed, handle = read_only(fixed), read_only(handle)
         preserved = enclosed.preserved(
             handle,
             whole=options.preserve_volume,
@@ -119,7 +130,11 @@ class Constraints:
         problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
         if places is not None:
-            fixed_in_scene = checked_targets(places, len(fixed), "fixed_at", "fixed")
+            count = len(fixed) - len(fixed_mates)
+            fixed_in_scene = checked_targets(places, count, "fixed_at", "fixed")
+            if mirror is not None:
+                rest = mesh.vertices[fixed]
+                fixed_in_scene = mirror.moved(rest, fixed_in_scene, fixed_mates)
             inside = problem.frame.inward(fixed_in_scene)
             check_distance(inside)
         handles, patches = connected_sets(mesh, handle), connected_sets(mesh, fixed)
@@ -139,7 +154,9 @@ class Constraints:
             Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
             for each in guides(options.slides, problem.rest, few=True)
         ]
-        terms: tuple[Term, ...] = (*sliding, *(() if contact is None else (contact,)))
+        terms: list[Term] = [*sliding, *(() if contact is None else (contact,))]
+        if mirror is not None:
+            terms.append(mirror.term(problem.subspace, problem.rest_cages, _MIRROR_SHARE * weight))
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
         return cls(
             problem=problem,
@@ -152,9 +169,11 @@ class Constraints:
             fixed_box=fixed_box,
             anchors=_centres(problem, preserved.scaled, fixed, inside),
             preserved=preserved,
-            solver=GaussNewton(energy, positions, preserved.volumes, terms=terms),
+            solver=GaussNewton(energy, positions, preserved.volumes, terms=tuple(terms)),
             contact=contact,
             guides=guides(options.slides, problem.rest_pose),
+            mirror=mirror,
+            mates=mates,
         )
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -176,6 +195,22 @@ class Constraints:
     def n_bounds(self) -> int:
         """Number of volumes that are bounded only."""
         return sum(each.bound != 0 for each in self.preserved.constraints)
+
+    @property
+    def n_given(self) -> int:
+        """Number of handle vertices that targets are given for; the others are their mates."""
+        return len(self.handle) - len(self.mates)
+
+    def goal(self, targets: FloatArray) -> FloatArray:
+        """Return the targets (k, 3) of all handle vertices, in solver coordinates.
+
+        *targets* (n_given, 3) are in scene coordinates.
+        """
+        if self.mirror is not None:
+            targets = self.mirror.moved(
+                self.problem.mesh.vertices[self.handle], targets, self.mates
+            )
+        return self.problem.frame.inward(targets)
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""

@@ -23,6 +23,7 @@ from .arguments import as_lids, checked_constraints, checked_targets
 from .clamping import clamped
 from .deformer import Deformer
 from .slides import Slide
+from .symmetry import Symmetry
 from .volume_goals import Goals, checked_goals
 
 _log = logging.getLogger(__name__)
@@ -43,6 +44,7 @@ def deform(
     parts: Mapping[str, ArrayLike] | None = None,
     stiffness: ArrayLike | None = None,
     slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
@@ -74,6 +76,8 @@ def deform(
         Of each vertex, relative to the others; infinite where the surface is rigid.
     slides : sequence of Slide, optional
         Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     through : sequence of (len(handle), 3) float
         Targets on the way, such as those of a quarter and of half a turn before those of
         three quarters; each less than half a turn from the last ones.
@@ -149,6 +153,7 @@ def deform(
         parts=parts,
         stiffness=stiffness,
         slides=slides,
+        symmetry=symmetry,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

@@ -66,6 +66,7 @@ from .path import Path, Pose
 from .problem import Problem
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
+from .symmetry import Mirror, Symmetry
 from .volume_goals import Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
@@ -113,6 +114,10 @@ class Deformer:
         See `stiffness`.
     slides : sequence of Slide, optional
         Vertices that move along a plane, a line or the surface at rest only; see `slides`.
+    symmetry : str or pair of (3,) float, optional
+        Mirror all motions on one side of a plane on the other side: "x", "y" or "z", the normal of
+        the plane, whose place is found; "auto", which finds the plane; or a point of it and its
+        normal.  See `symmetry`.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -162,6 +167,7 @@ class Deformer:
         parts: Mapping[str, ArrayLike] | None = None,
         stiffness: ArrayLike | None = None,
         slides: Iterable[Slide] = (),
+        symmetry: Symmetry = None,
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -184,6 +190,7 @@ class Deformer:
             goals=checked_goals(volumes),
             parts=checked_parts(mesh, parts),
             slides=checked_slides(mesh, slides),
+            mirror=Mirror.of(mesh, symmetry),
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -227,12 +234,13 @@ class Deformer:
         lids: bool | EllipsisType | None = ...,
         volumes: Goals | None = None,
         slides: Iterable[Slide] | None = None,
+        symmetry: Symmetry | EllipsisType = ...,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        None, and ``lids=...``, are the values of this deformer.  The fixed vertices stay at
-        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
+        None, or for *lids* and *symmetry* ``...``, are the values of this deformer.  The fixed
+        vertices stay at *fixed_at* (f, 3), in the order that they are given in, by default at rest.
         """
         flags = {
             "preserve_volume": preserve_volume,
@@ -244,6 +252,8 @@ class Deformer:
         }
         if volumes is not None:
             given["goals"] = checked_goals(volumes)
+        if symmetry is not ...:
+            given["mirror"] = Mirror.of(self.mesh, symmetry)
         if slides is not None:
             given["slides"] = checked_slides(self.mesh, slides)
         options = replace(self._options, **given)
@@ -348,8 +358,8 @@ class Deformer:
 
     @property
     def handle(self) -> IntArray:
-        """Vertices that follow targets, (k,)."""
-        return self._constraints.handle
+        """Vertices that follow targets, (k,); without the mates of a symmetric deformer."""
+        return self._constraints.handle[: self._constraints.n_given]
 
     @property
     def subspace(self) -> Subspace:
@@ -378,6 +388,11 @@ class Deformer:
         x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
         x = self._problem.frame.about_origin(x)
         return self._enclosed.volumes(x, self._options.parts)
+
+    @property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry, with its error and the mates of the vertices."""
+        return self._constraints.mirror
 
     @property
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -422,7 +437,7 @@ class Deformer:
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Continue from an earlier pose: its `Solution.cage_vertices` and its targets."""
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         self._path = Path.begin(self._constraints, self._inward(cage_vertices), goal)
 
     @one_blas_thread()
@@ -455,7 +470,7 @@ class Deformer:
             If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
             from the mesh or from the fixed vertices, that it must be in another unit.
         """
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         check_distance(goal)
         require_together(self._problem.rest, goal, self._constraints.fixed_box)
         before = self._path.copy()
@@ -601,7 +616,7 @@ class Deformer:
         """
         problem, some = self._problem, slice(None, None, 1 + len(x) // _SEEN)
         rest = self.mesh.vertices[some]
-        moved = largest_length(goal - problem.rest.vertices[self.handle])
+        moved = largest_length(goal - problem.rest.vertices[self._constraints.handle])
         limit = problem.frame.size * (_SIZES + _MOTIONS * moved)
         if largest_length(x[some] - rest) <= limit:
             return True

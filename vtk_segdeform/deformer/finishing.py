@@ -27,6 +27,11 @@ def finish_of(
     Its vertices are those of *start* if exact handles and exact volumes exclude each other.
     """
     constraints, problem = path.constraints, path.constraints.problem
+    mirror, rest = constraints.mirror, problem.rest_pose.vertices
+    if mirror is not None:
+        is_start = start is pose
+        pose = rest + mirror.symmetric(pose - rest)
+        start = pose if is_start else start
     frame, preserved = problem.frame, constraints.preserved.constraints
     held = np.zeros(len(pose), dtype=bool)
     held[constraints.fixed] = held[constraints.handle] = True
@@ -42,7 +47,10 @@ def finish_of(
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
-        stays = (far | _is_near_pulled_points(constraints)) & ~held
+        stays = far | _is_near_pulled_points(constraints)
+        if mirror is not None:
+            stays |= stays[mirror.mates]
+        stays &= ~held
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
@@ -58,6 +66,8 @@ def finish_of(
             avoid_contact=constraints.contact is not None,
         )
         found = finisher.run(pose, places[held], progress, start=start)
+        if mirror is not None:
+            found = finisher.made(found, lambda x: rest + mirror.symmetric(x - rest))
         off = [each.missed(found.vertices) for each in preserved]
         missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
         if not missed:

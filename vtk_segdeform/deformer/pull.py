@@ -29,6 +29,7 @@ from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
+from .symmetry import Symmetry
 from .volume_goals import Goals
 
 
@@ -46,6 +47,7 @@ def pull(
     parts: Mapping[str, ArrayLike] | None = None,
     stiffness: ArrayLike | None = None,
     slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
     refine: bool | None = None,
@@ -82,6 +84,8 @@ def pull(
         Of each vertex, relative to the others; infinite where the surface is rigid.
     slides : sequence of Slide, optional
         Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
@@ -137,7 +141,7 @@ def pull(
     cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, volumes=volumes, parts=parts,
-        stiffness=stiffness, slides=slides, avoid_contact=avoid_contact,
+        stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
         progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
