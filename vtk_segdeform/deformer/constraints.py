@@ -165,7 +165,7 @@ class Constraints:
             fixed_at=fixed_in_scene,
             handles=handles,
             places_of_targets=gathered[:, : len(handle)].tocsr(),
-            places_of_fixed=gathered[:, len(handle) :] @ inside,
+            places_of_fixed=np.asarray(gathered[:, len(handle) :] @ inside),
             fixed_box=fixed_box,
             anchors=_centres(problem, preserved.scaled, fixed, inside),
             preserved=preserved,

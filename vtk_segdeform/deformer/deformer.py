@@ -182,6 +182,7 @@ class Deformer:
         check_options(stretch, rotation_groups)
         load_for(mesh.n_vertices)
         self._limits = SolverOptions(tolerance, max_steps)
+        mirror = Mirror.of(mesh, symmetry)
         self._options = HoldOptions(
             preserve_volume=as_flag(preserve_volume, "preserve_volume"),
             preserve_region_volumes=as_flag(preserve_region_volumes, "preserve_region_volumes"),
@@ -190,7 +191,7 @@ class Deformer:
             goals=checked_goals(volumes),
             parts=checked_parts(mesh, parts),
             slides=checked_slides(mesh, slides),
-            mirror=Mirror.of(mesh, symmetry),
+            mirror=mirror,
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -199,7 +200,7 @@ class Deformer:
             cages,
             stretch=stretch,
             rotation_groups=rotation_groups,
-            stiffness=Stiffness.of(mesh, stiffness),
+            stiffness=Stiffness.of(mesh, stiffness, mirror),
             cache=None if cache is None else as_path(cache, "cache"),
             progress=part(progress, 0.0, _BOUND),
         )
@@ -274,7 +275,9 @@ class Deformer:
         It has the options of this one and shares its subspace, which takes most of the time.
         """
         other = self._shared()
-        other._problem = self._problem.stiffened(Stiffness.of(self.mesh, stiffness))
+        other._problem = self._problem.stiffened(
+            Stiffness.of(self.mesh, stiffness, self._options.mirror)
+        )
         other._enclosed = EnclosedVolume.under(other._problem, self._options.lids)
         other._hold(Constraints.of(other._enclosed, self._options, fixed=(), handle=()))
         return other

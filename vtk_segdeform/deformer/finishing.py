@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray
 from ..finish import Finish, Finisher
 from ..progress import Progress
+from ..solver import moved_along, steps_to_volume
 from .constraints import Constraints
 from .path import Path
 from .stiffness import rigid_places
+from .symmetry import Mirror
 
 VOLUME_MET = 1e-9
 """Relative error of a volume, at most; a finish with a larger error is not used."""
@@ -27,10 +30,9 @@ def finish_of(
     Its vertices are those of *start* if exact handles and exact volumes exclude each other.
     """
     constraints, problem = path.constraints, path.constraints.problem
-    mirror, rest = constraints.mirror, problem.rest_pose.vertices
+    mirror, given = constraints.mirror, start
     if mirror is not None:
-        is_start = start is pose
-        pose = rest + mirror.symmetric(pose - rest)
+        is_start, pose = start is pose, _symmetric(path, mirror, pose)
         start = pose if is_start else start
     frame, preserved = problem.frame, constraints.preserved.constraints
     held = np.zeros(len(pose), dtype=bool)
@@ -67,14 +69,32 @@ def finish_of(
         )
         found = finisher.run(pose, places[held], progress, start=start)
         if mirror is not None:
-            found = finisher.made(found, lambda x: rest + mirror.symmetric(x - rest))
+            found = finisher.made(found, partial(_mean_with_image, path, mirror))
         off = [each.missed(found.vertices) for each in preserved]
         missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
         if not missed:
             break
         active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
+    return replace(found, vertices=given) if max(off, default=0.0) > VOLUME_MET else found
+
+
+def _mean_with_image(path: Path, mirror: Mirror, x: FloatArray) -> FloatArray:
+    """Return the mean of the mesh *x* (n, 3) and its mirror image."""
+    rest = path.constraints.problem.rest_pose.vertices
+    return rest + mirror.symmetric(x - rest)
+
+
+def _symmetric(path: Path, mirror: Mirror, pose: FloatArray) -> FloatArray:
+    """Return the mean of a *pose* (n, 3) and its mirror image, moved onto the volumes."""
+    preserved = path.constraints.preserved.constraints
+    active = [preserved[k] for k in path.active_volumes]
+    x = _mean_with_image(path, mirror, pose)
+    if not active:
+        return x
+    outward = [mirror.symmetric(each.gradient(x)) for each in active]
+    paths = np.hstack([x, *(each / np.abs(each).max() for each in outward)])
+    return moved_along(paths, steps_to_volume(active, paths))
 
 
 def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:

@@ -247,7 +247,7 @@ class SurfaceSamples:
             _, part = csgraph.connected_components(self._joined[far][:, far], directed=False)
             size = np.bincount(part, self.areas[far])
             weights[far[(size < follows * size.max())[part]]] = 0.0
-        return weights
+        return np.asarray(weights)
 
     def quadratic(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""

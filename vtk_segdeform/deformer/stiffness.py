@@ -22,6 +22,7 @@ from ..errors import ConstraintError
 from ..geometry import rigid_fit
 from ..mesh import Mesh
 from ..solver import connected_sets
+from .symmetry import Mirror
 
 _LEAST, _MOST = 1e-2, 1e2  # of s, in medians; rigid parts have the largest, cages bend no less
 
@@ -34,8 +35,12 @@ class Stiffness:
     rigid: tuple[IntArray, ...]  # (k,) int each: connected parts
 
     @classmethod
-    def of(cls, mesh: Mesh, stiffness: ArrayLike | None) -> Stiffness | None:
+    def of(
+        cls, mesh: Mesh, stiffness: ArrayLike | None, mirror: Mirror | None = None
+    ) -> Stiffness | None:
         """Return the *stiffness* (n,) of *mesh*; None if it is the same everywhere.
+
+        With a *mirror*, what is stiff on one side of it is as stiff on the other side.
 
         Raises
         ------
@@ -52,6 +57,8 @@ class Stiffness:
                 f"got {shown(stiffness)}"
             )
         values = np.asarray(given, dtype=np.float64)
+        if mirror is not None:
+            values = np.maximum(values, values[mirror.mates])
         is_rigid = np.isinf(values)
         rigid = np.flatnonzero(is_rigid)
         soft = values[~is_rigid & (values > 0.0)]

@@ -88,7 +88,7 @@ class Mirror:
 
     def reflected(self, u: FloatArray) -> FloatArray:
         """Return M u of vectors *u* (k, 3)."""
-        return u - 2.0 * np.outer(u @ self.normal, self.normal)
+        return np.asarray(u - 2.0 * np.outer(u @ self.normal, self.normal))
 
     def symmetric(self, u: FloatArray) -> FloatArray:
         """Return the mean of displacements *u* (n, 3) and their mirror images."""
@@ -127,7 +127,7 @@ class Mirror:
         reach = np.abs((rest[: len(targets)] - self.point) @ self.normal)
         on_plane = reach <= _ON_PLANE * max(float(np.ptp(rest, axis=0).max()), reach.max())
         u[on_plane] -= np.outer(u[on_plane] @ self.normal, self.normal)
-        return rest + np.concatenate([u, self.reflected(u[sources])])
+        return np.asarray(rest + np.concatenate([u, self.reflected(u[sources])]))
 
     def term(self, subspace: Subspace, rest_cages: FloatArray, weight: float) -> MirrorTerm:
         """Return the term that keeps the cages symmetric, of this *weight* in all."""
@@ -179,7 +179,8 @@ def _settled(mesh: Mesh, normal: FloatArray, *, turns: bool) -> tuple[FloatArray
 def _with_mates(mesh: Mesh, point: FloatArray, normal: FloatArray) -> Mirror:
     x, faces = mesh.vertices, mesh.faces
     image = x - 2.0 * np.outer((x - point) @ normal, normal)
-    away, near = cKDTree(x).query(image, k=_NEIGHBOURS)
+    found = cKDTree(x).query(image, k=_NEIGHBOURS)
+    away, near = (np.asarray(each) for each in found)
     order = np.argsort(faces.ravel(), kind="stable")
     counts = np.bincount(faces.ravel(), minlength=len(x))
     starts = np.cumsum(counts) - counts

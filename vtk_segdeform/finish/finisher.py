@@ -163,8 +163,8 @@ class Finisher:
 
         The directions of the volumes are changed alike.
         """
-        x = change(found.vertices)
-        x[self._held] = found.vertices[self._held]
+        x = found.vertices.copy()
+        x[self._free] = change(x)[self._free]
         directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
         return replace(found, vertices=self._landed(x, directions))
 
