@@ -222,6 +222,7 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
         "stiffness": _stiffness(options, surface),
         "slides": [_slide(text, surface) for text in options.slide],
+        "symmetry": options.symmetry,
     }
 
 

@@ -447,6 +447,8 @@ def _constraints(parser: argparse.ArgumentParser) -> None:
         "SEL along a line, or along the surface; may be repeated"
     )
     add("--slide", action="append", default=[], metavar="SEL", help=text)
+    text = "mirror motions about a plane with this normal, whose place is found, or auto"
+    add("--symmetry", choices=("x", "y", "z", "auto"), default=None, help=text)
 
 
 def _contact_and_lids(parser: argparse.ArgumentParser) -> None:

@@ -126,6 +126,7 @@ class Constraints:
             by_region=options.preserve_region_volumes,
             goals=options.goals,
             parts=options.parts,
+            mirror=options.mirror,
         )
         problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
@@ -133,8 +134,7 @@ class Constraints:
             count = len(fixed) - len(fixed_mates)
             fixed_in_scene = checked_targets(places, count, "fixed_at", "fixed")
             if mirror is not None:
-                rest = mesh.vertices[fixed]
-                fixed_in_scene = mirror.moved(rest, fixed_in_scene, fixed_mates)
+                fixed_in_scene = mirror.moved(mesh, fixed, fixed_mates, fixed_in_scene)
             inside = problem.frame.inward(fixed_in_scene)
             check_distance(inside)
         handles, patches = connected_sets(mesh, handle), connected_sets(mesh, fixed)
@@ -207,9 +207,7 @@ class Constraints:
         *targets* (n_given, 3) are in scene coordinates.
         """
         if self.mirror is not None:
-            targets = self.mirror.moved(
-                self.problem.mesh.vertices[self.handle], targets, self.mates
-            )
+            targets = self.mirror.moved(self.problem.mesh, self.handle, self.mates, targets)
         return self.problem.frame.inward(targets)
 
     def places(self, targets: FloatArray) -> FloatArray:

@@ -36,7 +36,6 @@ Symmetry: TypeAlias = str | tuple[ArrayLike, ArrayLike] | None
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _SAME = 1e-6  # diagonals, between a mirror image and a vertex that is its mate
-_ON_PLANE = 1e-6  # diagonals, between a vertex on the plane and the plane
 _FARTHEST = 0.05  # diagonals: a mesh whose mirror image is farther off is not symmetric
 _ROUNDS, _POINTS = 20, 2_000  # of the search for the plane
 _TERM_POINTS = 400  # vertices in the objective
@@ -117,15 +116,17 @@ class Mirror:
         sources = np.flatnonzero(is_new)
         return np.concatenate([ids, mates[sources]]), sources
 
-    def moved(self, rest: FloatArray, targets: FloatArray, sources: IntArray) -> FloatArray:
-        """Return the *targets* (k, 3) of handles and those of their mates, (k + e, 3).
+    def moved(
+        self, mesh: Mesh, ids: IntArray, sources: IntArray, targets: FloatArray
+    ) -> FloatArray:
+        """Return the *targets* (k, 3) of vertices of *mesh* and those of their mates, (k + e, 3).
 
-        *rest* (k + e, 3) are their places at rest, *sources* (e,) whose mates the last ones are.
-        Handles on the plane stay on it.
+        *ids* (k + e,) are all these vertices, *sources* (e,) whose mates the last ones are.
+        Vertices that are their own mates stay on the plane.
         """
+        rest, given = mesh.vertices[ids], ids[: len(targets)]
         u = targets - rest[: len(targets)]
-        reach = np.abs((rest[: len(targets)] - self.point) @ self.normal)
-        on_plane = reach <= _ON_PLANE * max(float(np.ptp(rest, axis=0).max()), reach.max())
+        on_plane = self.mates[given] == given
         u[on_plane] -= np.outer(u[on_plane] @ self.normal, self.normal)
         return np.asarray(rest + np.concatenate([u, self.reflected(u[sources])]))
 
@@ -136,7 +137,9 @@ class Mirror:
         rows = subspace.at(some)
         at_mates = subspace.at(self.corners[some].ravel()).reshape(len(some), 3, -1)
         mates = np.einsum("kc,kcm->km", self.shares[some], at_mates)
-        return MirrorTerm.of(rows, mates, self.normal, rest_cages, weight / len(some))
+        return MirrorTerm.of(
+            rows, mates, normal=self.normal, rest=rest_cages, weight=weight / len(some)
+        )
 
 
 def _given(symmetry: object) -> tuple[FloatArray, FloatArray]:

@@ -304,4 +304,9 @@ def _volumes(state: State) -> dict[str, Any]:
     """Return the options of *state* for `Deformer.hold`."""
     names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
     given = {name: getattr(state.options, name) for name in names}
-    return {**given, "volumes": dict(state.options.volumes), "slides": state.slides}
+    return {
+        **given,
+        "volumes": dict(state.options.volumes),
+        "slides": state.slides,
+        "symmetry": state.options.symmetry,
+    }

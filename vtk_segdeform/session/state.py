@@ -50,6 +50,7 @@ _WORDS = {
     "preserve_volume": "volume preservation",
     "preserve_region_volumes": "volume preservation per region",
     "volumes": "volumes",
+    "symmetry": "symmetry",
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
@@ -76,6 +77,8 @@ class Options:
         each connected part, as `Deformer` does.
     volumes : mapping of str to str or float
         Goals by the names of volumes, as `Deformer` takes them; kept as pairs.
+    symmetry : str, optional
+        Mirror motions about a plane: "x", "y", "z" or "auto", as `Deformer` does.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int
@@ -98,6 +101,7 @@ class Options:
     rotation_groups: int = 300
     avoid_contact: bool = False
     volumes: tuple[tuple[str, str | float], ...] = ()
+    symmetry: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "volumes", _pairs(self.volumes))
@@ -108,6 +112,10 @@ class Options:
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
+        if self.symmetry not in (None, "x", "y", "z", "auto"):
+            raise SessionError(
+                f"symmetry must be x, y, z, auto or None; got {shown(self.symmetry)}"
+            )
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:

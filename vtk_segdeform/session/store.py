@@ -75,6 +75,7 @@ _LATER = {
     "lids": None,
     "avoid_contact": False,
     "volumes": (),
+    "symmetry": None,
 }  # options that version 1 does not have, and their defaults
 
 # Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
