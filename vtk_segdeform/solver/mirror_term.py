@@ -31,6 +31,7 @@ class MirrorTerm:
         cls,
         rows: FloatArray,
         mates: FloatArray,
+        *,
         normal: FloatArray,
         rest: FloatArray,
         weight: float,
