@@ -29,6 +29,7 @@ from ..session import Session, load_session
 from . import motion
 from .outputs import (
     HANDLE_TOLERANCE,
+    LIDS,
     Say,
     coloured_cages,
     coloured_regions,
@@ -45,7 +46,6 @@ from .selection import Role, parse_selection
 from .turns import turns_off
 
 SESSION = ".segdeform"  # suffix of session files
-LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -83,7 +83,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options.output, LIDS[options.lids])
+    stored = written(surface, solution, options)
     report_solution(stored, seconds, say)
     report_goals(stored, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)

@@ -449,6 +449,12 @@ def _constraints(parser: argparse.ArgumentParser) -> None:
     add("--slide", action="append", default=[], metavar="SEL", help=text)
     text = "mirror motions about a plane with this normal, whose place is found, or auto"
     add("--symmetry", choices=("x", "y", "z", "auto"), default=None, help=text)
+    text = "an array of vectors or tensors that turns with the surface; may be repeated"
+    add("--turn", action="append", default=[], metavar="ARRAY", help=text)
+    text = "the same, pushed forward with the surface: lengths change; may be repeated"
+    add("--push", action="append", default=[], metavar="ARRAY", help=text)
+    text = "add a point array of this name: how far each point has moved"
+    add("--displacement", default=None, metavar="NAME", help=text)
 
 
 def _contact_and_lids(parser: argparse.ArgumentParser) -> None:

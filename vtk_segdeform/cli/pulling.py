@@ -15,7 +15,7 @@ from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
-from .commands import LIDS, constraints_of
+from .commands import constraints_of
 from .motion import parse_vector
 from .outputs import (
     HANDLE_TOLERANCE,
@@ -60,7 +60,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options.output, lids)
+    stored = written(surface, solution, options)
     report_volume(stored.volume_change, say)
     report_goals(stored, say)
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
