@@ -19,6 +19,7 @@ from .commands import constraints_of
 from .motion import parse_vector
 from .outputs import (
     HANDLE_TOLERANCE,
+    LIDS,
     Say,
     report_goals,
     report_pose,

@@ -65,7 +65,9 @@ def _moved(values: FloatArray, gradients: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("kij,kj->ki", gradients, values))
     full = values.reshape(-1, 3, 3) if values.shape[1] == 9 else values[:, _SYMMETRIC]
     full = gradients @ full @ np.swapaxes(gradients, 1, 2)
-    return np.asarray(full.reshape(-1, 9) if values.shape[1] == 9 else full[:, *_UNIQUE])
+    return np.asarray(
+        full.reshape(-1, 9) if values.shape[1] == 9 else full[(slice(None), *_UNIQUE)]
+    )
 
 
 class _Change(NamedTuple):
