@@ -392,6 +392,20 @@ class Deformer:
         x = self._problem.frame.about_origin(x)
         return self._enclosed.volumes(x, self._options.parts)
 
+    @one_blas_thread()
+    def volume(self, name: str, vertices: ArrayLike | None = None) -> tuple[float, float]:
+        """Return one of `volumes`, and (V - V0) / V0, at *vertices* (n, 3) or at rest.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no volume called *name*.
+        """
+        rest = self.mesh.vertices
+        x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
+        x = self._problem.frame.about_origin(x)
+        return self._enclosed.volume(name, x, self._options.parts)
+
     @property
     def mirror(self) -> Mirror | None:
         """The plane of symmetry, with its error and the mates of the vertices."""

@@ -59,6 +59,7 @@ class EnclosedVolume:
     problem: Problem
     lids: Lids
     total: VolumeConstraint
+    _named: dict[str, VolumeConstraint] = field(default_factory=dict, repr=False)
     _known: dict[tuple[object, ...], Preserved] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -228,8 +229,16 @@ class EnclosedVolume:
 
     def volumes(self, x: FloatArray, parts: Mapping[str, BoolArray]) -> dict[str, float]:
         """Return all volumes by name, at the vertices *x* (n, 3)."""
-        every = {name: self.named(name, parts) for name in (*self.volume_names, *parts)}
-        return {name: each.target + each.violation(x) for name, each in every.items()}
+        return {name: self.volume(name, x, parts)[0] for name in (*self.volume_names, *parts)}
+
+    def volume(
+        self, name: str, x: FloatArray, parts: Mapping[str, BoolArray]
+    ) -> tuple[float, float]:
+        """Return a volume at the vertices *x* (n, 3), and (V - V0) / V0."""
+        found = self._named.get(name)
+        if found is None or name in parts:
+            found = self._named[name] = self.named(name, parts)
+        return found.target + found.violation(x), found.relative(x)
 
     def changes_of_regions(self, x: FloatArray) -> FloatArray:
         """Return the relative change of the volume of each region in the pose *x* (n, 3)."""

@@ -635,6 +635,16 @@ class Session(Described):
         """Return all volumes of the pose by name, in the mesh's unit cubed; see `Deformer`."""
         return self.deformer.volumes(self.vertices)
 
+    def volume(self, name: str) -> tuple[float, float]:
+        """Return one of `volumes`, and (V - V0) / V0."""
+        return self.deformer.volume(name, self.vertices)
+
+    def forget_volume(self, name: str) -> None:
+        """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
+        goals = {own: goal for own, goal in self.options.volumes if own != name}
+        options = replace(self.options, volumes=tuple(goals.items()))
+        self.history.step(f"forget the volume of {name}", replace(self.state, options=options))
+
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
         """Change the volume called *name*, as part of a drag, like `drag`.
 
@@ -780,9 +790,9 @@ class Session(Described):
         """Redo the last step undone; return its label, or None if there is none."""
         return self.history.redo()
 
-    def commit(self, label: str | None = None) -> str | None:
+    def commit(self, label: str | None = None, *, join: bool = False) -> str | None:
         """End the drag as one step, and return its label; see `Timeline.commit`."""
-        return self.history.commit(label)
+        return self.history.commit(label, join=join)
 
     def revert(self) -> None:
         """Cancel the drag and restore the state before it."""
