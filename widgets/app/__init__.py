@@ -7,7 +7,7 @@ The files, in reading order:
     start_page    the page shown before a document is open
     documents     the open document, and readers for it
     opening       the request to open a document, and the waiting page
-    qt_timer      a timer of Qt for background jobs
+    qt_ticker     the timers of Qt, for a queue
     saving        saving, and the questions asked before
     dialogs       the dialogs
     menus         the menus
@@ -16,7 +16,6 @@ The files, in reading order:
                   repair and open: a closed copy of the surface as a new document
     drops         files dropped on the window
     recent        recent files
-    autosaver     when to autosave
 """
 
 from .window import Window

@@ -48,13 +48,13 @@ class Document:
         """The description stored with autosaved work."""
         return About(self.name, _text(self.session_path), _text(self.source))
 
-    def file(self, session: Session, *, is_unsaved: bool = False) -> SessionFile:
-        """Return the editor's file for *session*, which is modified at first if *is_unsaved*."""
-        saved = Session(session.mesh) if is_unsaved else session
-        file = SessionFile(self.proposal.with_suffix(SUFFIX), saved)
+    def file(self, session: Session, *, is_new: bool = False) -> SessionFile:
+        """Return the editor's file for *session*, which has yet to be saved if it *is_new*."""
+        file = SessionFile(self.proposal.with_suffix(SUFFIX), session)
         if self.session_path is not None:
             file.path = self.session_path
-            file.mark_saved(saved)
+            file.mark_saved(session)
+        file.is_new = is_new
         return file
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import SessionFile, Slot
+from ..editor import Slot
 from .documents import Reader
 
 Qt = QtCore.Qt
@@ -27,19 +27,7 @@ class Request:
     slot: Slot | None = None
     """Where it was autosaved, if it is recovered work."""
     is_new: bool = False
-    """Whether it has been made by the program, and is to be saved."""
-    original: Request | None = None
-    """How to return to the document of which it is a repaired copy."""
-    repaired: Request | None = None
-    """How to return to its repaired copy, if that was undone."""
-    names: tuple[str, ...] = ()
-    """The states of this original or repaired copy in the history, by name."""
-    file: SessionFile | None = None
-    """The file of its session, if that was open before."""
-    position: int | None = None
-    """The position in the whole history to open it at."""
-    message: str = ""
-    """What to say then."""
+    """Whether it has been made or recovered by the program, and is to be saved."""
 
 
 class WaitingPage(QtWidgets.QWidget):

@@ -27,7 +27,6 @@ from .help_card import HelpCard
 from .hints import hint
 from .keys import Keys
 from .messages import Messages
-from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
@@ -65,8 +64,6 @@ class Controller:
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
-    neighbours : Neighbours
-        The sessions before and after this one in the history.
     camera : Camera
         Navigation, views and the orientation cube.
     queue : Queue
@@ -83,7 +80,6 @@ class Controller:
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
-        self.neighbours = Neighbours()
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
         self._left = False, False  # by turning off: as `_ahead`
@@ -96,7 +92,7 @@ class Controller:
             self.queue,
             lambda: self.session,
             lambda: self.widgets.surface,
-            self._is_free,
+            self.is_free,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
@@ -111,20 +107,6 @@ class Controller:
     def session(self) -> Session:
         """The session being edited; another one after `open`."""
         return self.widgets.session
-
-    @property
-    def undo_label(self) -> str | None:
-        """The step to undo: of the session, or else the one from which the session came."""
-        label, before = self.session.history.undo_label, self.neighbours.before
-        return before.step if label is None and before is not None else label
-
-    @property
-    def redo_label(self) -> str | None:
-        """The step to redo: to the session that came from this state, or else of the session."""
-        after = self.neighbours.after(self.session)
-        if after is not None and after[0] == self.session.history.position:
-            return after[1].step
-        return self.session.history.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -470,7 +452,7 @@ class Controller:
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
 
-    def _is_free(self) -> bool:
+    def is_free(self) -> bool:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
@@ -479,7 +461,7 @@ class Controller:
         return self._is_on and not (self.is_busy or is_used or is_refined)
 
     def _is_at_rest(self) -> bool:
-        return self._is_free() and self.queue.task(Kind.PREPARE) is None
+        return self.is_free() and self.queue.task(Kind.PREPARE) is None
 
     def _load_later(self) -> None:
         """Load kernels once the hand has rested: a press would wait for it."""
@@ -492,9 +474,8 @@ class Controller:
         self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=may_begin, rest=_REST))
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
-        was_modified, after = self.file.is_modified(session), self.neighbours.after(session)
+        was_modified = self.file.is_modified(session)
         session.accept(preparation)
-        self.neighbours.prepared(session, after)
         self._load_later()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
@@ -573,7 +554,7 @@ class Controller:
 
         self.queue.cancel(Kind.CHECK)
         self._is_intact = True
-        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self._is_free)
+        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self.is_free)
         self.queue.add(task)
 
     def saved_intact(self) -> bool:

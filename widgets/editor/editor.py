@@ -29,7 +29,7 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..scene import Phase, Stop, View
-from .actions import Action, show_pose, show_rest
+from .actions import Action, show_rest
 from .bindings import KeyChoice, keys_of
 from .controller import Controller
 from .keys import Keys, key_cap, pressed_key
@@ -298,7 +298,7 @@ class DeformEditor:
 
     def _show_pose(self) -> None:
         self._stop_waiting()
-        show_pose(self._controller)
+        self._controller.show_instead(None)
 
     def _type(self, key: str) -> None:
         binding = self.keys.binding_of(key, self.mode)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..editor import DeformEditor, Mode, selecting_through, with_radius
+from ..editor import DeformEditor, Mode, actions
 from ..region_selector import Tool
 from .fields import Field, Section, key_button
 
@@ -43,7 +43,7 @@ def painting_section(editor: DeformEditor) -> Section:
                 maximum=round(2.0 * diagonal, decimals),
                 step=0.01 * diagonal,
                 decimals=decimals,
-                act=with_radius,
+                act=lambda radius: actions.assigning(actions.selector_of, "radius", radius),
             ),
             Field(
                 "paint.through",
@@ -52,7 +52,7 @@ def painting_section(editor: DeformEditor) -> Section:
                 "Paint hidden vertices as well",
                 "select_through",
                 value=selector.through,
-                act=selecting_through,
+                act=lambda on: actions.assigning(actions.selector_of, "through", on),
             ),
             (
                 key_button(keys, "paint.grow", "grow", "Grow"),

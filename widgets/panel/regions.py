@@ -6,17 +6,7 @@ from collections.abc import Sequence
 
 from vtk_segdeform.pictures import of_region
 
-from ..editor import (
-    Action,
-    DeformEditor,
-    Mode,
-    choosing_regions,
-    merging,
-    naming_region,
-    segmenting,
-    showing_cage,
-    split_region,
-)
+from ..editor import Action, Controller, DeformEditor, Mode, actions
 from ..volume_overlay import in_tenths
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
 
@@ -47,7 +37,7 @@ def regions_section(editor: DeformEditor) -> Section:
                 minimum=1,
                 maximum=_MOST,
                 on_release=True,
-                act=segmenting,
+                act=lambda n: lambda controller: actions.segment(controller, n),
             ),
             Table(
                 "regions.list",
@@ -59,8 +49,8 @@ def regions_section(editor: DeformEditor) -> Section:
                 multiple=True,
                 acts={
                     "select": _choosing,
-                    "rename": lambda key, name: naming_region(int(key), name),
-                    "cage": lambda key, on: showing_cage(int(key), on),
+                    "rename": _renaming,
+                    "cage": _showing_cage,
                 },
             ),
             (
@@ -72,7 +62,7 @@ def regions_section(editor: DeformEditor) -> Section:
                     "Merge the selected regions",
                     enabled=len(existing) > 1,
                     visible=painting,
-                    act=lambda _: merging(existing),
+                    act=lambda _: actions.merging(existing),
                 ),
                 Field(
                     "regions.split",
@@ -82,7 +72,7 @@ def regions_section(editor: DeformEditor) -> Section:
                     "split_region",
                     enabled=len(existing) == 1,
                     visible=painting,
-                    act=lambda _: split_region,
+                    act=lambda _: actions.split_region,
                 ),
             ),
         ),
@@ -90,7 +80,23 @@ def regions_section(editor: DeformEditor) -> Section:
 
 
 def _choosing(keys: Sequence[str]) -> Action:
-    return choosing_regions([int(key) for key in keys])
+    return lambda controller: controller.widgets.choose_regions([int(key) for key in keys])
+
+
+def _showing_cage(key: str, on: bool) -> Action:
+    return lambda controller: controller.widgets.cages.set_visible(int(key), on)
+
+
+def _renaming(key: str, name: str) -> Action:
+    """Return the action that renames a region; "" restores its default name."""
+
+    def rename(controller: Controller) -> None:
+        session, region = controller.session, int(key)
+        before = session.region_name(region)
+        session.painting.rename(region, name)
+        controller.say(f"Renamed {before} to {session.region_name(region)}")
+
+    return rename
 
 
 def _rows(editor: DeformEditor) -> tuple[Row, ...]:

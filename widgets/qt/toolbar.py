@@ -13,15 +13,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import (
-    MESH_FILES,
-    READABLE_FILES,
-    DeformEditor,
-    exporting,
-    opening,
-    save,
-    saving,
-)
+from ..editor import MESH_FILES, READABLE_FILES, DeformEditor, actions
 from ..panel import Field, toolbar, tooltip
 from .controls import Press, highlighted, tool_button
 from .icons import icon
@@ -183,7 +175,7 @@ class Toolbar(QtWidgets.QWidget):
             self, "Open", self._folder(), READABLE_FILES
         )
         if path and self.may_discard():
-            self._editor.do(opening(Path(path)))
+            self._editor.do(actions.opening(Path(path)))
 
     def may_discard(self) -> bool:
         """Return whether the session may be closed; ask if it has unsaved changes."""
@@ -199,7 +191,7 @@ class Toolbar(QtWidgets.QWidget):
     def save_session(self) -> None:
         """Save to the session's file; ask before another existing file is replaced."""
         if self._editor.controller.file.may_overwrite:
-            self._editor.do(save)
+            self._editor.do(actions.save)
         else:
             self.ask_and_save()
 
@@ -207,14 +199,14 @@ class Toolbar(QtWidgets.QWidget):
         """Ask for a file and save the session there."""
         path = self._path_to_write("Save session", str(self._editor.path), _SESSIONS)
         if path is not None:
-            self._editor.do(saving(path if path.suffix else path.with_suffix(".segdeform")))
+            self._editor.do(actions.saving(path if path.suffix else path.with_suffix(".segdeform")))
 
     def ask_and_export(self) -> None:
         """Ask for a file and write the posed mesh there."""
         proposed = str(self._editor.path.with_suffix(".ply"))
         path = self._path_to_write("Save mesh", proposed, MESH_FILES)
         if path is not None:
-            self._editor.do(exporting(path if path.suffix else path.with_suffix(".ply")))
+            self._editor.do(actions.exporting(path if path.suffix else path.with_suffix(".ply")))
 
     def _path_to_write(self, title: str, proposed: str, kinds: str) -> Path | None:
         path, _ = QtWidgets.QFileDialog.getSaveFileName(self, title, proposed, kinds)

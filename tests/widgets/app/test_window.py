@@ -754,11 +754,13 @@ def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
 @BLANK
 def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
-    hand, told = start(ball_file, interval=0.05), []
-    hand.window.autosaver.failed.connect(told.append)
-    change(hand)
+    hand = start(ball_file, interval=0.05)
+    window, told = hand.window, []
+    say = window.editor.controller.say
+    window.editor.controller.say = lambda text: told.append(text) or say(text)
+    window.session.handles.add([40, 41], "knob")
     until(lambda: told, "the word")
-    assert "Could not autosave" in hand.window.editor.status
+    assert "Could not autosave" in window.editor.status
     (tmp_path / "unsaved").unlink()
     until(lambda: slots(tmp_path), "another attempt")
     assert len(told) == 1

@@ -20,10 +20,9 @@ from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions, controller
-from vtk_segdeform.widgets.editor import panel_actions as actions_of_panel
 from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.editor.job import _Shared
+from vtk_segdeform.widgets.editor.queue import _Shared
 from vtk_segdeform.widgets.editor.session_file import read_session
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
@@ -339,7 +338,8 @@ def test_painted_handles_are_coloured_where_they_hold_the_surface(bench, mode):
     (name,) = bench.session.handles
     bench.editor.mode = mode
     shown = picture(bench.view)
-    bench.editor.do(actions_of_panel.hiding_handle(name, True))
+    bench.editor.widgets.dragger.set_hidden(name, True)
+    bench.editor.widgets.show(mode)
     hidden = picture(bench.view)
     assert np.any(shown != hidden, axis=2).sum() > 100
 
@@ -351,7 +351,7 @@ def test_a_refit_is_one_step_and_keeps_the_pose(bench):
     session.move_handle(next(iter(session.handles)), up)
     session.commit()
     before, count = session.vertices, len(session.history.labels)
-    bench.editor.do(actions_of_panel.fitting_with(60))
+    bench.editor.do(lambda controller: actions.fit_cages(controller, 60))
     bench.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 60
     assert len(session.history.labels) == count + 1
@@ -682,7 +682,7 @@ def test_do_returns_the_error_of_an_action_or_none(bench):
     bench.editor.controller.start("Counting", lambda _: time.sleep(0.05), lambda _: None)
     refusal = bench.editor.do(actions.undo)
     assert str(refusal).startswith("Busy. Counting")
-    assert bench.editor.do(actions.toggle_help, while_busy=True) is None
+    assert bench.editor.do(lambda controller: controller.show_keys(), while_busy=True) is None
     bench.settle()
     bench.hand.failures.clear()
 
