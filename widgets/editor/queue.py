@@ -1,8 +1,5 @@
 """Everything that a window does in the background, or later: one queue.
 
-    queue = Queue(view, refresh)
-    queue.add(Task(kind=Kind.JOB, name="Fitting cages", begin=lambda: work, done=show))
-
 Of the tasks that may begin, the one of the first kind begins first:
 
     JOB       an action of the user; begins at once, and the widgets are off meanwhile
@@ -81,10 +78,6 @@ class Ticker(Protocol):
         """Report exceptions that are raised inside."""
 
 
-def _always() -> bool:
-    return True
-
-
 @dataclass(eq=False, kw_only=True)
 class Task:
     """Something to do, now or later.
@@ -115,8 +108,8 @@ class Task:
     done: Callable[[Any], object] = lambda _: None
     failed: Callable[[BaseException], object] | None = None
     name: str = ""
-    may_begin: Callable[[], bool] = _always
-    may_end: Callable[[], bool] = _always
+    may_begin: Callable[[], bool] = lambda: True
+    may_end: Callable[[], bool] = lambda: True
     rest: float = 0.0
     since: float = field(default=0.0, init=False)
     future: futures.Future[Any] | None = field(default=None, init=False)
@@ -379,18 +372,14 @@ class Queue:
     @property
     def _computing(self) -> list[Task]:
         """The tasks with threads that compute; writing a file leaves the window its time."""
-        running = (task for task in self._tasks if task.future is not None)
-        return [task for task in running if task.kind is not Kind.AUTOSAVE]
+        return [task for task in self._tasks if task.future and task.kind is not Kind.AUTOSAVE]
 
     def _changed(self) -> None:
         self._told, self._told_at = self._progress(), time.monotonic()
         self._tell()
 
     def _progress(self) -> list[object]:
-        return [
-            (self.fraction(task.kind), task.text if task.kind <= Kind.DOCUMENT else "")
-            for task in self._computing
-        ]
+        return [(self.fraction(task.kind), task.text) for task in self._computing]
 
     def _report(self) -> None:
         if time.monotonic() >= self._told_at + _REPORT_INTERVAL and self._progress() != self._told:
