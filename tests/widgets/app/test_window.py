@@ -452,26 +452,6 @@ def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     assert "no folder" in boxes.seen[-1]
 
 
-@pytest.mark.campaign
-def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
-    start, ball_file, tmp_path, monkeypatch
-):
-    hand = start(ball_file)
-    head = hand.window.editor_widget.panel.toolbar
-    change(hand)
-    choose_file(monkeypatch, tmp_path / "knob.segdeform")
-    head.buttons["save"].menu().actions()[1].trigger()
-    assert hand.title == "knob.segdeform - segdeform"
-    head.buttons["save"].menu().actions()[0].trigger()
-    choose_file(monkeypatch, ball_file)
-    hand.click(head.buttons["open"])
-    hand.settle()
-    assert hand.title == "ball.vtp - segdeform"
-    choose_file(monkeypatch, tmp_path / "again.vtp")
-    hand.window.editor_widget.panel.toolbar.buttons["save"].menu().actions()[2].trigger()
-    assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
-
-
 # Drops and invalid files.
 
 
@@ -520,37 +500,6 @@ def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, 
 
 
 # View and help.
-
-
-@pytest.mark.campaign
-def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
-    hand = start(arm_file)
-    hand.view_hand()
-    for name, is_shown in (
-        ("Show cages in all modes", lambda: hand.window.editor.widgets.cages.is_shown),
-        ("Show local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
-    ):
-        assert hand.reads("View")[name] == (True, False)
-        hand.choose("View", name)
-        hand.settle()
-        assert is_shown()
-        assert hand.reads("View")[name] == (True, True)
-        hand.choose("View", name)
-        hand.settle()
-        assert not is_shown()
-    cards = hand.window.editor_widget.first_steps
-    cards.hide()
-    hand.choose("Help", "First steps")
-    assert cards.isVisible()
-    plotter = hand.window.editor_widget.plotter
-    plotter.camera.zoom(5.0)
-    hand.choose("View", "Fit to view")
-
-    def is_framed():
-        places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
-        return (places > 0).all() and (places < plotter.window_size).all()
-
-    until(is_framed, "the mesh in the view")
 
 
 @BLANK
@@ -632,21 +581,6 @@ def test_a_picture_shows_the_view_without_status_line_and_gizmo(
 
 
 # Autosave.
-
-
-@pytest.mark.campaign
-def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
-    hand = start(arm_file)
-    mouse = hand.view_hand()
-    mouse.drag(hand.way())
-    hand.settle()
-    (path,) = slots(tmp_path)
-    assert digest(load_session(path)) == digest(hand.window.session)
-    assert hand.window.session.state.pose is not None
-    hand.choose("File", "Save session")
-    hand.settle()
-    assert slots(tmp_path) == []
-    assert digest(load_session(arm_file)) == digest(hand.window.session)
 
 
 def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
