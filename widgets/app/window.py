@@ -11,7 +11,6 @@ read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanw
 from __future__ import annotations
 
 import os
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,6 @@ from ..editor import (
     DeformEditor,
     Kind,
     Queue,
-    Slot,
     Task,
     expect_session,
 )
@@ -104,8 +102,6 @@ class Window(QtWidgets.QMainWindow):
         self._interval = interval
         self.document = Document("")
         self.mesh_state: object = None
-        self._make_other = partial(Window, settings, autosaves, interval=interval)
-        self._other: Window | None = None  # for a file beside recovered work
         self.editor_widget: Any = None
         self._request: Request | None = None  # that is being opened
         self._queue = Queue(QtTicker(self), self._show_progress)
@@ -155,17 +151,12 @@ class Window(QtWidgets.QMainWindow):
     # Opening.
 
     def begin(self, path: Path | None = None) -> None:
-        """Offer to recover autosaved work; open *path*, in another window beside recovered work."""
-        slot = self._recover()
+        """Offer to recover autosaved work; open *path*, if it is given, unless that is accepted."""
+        is_recovered = self.recover()
         if path is None:
             QtCore.QTimer.singleShot(_PAUSE, self, self._load_kernels)
-            return
-        if slot is None:
+        elif not is_recovered:
             self.open(path)
-        elif str(path.absolute()) not in (slot.about.session, slot.about.mesh):
-            self._other = self._make_other()
-            self._other.show()
-            self._other.open(path)
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
@@ -200,16 +191,12 @@ class Window(QtWidgets.QMainWindow):
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
-        return self._recover() is not None
-
-    def _recover(self) -> Slot | None:
-        """Offer to recover autosaved work; return what the user has chosen."""
         slot = choose_work(self, self.autosaves)
-        if slot is not None and not self._open(
-            Request(slot.about.name, from_slot(slot), slot=slot, is_new=True)
-        ):
+        if slot is None:
+            return False
+        if not self._open(Request(slot.about.name, from_slot(slot), slot=slot, is_new=True)):
             slot.release()
-        return slot
+        return True
 
     def _keep_keys(self) -> None:
         """Store the keys that were assigned in the dialog."""

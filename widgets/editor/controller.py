@@ -148,11 +148,10 @@ class Controller:
                     if was_on:
                         self._left = self._ahead
                     self.help.hide()
-                    self.queue.hurry(Kind.SAVE)
                     self._preparing.stop()
                     self.finishing.interrupt()
                     self.queue.cancel(Kind.JOB, Kind.LOAD)
-                    self.wait()
+                    self.queue.wait(Kind.JOB)
             finally:
                 self._apply_mode()
 
@@ -191,11 +190,6 @@ class Controller:
     # Messages.
 
     @property
-    def status(self) -> str:
-        """Text of the status line."""
-        return self.messages.text
-
-    @property
     def hint(self) -> str:
         """The next step, or what is shown."""
         if self.widgets.surface.instead is not None:
@@ -212,8 +206,12 @@ class Controller:
         mode = f"{self._mode.value} {self._mode.name}"
         job = self.queue.job
         if self.widgets.is_settling and self.queue.task(Kind.SETTLE) is None:
-            may_begin = self._has_settled
-            self.queue.add(Task(kind=Kind.SETTLE, begin=self.refresh, may_begin=may_begin))
+            task = Task(
+                kind=Kind.SETTLE,
+                begin=self.refresh,
+                may_begin=lambda: not self.widgets.is_settling,
+            )
+            self.queue.add(task)
         if job is not None:
             self.messages.show_progress(
                 mode, self.queue.text, job.fraction, is_cancelled=job.is_cancelled
@@ -315,7 +313,6 @@ class Controller:
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects
-        self.queue.hurry(Kind.SAVE)
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if is_compiling():
@@ -345,11 +342,6 @@ class Controller:
         """Whether a job is running."""
         return self.queue.job is not None
 
-    @property
-    def refusal(self) -> str:
-        """Why an action is refused while a job is running."""
-        return self.queue.refusal
-
     def start(
         self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
     ) -> None:
@@ -377,17 +369,12 @@ class Controller:
 
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
-            self.queue.hurry(Kind.SAVE)
             self._preparing.interrupt()
             self.finishing.interrupt()
             task = Task(kind=Kind.JOB, name=name, begin=lambda: with_kernels, done=deliver)
             self.queue.add(task)
             self.widgets.switch_off()
             self.refresh()
-
-    def wait(self) -> None:
-        """Block until no job is running; for scripts."""
-        self.queue.wait(Kind.JOB)
 
     @property
     def is_modified(self) -> bool:
@@ -407,9 +394,7 @@ class Controller:
             self.finishing.interrupt()
             self.widgets.stop_refining()
             self.queue.cancel(Kind.SETTLE)
-            self.messages.note("Stopped. The pose has not settled")
-            self.queue.hurry(Kind.SAVE)
-            self.refresh()
+            self.say("Stopped. The pose has not settled")
         elif self.finishing.interrupt():
             self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
@@ -460,9 +445,6 @@ class Controller:
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
 
-    def _is_at_rest(self) -> bool:
-        return self.is_free() and self.queue.task(Kind.PREPARE) is None
-
     def _load_later(self) -> None:
         """Load kernels once the hand has rested: a press would wait for it."""
         self.queue.cancel(Kind.LOAD)
@@ -470,8 +452,10 @@ class Controller:
         def load() -> None:
             load_early()
 
-        may_begin = self._is_at_rest
-        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=may_begin, rest=_REST))
+        def is_at_rest() -> bool:
+            return self.is_free() and self.queue.task(Kind.PREPARE) is None
+
+        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=is_at_rest, rest=_REST))
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)
@@ -500,32 +484,19 @@ class Controller:
 
     # Files.
 
-    def once_settled(self, act: Callable[[], None]) -> None:
-        """Call *act* once the pose has settled: what is saved is the pose that is to come.
-
-        What would change the pose meanwhile, such as a press, lets *act* be called first, and so
-        does Escape, at which the pose remains as it is.
-        """
-        if not self.widgets.is_pose_to_come:
-            act()
-            return
-        may_begin = self._has_come
-        self.queue.add(Task(kind=Kind.SAVE, begin=act, may_begin=may_begin))
-        self.say("Saving once the pose has settled")
-
     def settle(self) -> None:
-        """Settle the pose now, which may take seconds, and save what waits; for scripts."""
+        """Settle the pose now, which may take seconds: what is saved is the pose that is to come.
+
+        Raises
+        ------
+        SessionError
+            If a released pull waits for the preparation of the mesh.
+        """
+        if self.widgets.puller.waiting.has_pull:
+            raise SessionError("The pull is not computed yet. Save again in a moment")
         if self.widgets.is_settling:
             self.session.refine()
             self.queue.cancel(Kind.SETTLE)
-        if not self.widgets.is_pose_to_come:
-            self.queue.hurry(Kind.SAVE)
-
-    def _has_settled(self) -> bool:
-        return not self.widgets.is_settling
-
-    def _has_come(self) -> bool:
-        return not self.widgets.is_pose_to_come
 
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""

@@ -144,7 +144,7 @@ class DeformEditor:
     @property
     def status(self) -> str:
         """Text of the status line."""
-        return self._controller.status
+        return self._controller.messages.text
 
     @property
     def is_busy(self) -> bool:
@@ -158,7 +158,7 @@ class DeformEditor:
 
     def wait(self) -> None:
         """Block until no job is running; raise the error of a failed job.  For scripts."""
-        self._controller.wait()
+        self._controller.queue.wait(Kind.JOB)
 
     def do(self, action: Action, *, while_busy: bool = False) -> Exception | None:
         """Run an action as if its key had been pressed; an error is shown in the status line.
@@ -317,11 +317,9 @@ class DeformEditor:
         if not while_busy:
             if controller.is_busy:
                 controller.refuse()
-                return SessionError(controller.refusal)
+                return SessionError(controller.queue.refusal)
             controller.widgets.finish()
         controller.messages.clear()
-        if not while_busy:
-            controller.queue.hurry(Kind.SAVE)
         self._stop_waiting()
         is_edit = not while_busy and action is not show_rest
         if is_edit:  # the camera may move around the mesh at rest

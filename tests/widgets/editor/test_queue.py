@@ -132,7 +132,7 @@ def test_no_result_is_delivered_while_the_hand_is_active_but_the_worker_is_free(
     bench.until(lambda: "prepare" in bench.heard)
 
 
-def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
+def test_a_task_begins_after_a_rest_or_when_it_is_waited_for(bench, monkeypatch):
     now, is_free = [0.0], [True]
     monkeypatch.setattr(queue_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     how = {"rest": 1.0, "may_begin": lambda: is_free[0]}
@@ -143,8 +143,8 @@ def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
     now[0] = 2.6
     bench.hand.tick()
     assert bench.heard == ["loaded"]
-    bench.queue.add(Task(kind=Kind.SAVE, begin=lambda: bench.heard.append("saved"), **how))
-    bench.queue.hurry(Kind.SAVE)
+    bench.queue.add(Task(kind=Kind.AUTOSAVE, begin=lambda: bench.heard.append("saved"), **how))
+    bench.queue.wait(Kind.AUTOSAVE)
     bench.hand.tick()
     assert bench.heard == ["loaded", "saved"]
 

@@ -266,6 +266,7 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     until(lambda: not seen.editor.widgets.dragger.is_refining, "refinement")
     assert len(seen.deformed) >= 7
     assert max(map(abs, seen.deformed)) < 1e-12
+    until(lambda: not seen.editor.controller.finishing.is_pending, "the finish")
     bent = seen.session.vertices
     seen.settle()
     volumes = [text for _, _, text in rows(panel.controls["regions.list"])]
@@ -825,6 +826,15 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
             assert grey[:, :18].max() > 90  # the frame of an empty box
     finally:
         application().setPalette(before)
+
+
+def test_a_dock_is_made_for_a_view_of_plain_vtk():
+    view = plain_view((200, 150))
+    dock = deform_dock((view.renderer, view.interactor), MESH)
+    assert dock.editor.GetEnabled()
+    assert dock.panel.isEnabled()
+    dock.editor.remove()
+    dock.deleteLater()
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():
