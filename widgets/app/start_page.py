@@ -11,7 +11,6 @@ from qtpy import QtCore, QtWidgets
 
 Qt = QtCore.Qt
 _WIDTH = 64  # letters
-_MOST = 6  # recent files; the menu has the rest
 
 
 class StartPage(QtWidgets.QWidget):
@@ -64,7 +63,7 @@ class StartPage(QtWidgets.QWidget):
             self._list.removeWidget(button)
             button.hide()  # it is deleted only after a dialog that is shown next
             button.deleteLater()
-        self.recent = [self._recent_button(path) for path in paths[:_MOST]]
+        self.recent = [self._recent_button(path) for path in paths]
         for button in self.recent:
             self._list.addWidget(button)
         self._heading.setVisible(bool(self.recent))

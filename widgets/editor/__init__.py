@@ -28,7 +28,7 @@ from .autosaver import INTERVAL, Autosaver
 from .bindings import PRESETS, KeyChoice, keys_of
 from .controller import Controller
 from .editor import DeformEditor
-from .hints import hint
+from .hints import TOOLS, hint
 from .history import jumping_to, preview, states_of
 from .keys import MOUSE, Binding, Keys, key_cap, key_name
 from .messages import error_text
@@ -52,6 +52,7 @@ __all__ = [
     "MOUSE",
     "PRESETS",
     "READABLE_FILES",
+    "TOOLS",
     "About",
     "Action",
     "Autosaver",

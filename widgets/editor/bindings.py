@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
 
-from ..region_selector import Paint, Tool
+from ..region_selector import Paint
 from . import actions
+from .hints import TOOLS
 from .keys import VIEW, Binding, Keys
 from .widget_set import Mode
 
@@ -57,14 +58,14 @@ BINDINGS = (
     ),
     Binding("cancel", ("escape",), ALL, "Cancel", actions.cancel, while_busy=True),
     *(
-        Binding(name, (key,), PAINTING, label, actions.assigning(actions.selector_of, "tool", tool))
-        for name, key, label, tool in (
-            ("brush", "b", "Brush", Tool.BRUSH),
-            ("lasso", "l", "Lasso", Tool.LASSO),
-            ("rectangle", "t", "Rectangle", Tool.RECTANGLE),
-            ("connected_part", "k", "Connected part", Tool.COMPONENT),
-            ("whole_region", "r", "Whole region", Tool.REGION),
+        Binding(
+            TOOLS[tool],
+            (key,),
+            PAINTING,
+            TOOLS[tool].replace("_", " ").capitalize(),
+            actions.assigning(actions.selector_of, "tool", tool),
         )
+        for tool, key in zip(TOOLS, "bltkr", strict=True)
     ),
     *(
         Binding("", ("bracketleft", "bracketright"), modes, label, None, is_reserved=True)

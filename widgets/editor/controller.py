@@ -82,8 +82,8 @@ class Controller:
         self.notices = Notices(view, lambda: self.messages.height)
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
-        self._left = False, False  # by turning off: as `_ahead`
-        self._instead = self._unmoved = ""
+        self._interrupted = False, False  # by turning off: as `_unfinished`
+        self._text_instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
         self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
@@ -146,7 +146,7 @@ class Controller:
                 if not on:
                     self.widgets.finish()  # a drag that ends now is completed as any other
                     if was_on:
-                        self._left = self._ahead
+                        self._interrupted = self._unfinished
                     self.help.hide()
                     self._preparing.stop()
                     self.finishing.interrupt()
@@ -156,7 +156,7 @@ class Controller:
                 self._apply_mode()
 
     @property
-    def _ahead(self) -> tuple[bool, bool]:
+    def _unfinished(self) -> tuple[bool, bool]:
         """Whether the pose is settling, and whether it will be finished."""
         return self.widgets.is_settling, self.finishing.is_pending
 
@@ -165,8 +165,8 @@ class Controller:
 
         The part that is done when *progress* cancels remains.
         """
-        settles, finishes = self._ahead if self._is_on else self._left
-        self._left = False, False
+        settles, finishes = self._unfinished if self._is_on else self._interrupted
+        self._interrupted = False, False
         session = self.session
         if settles:
             session.refine(progress=part(progress, 0.0, 0.5))
@@ -193,7 +193,7 @@ class Controller:
     def hint(self) -> str:
         """The next step, or what is shown."""
         if self.widgets.surface.instead is not None:
-            return self._instead
+            return self._text_instead
         return hint(self.widgets, self._mode, self.keys)
 
     def say(self, text: str) -> None:
@@ -247,7 +247,7 @@ class Controller:
 
     def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
         """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""
-        surface, self._instead = self.widgets.surface, text
+        surface, self._text_instead = self.widgets.surface, text
         if vertices is not None:
             self.widgets.show_instead(vertices)
         elif surface.instead is None:

@@ -6,8 +6,8 @@ from ..editor import Action, Controller, DeformEditor, actions
 from .fields import Field, Section, key_button, option
 from .pulling import preserve_toggle, reset_button, volume_label
 
-_MOST = 100_000
-_EACH, _MOST_DETAIL = 12, 800  # cage vertices: fewest for each region, and most of the slider
+_MOST_VERTICES = 100_000
+_FEWEST_EACH, _MOST_ON_SLIDER = 12, 800  # cage vertices: of a region, and of the slider
 _LIDS = {"auto": None, "lids": True, "off": False}
 _LIDS_LABELS = (("Auto", "auto"), ("Under lids", "lids"), ("Off", "off"))
 
@@ -20,7 +20,7 @@ def cages_section(editor: DeformEditor) -> Section:
     wanted = options.n_cage_vertices
     if wanted == type(options)().n_cage_vertices:
         wanted = widgets.n_cage_vertices  # the default follows the regions
-    least = _EACH * max(1, widgets.n_regions)
+    least = _FEWEST_EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
     return Section(
         "cages",
@@ -34,7 +34,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 value=widgets.n_cage_vertices,
                 enabled=has_regions,
                 minimum=least,
-                maximum=max(least, _MOST_DETAIL),
+                maximum=max(least, _MOST_ON_SLIDER),
                 page=50.0,
                 on_release=True,
                 act=_fitting_with,
@@ -46,7 +46,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "Total vertices of all cages (used at next fit)",
                 value=wanted,
                 minimum=8,
-                maximum=_MOST,
+                maximum=_MOST_VERTICES,
                 step=10,
                 unit=f"({fitted} fitted)" if fitted not in (0, wanted) else "",
                 act=option("n_cage_vertices"),
@@ -157,7 +157,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 "Rotation clusters",
                 "Rotation clusters: fewer is faster, less accurate",
                 value=options.rotation_groups,
-                maximum=_MOST,
+                maximum=_MOST_VERTICES,
                 step=50,
                 minimum=1,
                 act=option("rotation_groups"),

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..editor import DeformEditor, Mode, actions
+from ..editor import TOOLS, DeformEditor, Mode, actions
 from ..region_selector import Tool
 from .fields import Field, Section, key_button
-
-_TOOLS = {
-    Tool.BRUSH: "brush",
-    Tool.LASSO: "lasso",
-    Tool.RECTANGLE: "rectangle",
-    Tool.COMPONENT: "connected_part",
-    Tool.REGION: "whole_region",
-}
 
 
 def painting_section(editor: DeformEditor) -> Section:
@@ -24,7 +16,7 @@ def painting_section(editor: DeformEditor) -> Section:
     decimals = max(0, 4 - math.floor(math.log10(diagonal)))
     tools = tuple(
         key_button(keys, f"paint.{action}", action, value=selector.tool is tool, group="tools")
-        for tool, action in _TOOLS.items()
+        for tool, action in TOOLS.items()
     )
     return Section(
         "paint",

@@ -10,7 +10,7 @@ from ..editor import Action, Controller, DeformEditor, Mode, actions
 from ..volume_overlay import in_tenths
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
 
-_MOST = 20  # regions of a segmentation
+_MOST_REGIONS = 20  # regions of a segmentation
 _COLUMNS = (
     Column("cage", "Cage", "Number of cage vertices. Tick: show the cage"),
     Column("volume", "Volume"),
@@ -32,10 +32,10 @@ def regions_section(editor: DeformEditor) -> Section:
                 "slider",
                 "Number",
                 "Number of regions: release to segment again, which resets the pose",
-                value=min(max(1, widgets.n_regions), _MOST),
+                value=min(max(1, widgets.n_regions), _MOST_REGIONS),
                 visible=painting,
                 minimum=1,
-                maximum=_MOST,
+                maximum=_MOST_REGIONS,
                 on_release=True,
                 act=lambda n: lambda controller: actions.segment(controller, n),
             ),

@@ -111,7 +111,7 @@ class Toolbar(QtWidgets.QWidget):
             button.clicked.connect(self._asker(name))
         elif field.kind == "hold":
             button.pressed.connect(lambda: self._hold(name))
-            button.released.connect(lambda: self._let_go(name))
+            button.released.connect(lambda: self._release(name))
             highlighted(button)
         else:
             button.clicked.connect(lambda: press(name))
@@ -125,7 +125,7 @@ class Toolbar(QtWidgets.QWidget):
         self._since.start()
         self._press(name, True)
 
-    def _let_go(self, name: str) -> None:
+    def _release(self, name: str) -> None:
         if self._was_held or self._since.elapsed() > _CLICK:
             self._press(name, False)
         self.refresh()

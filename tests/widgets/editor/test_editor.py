@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import pyvista as pv
 from hands import Hand, draw_seldom, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
@@ -20,7 +19,6 @@ from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions, controller
-from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.queue import _Shared
 from vtk_segdeform.widgets.editor.session_file import read_session
@@ -74,19 +72,6 @@ class Bench:
         return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
 
 
-@pytest.fixture(params=["plain", pytest.param("pyvista", marks=pytest.mark.campaign)])
-def any_view(request):
-    """Yield a view with pyvista, and one without."""
-    if request.param == "plain":
-        yield plain_view((400, 400))
-        return
-    plotter = pv.Plotter(off_screen=True, window_size=(400, 400))
-    plotter.disable_anti_aliasing()
-    plotter.show(auto_close=False, interactive=False)
-    yield View.of(plotter)
-    plotter.close()
-
-
 @pytest.fixture(scope="module")
 def ready():
     """Return the state of a small session, complete except for a pose."""
@@ -121,11 +106,11 @@ def pull_handle(bench, shift=(20, 30), moves=2):
     bench.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
 
 
-def test_the_whole_story(any_view, tmp_path):
+def test_the_whole_story(tmp_path):
     mesh = models.cactus(500)
     coarse = Session(mesh)
     coarse.change_options(n_cage_vertices=60)
-    bench = Bench(any_view, Session(mesh, state=coarse.state))  # without a history
+    bench = Bench(plain_view((400, 400)), Session(mesh, state=coarse.state))  # without a history
     del bench.view.render  # drawn at every event
     hand, z = bench.hand, mesh.vertices[:, 2]
     volume = signed_volume(mesh.vertices, mesh.faces)
@@ -135,7 +120,7 @@ def test_the_whole_story(any_view, tmp_path):
         points = bench.editor.widgets.surface.points
         drawn.append(abs(signed_volume(points, mesh.faces) / volume - 1.0))
 
-    any_view.renderer.AddObserver("EndEvent", check_frame)
+    bench.view.renderer.AddObserver("EndEvent", check_frame)
 
     bench.type("g")
     assert bench.session.regions.n_regions >= 2
@@ -331,17 +316,6 @@ def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
     assert [style for style, _ in seen] == [SurfaceStyle.EDGES, SurfaceStyle.WIREFRAME, shaded]
     for k in range(3):
         assert np.mean(np.any(seen[k][1] != seen[k - 1][1], axis=2)) > 0.02
-
-
-@pytest.mark.parametrize("mode", [Mode.PULL, Mode.DEFORM])
-def test_painted_handles_are_coloured_where_they_hold_the_surface(bench, mode):
-    (name,) = bench.session.handles
-    bench.editor.mode = mode
-    shown = picture(bench.view)
-    bench.editor.widgets.dragger.set_hidden(name, True)
-    bench.editor.widgets.show(mode)
-    hidden = picture(bench.view)
-    assert np.any(shown != hidden, axis=2).sum() > 100
 
 
 def test_a_refit_is_one_step_and_keeps_the_pose(bench):
@@ -582,12 +556,6 @@ def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
     bench.hand.release((x + 20, y + 30))
     bench.type("z")
     assert not bench.session.state.changes(before)
-
-
-def test_no_key_has_two_bindings_in_one_mode():
-    taken = [(key, mode) for b in BINDINGS if b.action for key in b.keys for mode in b.modes]
-    assert len(taken) == len(set(taken))
-    assert "q" not in {key for key, _ in taken}
 
 
 def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
@@ -836,12 +804,6 @@ def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end
     assert bare.hand.failures == []
 
 
-def test_the_progress_of_binding_leaves_room_for_the_overlay_that_follows(bench):
-    told = []
-    bench.editor.widgets.bind(lambda fraction, _: told.append(fraction))
-    assert max(told) == 0.75  # measured: the overlay takes 20 to 28 % of the time
-
-
 def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     bench.type("4")
     pull_handle(bench)
@@ -960,8 +922,8 @@ def test_a_session_of_another_mesh_is_framed_by_the_camera(bench, tmp_path):
 # Removing and switching off.
 
 
-def test_removing_the_editor_restores_the_view(any_view):
-    heard = []
+def test_removing_the_editor_restores_the_view():
+    any_view, heard = plain_view((400, 400)), []
     interactor, style = any_view.interactor, any_view.interactor.GetInteractorStyle()
     interactor.AddObserver("KeyPressEvent", lambda *_: heard.append(interactor.GetKeySym()), 0.5)
     blank = picture(any_view)
