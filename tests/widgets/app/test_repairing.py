@@ -137,21 +137,6 @@ def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name
     assert ("Repair ..." in notices._offers) is (name in ("bottle.ply", "sheet.obj"))
 
 
-@pytest.mark.campaign
-def test_show_is_clicked_in_the_view_of_qt(hand, tmp_path):
-    opened(hand, bottle(), tmp_path / "bottle.ply")
-    editor, plotter = hand.window.editor, hand.window.editor_widget.plotter
-    notices = editor.controller.notices
-    plotter.render()
-    pointer = QtHand(plotter.interactor, editor.view)
-    for marked, button in ((True, "Show"), (False, "Hide")):
-        plotter.render()
-        pointer.drag([notices._line.centre_of(button)])
-        assert notices.are_marked is marked
-    assert pointer.failures == []
-    assert hand.title == "bottle.ply - segdeform"  # nothing was painted
-
-
 @BLANK
 def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
     path = opened(hand, bottle(3, 3), tmp_path / "bottle.ply")
@@ -199,15 +184,6 @@ def test_a_saved_repaired_copy_is_no_longer_new(hand, tmp_path, monkeypatch):
     assert proposals == [str(tmp_path / "bottle (repaired).segdeform")]
     assert hand.title == "bottle (repaired).segdeform - segdeform"
     assert load_session(proposals[0]).mesh.is_closed
-
-
-@pytest.mark.campaign
-def test_cancelling_changes_nothing(hand, tmp_path):
-    path = opened(hand, bottle(2), tmp_path / "bottle.ply")
-    before = hand.window.session
-    repair(hand, lambda dialog: QtTest.QTest.keyClick(dialog, Qt.Key_Escape))
-    assert hand.window.session is before
-    assert hand.title == f"{path.name} - segdeform"
 
 
 @pytest.mark.campaign

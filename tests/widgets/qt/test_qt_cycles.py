@@ -26,6 +26,7 @@ from qt_hands import (
     small,
     until,
 )
+from qt_moments import delete_now
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
 import pyvistaqt  # isort: skip
@@ -149,13 +150,6 @@ def one_cycle(kind, *, in_a_job):
     listeners = session.history._listeners._listeners
     assert listeners == {}
     return [*gone, weakref.ref(session)]
-
-
-def delete_now():
-    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
-    for _ in range(2):
-        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-        application().processEvents()
 
 
 def mebibytes():

@@ -22,6 +22,7 @@ from qt_hands import (
     small,
     until,
 )
+from qt_moments import delete_now
 from qtpy import QtGui
 
 import pyvistaqt  # isort: skip
@@ -209,13 +210,6 @@ def seen(state, last):
     new.widget.plotter.setFocus()
     last[:] = new, new.editor.controller.camera.viewpoint.settings(), new.look()
     return new
-
-
-def delete_now():
-    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
-    for _ in range(2):
-        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-        application().processEvents()
 
 
 def rows(tree):
