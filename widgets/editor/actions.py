@@ -26,7 +26,7 @@ from ..region_selector import Paint, RegionSelector
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
-from .session_file import write_posed
+from .session_file import pose_remark, write_posed
 from .widget_set import Mode
 
 Action = Callable[[Controller], None]
@@ -137,7 +137,7 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         controller.settle()
         controller.finishing.interrupt()
         written = write_posed(session, path)
-        saved = f"Mesh saved to {path}{controller.pose_remark}"
+        saved = f"Mesh saved to {path}{pose_remark(session)}"
         controller.say(". ".join([saved, *written.remarks]))
         controller.read_again(written)
         then()

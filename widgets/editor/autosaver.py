@@ -105,7 +105,7 @@ class Autosaver:
         except SegDeformError as error:
             self._fail(error)
             return None
-        view = self._controller.view_settings
+        view = self._controller.camera.settings(self._controller.mode)
 
         def write(_: Progress) -> None:
             slot.write(session, view)  # reads only the mesh and the state, once

@@ -30,7 +30,7 @@ from .messages import Messages
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
-from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
+from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
@@ -82,7 +82,7 @@ class Controller:
         self.notices = Notices(view, lambda: self.messages.height)
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
-        self._interrupted = False, False  # by turning off: as `_unfinished`
+        self._interrupted = False, False  # by turning off: settling, and finishing
         self._text_instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
@@ -146,7 +146,7 @@ class Controller:
                 if not on:
                     self.widgets.finish()  # a drag that ends now is completed as any other
                     if was_on:
-                        self._interrupted = self._unfinished
+                        self._interrupted = self.widgets.is_settling, self.finishing.is_pending
                     self.help.hide()
                     self._preparing.stop()
                     self.finishing.interrupt()
@@ -155,17 +155,14 @@ class Controller:
             finally:
                 self._apply_mode()
 
-    @property
-    def _unfinished(self) -> tuple[bool, bool]:
-        """Whether the pose is settling, and whether it will be finished."""
-        return self.widgets.is_settling, self.finishing.is_pending
-
     def complete(self, progress: Progress | None = None) -> None:
         """Settle and finish the pose now, as it would have been soon, had the editor stayed on.
 
         The part that is done when *progress* cancels remains.
         """
-        settles, finishes = self._unfinished if self._is_on else self._interrupted
+        settles, finishes = self._interrupted
+        if self._is_on:
+            settles, finishes = self.widgets.is_settling, self.finishing.is_pending
         self._interrupted = False, False
         session = self.session
         if settles:
@@ -294,19 +291,15 @@ class Controller:
             and pulled in self.session.handles
         ):
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
-        if widget is self.widgets.dragger:
-            self._tell_unmoved()
+        if widget is self.widgets.dragger:  # name the parts that no handle moves, once
+            solution, mesh = self.session.solution, self.session.mesh
+            text = "" if solution is None else solution.unmoved_summary(mesh)
+            if text and text != self._unmoved:
+                self.messages.note(text[:1].upper() + text[1:])
+            self._unmoved = text
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
-
-    def _tell_unmoved(self) -> None:
-        """Name the parts that no handle moves, once."""
-        solution = self.session.solution
-        text = "" if solution is None else solution.unmoved_summary(self.session.mesh)
-        if text and text != self._unmoved:
-            self.messages.note(text[:1].upper() + text[1:])
-        self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
         self._began_at = self.session.history.position
@@ -400,11 +393,6 @@ class Controller:
         elif self._preparing.cancel():
             self.say("Preparation cancelled. Drag the surface to start it again")
 
-    def refuse(self) -> None:
-        """Show that the running job must end, or be cancelled, before anything else."""
-        self.queue.refuse()
-        self.refresh()
-
     def prepare(self) -> None:
         """Precompute the data of the first drag, or of the overlay, in the background."""
         widgets, session = self.widgets, self.session
@@ -415,11 +403,6 @@ class Controller:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
-
-    @property
-    def is_preparing(self) -> bool:
-        """Whether pulls are being prepared in the background, and will be possible afterwards."""
-        return self._mode is Mode.PULL and self._preparing.fraction is not None
 
     def _prepare_pulls(self, *, again: bool = False) -> None:
         """Prepare the session for pulls in mode PULL; *again* even after an error or Escape.
@@ -501,8 +484,8 @@ class Controller:
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""
         self.finishing.interrupt()
-        self.file.write(self.session, self.view_settings)
-        self.say(f"Saved to {self.file.path}{self.pose_remark}")
+        self.file.write(self.session, self.camera.settings(self._mode))
+        self.say(f"Saved to {self.file.path}{pose_remark(self.session)}")
 
     def read_again(self, written: WrittenMesh) -> None:
         """Read a mesh again in another thread, and say what the file has lost, if anything.
@@ -532,16 +515,6 @@ class Controller:
         """Wait until the mesh that was saved last is read again; return whether nothing is lost."""
         self.queue.wait(Kind.CHECK)
         return self._is_intact
-
-    @property
-    def view_settings(self) -> dict[str, object]:
-        """Camera, mode, up axis, and what is hidden and locked, for a session file."""
-        return self.camera.settings(self._mode)
-
-    @property
-    def pose_remark(self) -> str:
-        """What to say about a saved pose; "" if it has settled."""
-        return ". The pose had not settled" if self.session.is_unsettled else ""
 
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""

@@ -154,7 +154,7 @@ class DeformEditor:
     @property
     def is_preparing(self) -> bool:
         """Whether pulls are being prepared in the background; nothing else waits for that."""
-        return self._controller.is_preparing
+        return self.mode is Mode.PULL and self._controller.queue.fraction(Kind.PREPARE) is not None
 
     def wait(self) -> None:
         """Block until no job is running; raise the error of a failed job.  For scripts."""
@@ -307,7 +307,7 @@ class DeformEditor:
             return
         modes = ", ".join(f"{mode.value} ({label})" for mode, label in self.keys.modes_of(key))
         if self.is_busy:
-            self._controller.refuse()
+            self._controller.queue.refuse()
         else:  # no action, so a drag continues
             self._controller.messages.clear()
             self._controller.say(f"{key_cap(key)} works in mode {modes}")
@@ -316,7 +316,7 @@ class DeformEditor:
         controller = self._controller
         if not while_busy:
             if controller.is_busy:
-                controller.refuse()
+                controller.queue.refuse()
                 return SessionError(controller.queue.refusal)
             controller.widgets.finish()
         controller.messages.clear()

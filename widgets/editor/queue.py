@@ -201,7 +201,10 @@ class Queue:
 
     def task(self, kind: Kind) -> Task | None:
         """Return the first task of a kind; None if there is none."""
-        return next((task for task in self._tasks if task.kind is kind), None)
+        for task in self._tasks:
+            if task.kind is kind:
+                return task
+        return None
 
     def fraction(self, kind: Kind) -> float | None:
         """Return the completed fraction of the running task of a kind, 0..1, coarsely, or None."""
@@ -240,8 +243,9 @@ class Queue:
         return f"Busy. {self.job.name if self.job else ''}: wait, or press Esc to cancel"
 
     def refuse(self) -> None:
-        """Mark the job as the reason why an action was refused; see `text`."""
+        """Say that the job must end, or be cancelled, before anything else; see `text`."""
         self._has_refused = True
+        self._changed()
 
     # Changes.
 
@@ -359,8 +363,6 @@ class Queue:
         with ExitStack() as last:  # the result is delivered even if `changed` raises
             last.callback(task.hand_over)
             self._changed()
-
-    # Progress and timers.
 
     @property
     def _computing(self) -> list[Task]:

@@ -143,6 +143,11 @@ class WrittenMesh:
         return loss and f"In the file, {loss}"
 
 
+def pose_remark(session: Session) -> str:
+    """Return what to say about a saved pose; "" if it has settled."""
+    return ". The pose had not settled" if session.is_unsettled else ""
+
+
 def write_posed(session: Session, path: Path) -> WrittenMesh:
     """Write the surface of *session* in its pose."""
     with _warnings() as warnings:

@@ -551,7 +551,8 @@ def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     assert hand.window.session.is_dragging
     mouse.release(place)
     assert threading.main_thread() not in threads
-    assert views[-1] == hand.window.editor.controller.view_settings
+    controller = hand.window.editor.controller
+    assert views[-1] == controller.camera.settings(controller.mode)
 
 
 @BLANK
