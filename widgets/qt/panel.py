@@ -117,10 +117,6 @@ class DeformPanel(QtWidgets.QWidget):
             box.setVisible(name in shown)
             if name in shown:
                 box.draw(shown[name], editor.keys)
-        if (
-            editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining
-        ):  # refinement ends without a message
-            self._delay.start()
 
     def stop(self) -> None:
         """Unsubscribe from the editor and disable the panel, permanently."""

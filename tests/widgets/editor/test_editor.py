@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, load_session, models, save_session
+from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions, controller
@@ -467,9 +468,23 @@ def test_handles_are_selected_and_removed(bench):
     assert {first, bench.editor.widgets.dragger.handle} == {"handle 1", "handle 2"}
     gone = bench.editor.widgets.dragger.handle
     bench.type("Delete")
-    assert list(bench.session.handles) == [
-        name for name in ("handle 1", "handle 2") if name != gone
-    ]
+    assert {*bench.session.handles, gone} == {"handle 1", "handle 2"}
+    assert len(bench.session.handles) == 1
+    assert f"Removed {gone}" in bench.editor.status
+
+
+def test_keys_make_a_pull_more_or_less_local(bench):
+    puller = bench.editor.widgets.puller
+    bench.type("0", "plus")
+    assert puller.locality == pytest.approx(LOCALITY + 0.1)
+    bench.type("minus", "minus")
+    assert puller.locality == pytest.approx(LOCALITY - 0.1)
+    assert f"Locality: {100 * (LOCALITY - 0.1):.0f} %" in bench.editor.status
+    bench.type(*["minus"] * 11)
+    assert puller.locality == 0.0
+    bench.type("a")
+    assert puller.locality is None
+    assert "Locality: auto" in bench.editor.status
 
 
 def test_keys_for_axes_the_pivot_and_pins(bench):

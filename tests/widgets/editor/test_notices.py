@@ -204,6 +204,16 @@ def test_the_first_edit_closes_the_line_and_later_ones_do_not(open_editor):
     assert scene.notices.are_marked
 
 
+def test_the_line_and_the_marks_follow_the_option_of_lids(open_editor):
+    session = Session(Surface(bottle(2)))
+    scene = open_editor(session)
+    scene.click("Show")
+    before = scene.notices.text
+    session.change_options(lids=False)
+    assert scene.notices.text != before
+    assert scene.notices.are_marked
+
+
 def test_a_clean_view_has_no_line_and_no_marks(open_editor):
     scene = open_editor(Session(Surface(bottle())))
     scene.click("Show")

@@ -95,6 +95,7 @@ def test_a_job_begins_beside_the_worker_and_another_one_is_refused(bench):
     assert bench.heard == ["begin prepare", "begin Counting"]
     with pytest.raises(SessionError, match="Counting: wait"):
         bench.add(Kind.JOB, "Measuring")
+    assert bench.queue.text.startswith("Counting")
     bench.queue.refuse()
     assert bench.queue.text.startswith("Busy. Counting")
     bench.gates["Counting"].set()
