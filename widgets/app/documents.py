@@ -1,4 +1,4 @@
-"""The document in the window, and readers for meshes, sessions and autosaves.
+"""The document in the window, requests to open one, and readers of files and autosaves.
 
 Readers run in any thread; this file does not use Qt.
 """
@@ -60,6 +60,22 @@ class Document:
 
 Opened = tuple[Document, Session]
 Reader = Callable[[Progress], Opened]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A document to open."""
+
+    name: str
+    """Its name for users."""
+    reader: Reader
+    """``reader(progress)`` reads it, in another thread."""
+    path: Path | None = None
+    """The file, if the user chose one."""
+    slot: Slot | None = None
+    """Where it was autosaved, if it is recovered work."""
+    is_new: bool = False
+    """Whether it has been made or recovered by the program, and is to be saved."""
 
 
 def from_file(path: Path) -> Reader:

@@ -13,8 +13,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from .documents import Document, Opened, Unopenable
-from .opening import Request
+from .documents import Document, Opened, Request, Unopenable
 from .repair_dialog import RepairDialog
 
 

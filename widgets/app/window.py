@@ -34,15 +34,14 @@ from .dialogs import ask_file, ask_repair_instead, choose_work, show_error
 from .documents import (
     Document,
     Opened,
+    Request,
     Unopenable,
     from_file,
     from_slot,
     opening_error,
     sample_model,
 )
-from .drops import Drops
 from .menus import Menus, connect_panel
-from .opening import Request
 from .pages import Pages
 from .qt_ticker import QtTicker
 from .recent import Recent
@@ -114,9 +113,7 @@ class Window(QtWidgets.QMainWindow):
         self.pages.waiting.cancelled.connect(self._cancel_opening)
         self.setCentralWidget(self.pages)
         self.menus = Menus(self)
-        drops = Drops(self)
-        drops.hovered.connect(self.pages.start.target.highlight)
-        drops.dropped.connect(self.open)
+        self.setAcceptDrops(True)  # of its children none does
         self.resize(*_SIZE)
         self._show_page()
 
@@ -321,6 +318,24 @@ class Window(QtWidgets.QMainWindow):
     def _say(self, text: str) -> None:
         self.editor.controller.say(text)
 
+    def dragEnterEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Accept local files."""
+        if _dropped(event):
+            event.acceptProposedAction()
+            self.pages.start.target.highlight(True)
+
+    def dragLeaveEvent(self, event: Any) -> None:  # noqa: N802
+        """Show that no file is dropped."""
+        super().dragLeaveEvent(event)
+        self.pages.start.target.highlight(False)
+
+    def dropEvent(self, event: Any) -> None:  # noqa: N802
+        """Open the first file, once the drop has been accepted."""
+        event.acceptProposedAction()
+        self.pages.start.target.highlight(False)
+        path = _dropped(event)[0]
+        QtCore.QTimer.singleShot(0, self, lambda: self.open(path))
+
     def closeEvent(self, event: Any) -> None:  # noqa: N802
         """Close the window and delete the autosave, unless the user keeps the document."""
         if not may_discard(self):
@@ -329,3 +344,9 @@ class Window(QtWidgets.QMainWindow):
         self._cancel_opening()
         self._close_document()
         super().closeEvent(event)
+
+
+def _dropped(event: Any) -> list[Path]:
+    """Return the local files of an event of drag and drop."""
+    urls = event.mimeData().urls()
+    return [Path(url.toLocalFile()) for url in urls if url.isLocalFile()]

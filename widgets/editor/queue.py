@@ -298,8 +298,8 @@ class Queue:
         Exception
             The error of the work, unless the task was cancelled or *failed* was given.
         """
-        for task in [each for each in self._tasks if each.kind is kind and each.future is None]:
-            self._begin(task)
+        for waiting in [each for each in self._tasks if each.kind is kind and each.future is None]:
+            self._begin(waiting)
         while (task := self.task(kind)) is not None and task.future is not None:
             futures.wait([task.future])
             self._deliver(task)

@@ -1,4 +1,4 @@
-"""Interruptions in Qt: clicks in the panel, other timers, loss of focus, closing.
+"""Interruptions in Qt: other timers, loss of focus, closing.
 
 In mid-drag, while a pose converges, or during a job: nothing hangs, and no drag is lost.
 """
@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from campaign import every
 from key_moments import STEPS, Stand, Story, slow_down
-from qt_hands import QtCore, QtWidgets, application
+from qt_hands import QtCore, application
 from qt_moments import QtStand, delete_now
 
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.handle_dragger import live_solve
 
-MOMENTS = pytest.mark.parametrize("during", [True, False], ids=["in mid-drag", "converging"])
 DRAG = STEPS[Mode.DEFORM]
 
 
@@ -65,47 +64,6 @@ def is_kept(stand: Stand, place) -> Story:
     assert not story.states[0].changes(stand.start)
     assert story.states[1].pose is not None
     return story
-
-
-def settings(panel) -> list:
-    """Return all widgets that can be clicked or set in mode 4, except files and modes."""
-    kinds = QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox
-    owners = panel, panel.toolbar  # which is not inside the panel of a `DeformWidget`
-    inside = {each for kind in kinds for owner in owners for each in owner.findChildren(kind)}
-    found = [each for each in inside if each.isVisible()]
-    asking = (
-        panel.toolbar.buttons["open"],
-        panel.toolbar.buttons["save"],
-        panel.toolbar.buttons["view"],
-    )  # a dialog or a menu
-    return [each for each in found if each.isEnabled() and each not in asking]
-
-
-@pytest.mark.parametrize(
-    ("during", "step"),
-    [pytest.param(True, 1, id="in mid-drag", marks=pytest.mark.campaign),
-     pytest.param(False, 1, id="converging", marks=pytest.mark.campaign),
-     pytest.param(False, 5, id="every fifth, converging")],
-)  # fmt: skip
-def test_any_action_in_the_panel_finishes_the_drag(stand, during, step):
-    panel = stand.widget.panel
-    panel.history.fold.setChecked(True)
-    dragged(stand, during=False)
-    stand.settle()
-    controls = sorted(settings(panel), key=lambda each: (type(each).__name__, each.toolTip()))
-    assert len(controls) > 12
-    for control in controls[::step]:
-        place = dragged(stand, during=during)
-        panel.refresh()
-        assert control.isEnabled()
-        if isinstance(control, QtWidgets.QAbstractButton):
-            control.click()
-        else:
-            control.stepUp()
-        stand.hand.move(place + [-40.0, -30.0])
-        stand.hand.move(place)
-        assert len(is_kept(stand, place).labels) <= 2
-        panel.history.fold.setChecked(True)
 
 
 @pytest.mark.parametrize("what", ["timer", "interactor"])
