@@ -67,9 +67,9 @@ class Menus:
         self._add(menu, "&Quit", window.close, _Keys.Quit).setMenuRole(_role("QuitRole"))
 
     def _edit(self) -> None:
-        menu = self._menu("&Edit")
-        self._undo = self._add(menu, "Undo", lambda: self._window.editor.run("undo"))
-        self._redo = self._add(menu, "Redo", lambda: self._window.editor.run("redo"))
+        window, menu = self._window, self._menu("&Edit")
+        self._undo = self._add(menu, "Undo", lambda: window.editor.run("undo"))
+        self._redo = self._add(menu, "Redo", lambda: window.editor.run("redo"))
         menu.aboutToShow.connect(self._update_steps)
 
     def _view(self) -> None:
@@ -78,19 +78,17 @@ class Menus:
         add_view_entries(menu, lambda: window.editor if window.has_mesh else None)
 
     def _help(self) -> None:
-        menu = self._menu("&Help")
-        card = self._add(menu, "&Keys ...", lambda: self._window.editor.run("help"))
+        window, menu = self._window, self._menu("&Help")
+        card = self._add(menu, "&Keys ...", lambda: window.editor.run("help"))
         self._need_mesh.append(card)
         named = [(card, card.text(), "help")]
-        menu.aboutToShow.connect(lambda: name_keys(named, self._window.keys))
-        self._need_mesh.append(self._add(menu, "&First steps", self._show_first_steps))
-        self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
-
-    def _show_first_steps(self) -> None:
-        self._window.editor_widget.first_steps.show()
-
-    def _show_about(self) -> None:
-        show_about(self._window, __version__)
+        menu.aboutToShow.connect(lambda: name_keys(named, window.keys))
+        self._need_mesh.append(
+            self._add(menu, "&First steps", lambda: window.editor_widget.first_steps.show())
+        )
+        self._add(menu, "&About segdeform", lambda: show_about(window, __version__)).setMenuRole(
+            _role("AboutRole")
+        )
 
     # Entries that are updated when a menu opens.
 

@@ -11,6 +11,7 @@ read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanw
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -182,10 +183,6 @@ class Window(QtWidgets.QMainWindow):
         if not self.has_mesh and self._request is None:
             expect_session()
 
-    def _repair_soon(self) -> None:
-        """Repair once the current event of the view has been handled."""
-        QtCore.QTimer.singleShot(0, self, self.repair)
-
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
         slot = choose_work(self, self.autosaves)
@@ -243,7 +240,8 @@ class Window(QtWidgets.QMainWindow):
             widget.editor.controller.restore_view(path)
         connect_panel(self)
         if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
-            widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
+            repair = partial(QtCore.QTimer.singleShot, 0, self, self.repair)  # after the press
+            widget.editor.controller.notices.offer("Repair ...", repair)
         widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         self.autosaver = Autosaver(

@@ -184,7 +184,8 @@ class Autosaves:
                 with suppress(FileNotFoundError):  # another program has just deleted it as empty
                     handle = hold(folder / _LOCK)
                     if handle is not None:
-                        _write_about(folder, about)
+                        with replacing(folder / _ABOUT) as draft:
+                            draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
                         return Slot(folder, handle, about)
         except OSError as fault:
             raise SessionError(f"{self.folder}: {fault.strerror or fault}") from fault
@@ -237,11 +238,6 @@ def _is_file(path: Path) -> bool:
         return not fault_of(os.lstat(path), own=True)
     except OSError:
         return False
-
-
-def _write_about(folder: Path, about: About) -> None:
-    with replacing(folder / _ABOUT) as draft:
-        draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
 
 
 def _read_about(folder: Path) -> About:

@@ -77,7 +77,7 @@ class DeformEditor:
         self._took_key = False
         self._is_removed = False
         self._stops: list[Stop] = []
-        self._stop_waiting: Stop = _nothing  # for a key to be pressed again
+        self._stop_waiting: Stop = lambda: None  # for a key to be pressed again
 
     @property
     def session(self) -> Session:
@@ -331,10 +331,6 @@ class DeformEditor:
             controller.prepare()
         controller.refresh()
         return None
-
-
-def _nothing() -> None:
-    pass
 
 
 def _is_aimed(renderer: Any) -> bool:

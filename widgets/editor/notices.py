@@ -74,7 +74,8 @@ class Notices:
     @property
     def text(self) -> str:
         """All notices in one line; "" if there are none."""
-        return "; ".join(_sentence(notice.text, k) for k, notice in enumerate(self._notices))
+        text = "; ".join(notice.text for notice in self._notices)
+        return text[:1].upper() + text[1:]
 
     @property
     def is_open(self) -> bool:
@@ -176,8 +177,3 @@ class Notices:
         elif button:
             self._offers[button]()
         return button is not None
-
-
-def _sentence(text: str, position: int) -> str:
-    """Return *text* with a capital letter at the beginning of the line only."""
-    return text if position else text[:1].upper() + text[1:]

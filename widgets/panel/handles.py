@@ -35,7 +35,7 @@ def handles_section(editor: DeformEditor) -> Section:
                     "select": _choosing,
                     "rename": _renaming,
                     "show": _showing,
-                    "lock": _locking,
+                    "lock": lambda key, on: lambda c: c.widgets.dragger.set_locked(_name(key), on),
                 },
             ),
             (
@@ -156,10 +156,6 @@ def _showing(key: str, on: bool) -> Action:
         controller.widgets.show(controller.mode)
 
     return show
-
-
-def _locking(key: str, on: bool) -> Action:
-    return lambda controller: controller.widgets.dragger.set_locked(_name(key), on)
 
 
 def _convert(controller: Controller) -> None:

@@ -37,7 +37,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 maximum=max(least, _MOST_ON_SLIDER),
                 page=50.0,
                 on_release=True,
-                act=_fitting_with,
+                act=lambda n: lambda controller: actions.fit_cages(controller, n),
             ),
             Field(
                 "cages.total",
@@ -192,11 +192,6 @@ def deform_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
-
-
-def _fitting_with(n_cage_vertices: int) -> Action:
-    """Return the action that sets the total number of cage vertices, and fits cages with it."""
-    return lambda controller: actions.fit_cages(controller, n_cage_vertices)
 
 
 def _with_range(percentage: float | None) -> Action:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from vtk_segdeform.pictures import of_region
 
 from ..editor import Action, Controller, DeformEditor, Mode, actions
@@ -48,9 +46,9 @@ def regions_section(editor: DeformEditor) -> Section:
                 n_rows=7,
                 multiple=True,
                 acts={
-                    "select": _choosing,
+                    "select": lambda keys: lambda c: c.widgets.choose_regions([*map(int, keys)]),
                     "rename": _renaming,
-                    "cage": _showing_cage,
+                    "cage": lambda key, on: lambda c: c.widgets.cages.set_visible(int(key), on),
                 },
             ),
             (
@@ -77,14 +75,6 @@ def regions_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
-
-
-def _choosing(keys: Sequence[str]) -> Action:
-    return lambda controller: controller.widgets.choose_regions([int(key) for key in keys])
-
-
-def _showing_cage(key: str, on: bool) -> Action:
-    return lambda controller: controller.widgets.cages.set_visible(int(key), on)
 
 
 def _renaming(key: str, name: str) -> Action:

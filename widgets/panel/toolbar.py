@@ -66,7 +66,7 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
             "before_after",
             value=controller.shows_rest,
             enabled=is_free and editor.session.state.pose is not None,
-            act=lambda on: actions.show_rest if on else _show_pose,
+            act=lambda on: actions.show_rest if on else lambda c: c.show_instead(None),
         ),
         Field("view", "menu", "View", "What is shown", enabled=is_free, items=view_entries(editor)),
         Field("help", "button", "Keys", "Show keys", "help", while_busy=True),
@@ -157,10 +157,6 @@ def _upright(axis: int) -> Act:
         controller.say(f"Up: {'XYZ'[axis]}")
 
     return lambda _: turn_up
-
-
-def _show_pose(controller: Controller) -> None:
-    controller.show_instead(None)
 
 
 def _toggle_cube(controller: Controller) -> None:

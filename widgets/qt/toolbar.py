@@ -172,7 +172,7 @@ class Toolbar(QtWidgets.QWidget):
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
         path, _ = QtWidgets.QFileDialog.getOpenFileName(
-            self, "Open", self._folder(), READABLE_FILES
+            self, "Open", str(self._editor.path.parent), READABLE_FILES
         )
         if path and self.may_discard():
             self._editor.do(actions.opening(Path(path)))
@@ -211,9 +211,6 @@ class Toolbar(QtWidgets.QWidget):
     def _path_to_write(self, title: str, proposed: str, kinds: str) -> Path | None:
         path, _ = QtWidgets.QFileDialog.getSaveFileName(self, title, proposed, kinds)
         return Path(path) if path else None
-
-    def _folder(self) -> Any:
-        return str(self._editor.path.parent)
 
 
 def _group(buttons: list[Any]) -> Any:

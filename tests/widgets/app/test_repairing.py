@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from app_hands import AppHand, Boxes, Window, delete, drop, settings_in
+from app_hands import AppHand, Window, delete, drop, settings_in
 from open_surfaces import bottle, polydata, sheet, split_at_seam
 from qt_hands import Qt, QtCore, QtHand, QtTest, application, until
 
@@ -20,15 +20,6 @@ from vtk_segdeform.widgets.editor import Autosaves
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 BLANK = pytest.mark.usefixtures("unpainted")
-
-
-@pytest.fixture
-def boxes():
-    application()
-    made = Boxes()
-    yield made
-    assert made.unexpected == []
-    assert made.answers == []
 
 
 @contextmanager

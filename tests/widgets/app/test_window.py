@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from app_hands import (
     AppHand,
-    Boxes,
     Window,
     delete,
     digest,
@@ -72,15 +71,6 @@ def bent(arm):
     session.move_handle("handle 1", up)
     session.commit()
     return session
-
-
-@pytest.fixture
-def boxes():
-    application()
-    made = Boxes()
-    yield made
-    assert made.unexpected == []
-    assert made.answers == []
 
 
 @pytest.fixture

@@ -44,13 +44,6 @@ def in_the_background():
     return plotter, plotter.app_window
 
 
-# A BackgroundPlotter is a QtInteractor in a window of its own.
-HOSTS = [
-    pytest.param(in_a_window, id="QtInteractor"),
-    pytest.param(in_the_background, id="BackgroundPlotter", marks=pytest.mark.campaign),
-]
-
-
 @contextmanager
 def shown(host):
     """Yield a plotter with the editor in it, the editor, a hand and the window."""
@@ -72,17 +65,10 @@ def shown(host):
     delete_now()
 
 
-@pytest.fixture(params=HOSTS)
-def qt(request):
-    """Yield a plotter with the editor in it, the editor, a hand and the window, for one test."""
-    with shown(request.param) as view:
-        yield view
-
-
-@pytest.fixture(scope="module", params=HOSTS)
-def shared(request, unprepared):
-    """Yield the same for several tests."""
-    with shown(request.param) as view:
+@pytest.fixture(scope="module")
+def shared(unprepared):
+    """Yield a plotter with the editor in it, the editor, a hand and the window."""
+    with shown(in_a_window) as view:
         yield view
 
 
@@ -108,15 +94,13 @@ def around(editor, mask):
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
 
-@pytest.mark.parametrize("qt", [in_the_background], ids=["BackgroundPlotter"], indirect=True)
-def test_closing_a_window_removes_the_editor(qt):
-    """`test_qt_widget` closes a QtInteractor with a dock."""
-    plotter, editor, hand, window = qt
-    hand.key("g")  # during a job
-    plotter.close()
-    window.close()
-    assert not editor.is_busy
-    assert not editor.GetEnabled()
+def test_closing_a_background_plotter_removes_the_editor():
+    with shown(in_the_background) as (plotter, editor, hand, window):
+        hand.key("g")  # during a job
+        plotter.close()
+        window.close()
+        assert not editor.is_busy
+        assert not editor.GetEnabled()
 
 
 # The example of an application.
