@@ -17,6 +17,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
+from vtk_segdeform.kernels import load_early
 from vtk_segdeform.session import Session
 
 from ..editor import (
@@ -27,7 +28,6 @@ from ..editor import (
     Kind,
     Queue,
     Task,
-    expect_session,
 )
 from ..qt import DeformWidget, menu_keys, stopper
 from ..scene import Stop
@@ -181,7 +181,7 @@ class Window(QtWidgets.QMainWindow):
     def _load_kernels(self) -> None:
         """Load the compiled kernels while the start page is shown, so that files open faster."""
         if not self.has_mesh and self._request is None:
-            expect_session()
+            load_early()
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""

@@ -176,7 +176,7 @@ class Controller:
         self.queue.stop()
         self._stop_listening()
         self._stop_failures()
-        self.finishing.remove()
+        self.finishing.interrupt()
         self.camera.remove()
         self.widgets.remove()
         self.help.remove()

@@ -193,11 +193,6 @@ def is_mesh(path: Path) -> bool:
     return is_mesh_file(path)
 
 
-def expect_session() -> None:
-    """Load the compiled kernels in another thread, for a session that will be opened soon."""
-    load_early()
-
-
 def read_session(path: Path, progress: Progress) -> Session:
     """Return the session in a file, or a new one of the surface in it.
 

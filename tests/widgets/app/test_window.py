@@ -131,7 +131,7 @@ def test_kernels_are_loaded_while_the_start_page_waits(
     start, ball_file, monkeypatch, is_file_given
 ):
     loads = []
-    monkeypatch.setattr(window, "expect_session", lambda: loads.append(None))
+    monkeypatch.setattr(window, "load_early", lambda: loads.append(None))
     monkeypatch.setattr(window, "_PAUSE", 50)
     hand = start(ball_file if is_file_given else None)
     times = []

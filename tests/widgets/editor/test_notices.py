@@ -172,6 +172,7 @@ def test_another_file_has_its_own_notices_and_marks(open_editor, tmp_path):
     assert scene.notices.text == "Open sheet: no volume to preserve"
     assert scene.notices.is_open
     assert not scene.notices.are_marked
+    assert not scene.editor.controller.is_modified
     assert not scene.shade(LOOP_RGB).any()
     Surface(polydata(*icosphere(2))).given.save(tmp_path / "ball.ply")
     scene.editor.load(tmp_path / "ball.ply")
