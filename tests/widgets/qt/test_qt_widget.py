@@ -90,7 +90,7 @@ class Seen:
         panel, controller = self.panel, self.editor.controller
         window, plotter = self.widget.window(), self.widget.plotter
         return (
-            self.session, self.session.state, self.editor.path,
+            self.session, self.session.state, self.editor.path, self.editor.keys.changes,
             controller.file.is_modified(self.session), controller.notices.text,
             controller.camera.viewpoint.settings(),
             window.isVisible(), window.isActiveWindow(), window.size(), plotter.hasFocus(),
