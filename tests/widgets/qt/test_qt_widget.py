@@ -260,7 +260,8 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     until(lambda: not seen.editor.widgets.dragger.is_refining, "refinement")
     assert len(seen.deformed) >= 7
     assert max(map(abs, seen.deformed)) < 1e-12
-    until(lambda: not seen.editor.controller.finishing.is_pending, "the finish")
+    finishing = seen.editor.controller.finishing
+    until(lambda: not (finishing.is_pending or finishing.glide.is_running), "the finish")
     bent = seen.session.vertices
     seen.settle()
     volumes = [text for _, _, text in rows(panel.controls["regions.list"])]
