@@ -456,6 +456,11 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
     assert selector.region == 0  # only one region is left
 
 
+def test_all_vertices_are_selected_for_a_region(bench):
+    bench.type("ctrl+a")
+    assert bench.session.regions.membership[0].all()
+
+
 def test_handles_are_selected_and_removed(bench):
     bench.type("3", "d", "a", "t")
     x = bench.session.mesh.vertices[:, 0]

@@ -130,6 +130,8 @@ def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
     assert not window.editor.editor.GetEnabled()
     window.deleteLater()
     delete_now()
+    later(0, app.quit)  # a quit without a loop would end every later one at once, until the next
+    app.exec()
 
 
 # Several tests share a view.
