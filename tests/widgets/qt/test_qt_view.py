@@ -75,7 +75,8 @@ def shared(unprepared):
 @pytest.fixture
 def again(shared):
     """Return the shared view as it was at first, after the tests that close theirs."""
-    plotter, editor, hand, _ = shared
+    plotter, editor, hand, window = shared
+    window.raise_()  # others may cover it, and Qt draws no covered one
     while editor.session.undo() is not None:
         pass
     editor.On()
@@ -101,40 +102,6 @@ def test_closing_a_background_plotter_removes_the_editor():
         window.close()
         assert not editor.is_busy
         assert not editor.GetEnabled()
-
-
-# The example of an application.
-
-
-def is_drawn(picture):
-    """Return whether a picture shows the cactus, and not only the status line, which is 0.04."""
-    grey = np.array(Image.open(picture).convert("L"))
-    return 0.1 < (grey < 215).mean() < 0.5
-
-
-def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
-    app, later = application(), QtCore.QTimer.singleShot
-    monkeypatch.setattr(models, "cactus", lambda _: MESH)
-    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
-    soon = functools.partial(later, 50)  # instead of a second
-    # Windows of other tests may be open, so that closing this one would not end the loop.
-    ended = lambda do: soon(lambda: (do(), app.quit()))  # noqa: E731
-    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
-    limit = QtCore.QTimer()
-    limit.setSingleShot(True)
-    limit.timeout.connect(app.quit)
-    limit.start(60_000)
-    window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
-    assert limit.isActive()  # it has ended by itself
-    assert is_drawn(tmp_path / "window.png")
-    assert not window.editor.editor.GetEnabled()
-    window.deleteLater()
-    delete_now()
-    later(0, app.quit)  # a quit without a loop would end every later one at once, until the next
-    app.exec()
-
-
-# Several tests share a view.
 
 
 def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(again):
@@ -200,3 +167,36 @@ def test_each_change_is_drawn_once(again):
         rest()
     window.RemoveObserver(observer)
     assert drawn == [3, 5]
+
+
+# The example of an application.
+
+
+def is_drawn(picture):
+    """Return whether a picture shows the cactus, and not only the status line, which is 0.04."""
+    grey = np.array(Image.open(picture).convert("L"))
+    return 0.1 < (grey < 215).mean() < 0.5
+
+
+def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
+    app, later = application(), QtCore.QTimer.singleShot
+    monkeypatch.setattr(models, "cactus", lambda _: MESH)
+    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
+    soon = functools.partial(later, 50)  # instead of a second
+    # Windows of other tests may be open, so that closing this one would not end the loop.
+    ended = lambda do: soon(lambda: (do(), app.quit()))  # noqa: E731
+    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
+    limit = QtCore.QTimer()
+    limit.setSingleShot(True)
+    limit.timeout.connect(app.quit)
+    limit.start(60_000)
+    window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
+    assert limit.isActive()  # it has ended by itself
+    assert is_drawn(tmp_path / "window.png")
+    assert not window.editor.editor.GetEnabled()
+    window.deleteLater()
+    delete_now()
+
+    # Several tests share a view.
+    later(0, app.quit)  # or that quit would end the dialogs of later tests at once
+    app.exec()
