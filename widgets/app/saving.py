@@ -1,7 +1,6 @@
 """Saving the window's document: as a session, a mesh or a picture, with the dialogs before.
 
-Every function takes the `Window` and returns whether the file was written, or will be once the pose
-has settled.
+Every function takes the `Window` and returns whether the file was written.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import MESH_FILES, Action, Controller, Kind, error_text, exporting, saving
+from ..editor import MESH_FILES, Action, Controller, error_text, exporting, saving
 from .dialogs import Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
@@ -61,36 +60,17 @@ def export_picture(window: Any) -> bool:
     return path is not None and _done(window, lambda controller: _draw(window, controller, path))
 
 
-def may_discard(window: Any, *, is_kept: bool = False) -> bool:
-    """Return whether the document may be closed: it is saved or *is_kept*, or the user discards it.
-
-    It is kept if undo or redo returns to it.
-    """
-    if window.has_mesh and window.editor.controller.queue.task(Kind.SAVE):
-        _settle(window)
-    if is_kept or not window.is_modified:
+def may_discard(window: Any) -> bool:
+    """Return whether the document may be closed: it is saved, or the user discards it."""
+    if not window.is_modified:
         return True
     mesh_is_saved = _mesh_is_saved(window)
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
     if answer is Answer.SAVE_MESH:
-        return _mesh_saved_now(window)
-    return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD
-
-
-def _saved_now(window: Any) -> bool:
-    """Save the session, and wait until that is done."""
-    if not save_session(window):
-        return False
-    _settle(window)
-    return not window.is_modified
-
-
-def _mesh_saved_now(window: Any) -> bool:
-    """Save the mesh, and wait until that is done."""
-    if not save_mesh(window):
-        return False
-    _settle(window)
-    return _mesh_is_saved(window)
+        return save_mesh(window) and _mesh_is_saved(window)
+    if answer is Answer.SAVE:
+        return save_session(window) and not window.is_modified
+    return answer is Answer.DISCARD
 
 
 def _mesh_is_saved(window: Any) -> bool:
@@ -99,28 +79,27 @@ def _mesh_is_saved(window: Any) -> bool:
     return is_written and window.editor.controller.saved_intact()
 
 
-def _settle(window: Any) -> None:
-    """Wait until the pose has settled and has been saved; the window is drawn meanwhile."""
-    events, controller = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller
-    while controller.widgets.is_pose_to_come:
-        QtWidgets.QApplication.processEvents(
-            events.ExcludeUserInputEvents | events.WaitForMoreEvents
-        )
-    controller.queue.hurry(Kind.SAVE)
-
-
 def _session_saved(window: Any, path: Path) -> None:
     window.set_document(replace(window.document, session_path=path, name=path.name))
     window.recent.add(path)
 
 
 def _mesh_saved(window: Any, path: Path) -> None:
-    window.set_document(replace(window.document, mesh_path=path))
+    window.editor.controller.file.is_new = False
     window.mesh_state = window.session.state
+    window.set_document(replace(window.document, mesh_path=path))
 
 
 def _done(window: Any, action: Action) -> bool:
-    """Run the action, even during a job; show an error in a dialog and in the status line."""
+    """Run the action, even during a job; show an error in a dialog and in the status line.
+
+    The pose settles first, in the window, which is drawn meanwhile.
+    """
+    events, widgets = QtCore.QEventLoop.ProcessEventsFlag, window.editor.widgets
+    while widgets.is_pose_to_come:
+        QtWidgets.QApplication.processEvents(
+            events.ExcludeUserInputEvents | events.WaitForMoreEvents
+        )
     error = window.editor.do(action, while_busy=True)
     if error is not None:
         show_error(window, "Could not save", error_text(error))

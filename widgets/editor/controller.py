@@ -27,11 +27,10 @@ from .help_card import HelpCard
 from .hints import hint
 from .keys import Keys
 from .messages import Messages
-from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
-from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
+from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
@@ -65,8 +64,6 @@ class Controller:
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
-    neighbours : Neighbours
-        The sessions before and after this one in the history.
     camera : Camera
         Navigation, views and the orientation cube.
     queue : Queue
@@ -83,11 +80,10 @@ class Controller:
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
-        self.neighbours = Neighbours()
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
-        self._left = False, False  # by turning off: as `_ahead`
-        self._instead = self._unmoved = ""
+        self._interrupted = False, False  # by turning off: settling, and finishing
+        self._text_instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
         self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
@@ -96,7 +92,7 @@ class Controller:
             self.queue,
             lambda: self.session,
             lambda: self.widgets.surface,
-            self._is_free,
+            self.is_free,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
@@ -111,20 +107,6 @@ class Controller:
     def session(self) -> Session:
         """The session being edited; another one after `open`."""
         return self.widgets.session
-
-    @property
-    def undo_label(self) -> str | None:
-        """The step to undo: of the session, or else the one from which the session came."""
-        label, before = self.session.history.undo_label, self.neighbours.before
-        return before.step if label is None and before is not None else label
-
-    @property
-    def redo_label(self) -> str | None:
-        """The step to redo: to the session that came from this state, or else of the session."""
-        after = self.neighbours.after(self.session)
-        if after is not None and after[0] == self.session.history.position:
-            return after[1].step
-        return self.session.history.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -164,28 +146,24 @@ class Controller:
                 if not on:
                     self.widgets.finish()  # a drag that ends now is completed as any other
                     if was_on:
-                        self._left = self._ahead
+                        self._interrupted = self.widgets.is_settling, self.finishing.is_pending
                     self.help.hide()
-                    self.queue.hurry(Kind.SAVE)
                     self._preparing.stop()
                     self.finishing.interrupt()
                     self.queue.cancel(Kind.JOB, Kind.LOAD)
-                    self.wait()
+                    self.queue.wait(Kind.JOB)
             finally:
                 self._apply_mode()
-
-    @property
-    def _ahead(self) -> tuple[bool, bool]:
-        """Whether the pose is settling, and whether it will be finished."""
-        return self.widgets.is_settling, self.finishing.is_pending
 
     def complete(self, progress: Progress | None = None) -> None:
         """Settle and finish the pose now, as it would have been soon, had the editor stayed on.
 
         The part that is done when *progress* cancels remains.
         """
-        settles, finishes = self._ahead if self._is_on else self._left
-        self._left = False, False
+        settles, finishes = self._interrupted
+        if self._is_on:
+            settles, finishes = self.widgets.is_settling, self.finishing.is_pending
+        self._interrupted = False, False
         session = self.session
         if settles:
             session.refine(progress=part(progress, 0.0, 0.5))
@@ -198,7 +176,7 @@ class Controller:
         self.queue.stop()
         self._stop_listening()
         self._stop_failures()
-        self.finishing.remove()
+        self.finishing.interrupt()
         self.camera.remove()
         self.widgets.remove()
         self.help.remove()
@@ -209,15 +187,10 @@ class Controller:
     # Messages.
 
     @property
-    def status(self) -> str:
-        """Text of the status line."""
-        return self.messages.text
-
-    @property
     def hint(self) -> str:
         """The next step, or what is shown."""
         if self.widgets.surface.instead is not None:
-            return self._instead
+            return self._text_instead
         return hint(self.widgets, self._mode, self.keys)
 
     def say(self, text: str) -> None:
@@ -230,8 +203,12 @@ class Controller:
         mode = f"{self._mode.value} {self._mode.name}"
         job = self.queue.job
         if self.widgets.is_settling and self.queue.task(Kind.SETTLE) is None:
-            may_begin = self._has_settled
-            self.queue.add(Task(kind=Kind.SETTLE, begin=self.refresh, may_begin=may_begin))
+            task = Task(
+                kind=Kind.SETTLE,
+                begin=self.refresh,
+                may_begin=lambda: not self.widgets.is_settling,
+            )
+            self.queue.add(task)
         if job is not None:
             self.messages.show_progress(
                 mode, self.queue.text, job.fraction, is_cancelled=job.is_cancelled
@@ -267,7 +244,7 @@ class Controller:
 
     def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
         """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""
-        surface, self._instead = self.widgets.surface, text
+        surface, self._text_instead = self.widgets.surface, text
         if vertices is not None:
             self.widgets.show_instead(vertices)
         elif surface.instead is None:
@@ -314,26 +291,21 @@ class Controller:
             and pulled in self.session.handles
         ):
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
-        if widget is self.widgets.dragger:
-            self._tell_unmoved()
+        if widget is self.widgets.dragger:  # name the parts that no handle moves, once
+            solution, mesh = self.session.solution, self.session.mesh
+            text = "" if solution is None else solution.unmoved_summary(mesh)
+            if text and text != self._unmoved:
+                self.messages.note(text[:1].upper() + text[1:])
+            self._unmoved = text
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
-
-    def _tell_unmoved(self) -> None:
-        """Name the parts that no handle moves, once."""
-        solution = self.session.solution
-        text = "" if solution is None else solution.unmoved_summary(self.session.mesh)
-        if text and text != self._unmoved:
-            self.messages.note(text[:1].upper() + text[1:])
-        self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
         self._began_at = self.session.history.position
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects
-        self.queue.hurry(Kind.SAVE)
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if is_compiling():
@@ -363,11 +335,6 @@ class Controller:
         """Whether a job is running."""
         return self.queue.job is not None
 
-    @property
-    def refusal(self) -> str:
-        """Why an action is refused while a job is running."""
-        return self.queue.refusal
-
     def start(
         self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
     ) -> None:
@@ -395,17 +362,12 @@ class Controller:
 
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
-            self.queue.hurry(Kind.SAVE)
             self._preparing.interrupt()
             self.finishing.interrupt()
             task = Task(kind=Kind.JOB, name=name, begin=lambda: with_kernels, done=deliver)
             self.queue.add(task)
             self.widgets.switch_off()
             self.refresh()
-
-    def wait(self) -> None:
-        """Block until no job is running; for scripts."""
-        self.queue.wait(Kind.JOB)
 
     @property
     def is_modified(self) -> bool:
@@ -425,18 +387,11 @@ class Controller:
             self.finishing.interrupt()
             self.widgets.stop_refining()
             self.queue.cancel(Kind.SETTLE)
-            self.messages.note("Stopped. The pose has not settled")
-            self.queue.hurry(Kind.SAVE)
-            self.refresh()
+            self.say("Stopped. The pose has not settled")
         elif self.finishing.interrupt():
             self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
             self.say("Preparation cancelled. Drag the surface to start it again")
-
-    def refuse(self) -> None:
-        """Show that the running job must end, or be cancelled, before anything else."""
-        self.queue.refuse()
-        self.refresh()
 
     def prepare(self) -> None:
         """Precompute the data of the first drag, or of the overlay, in the background."""
@@ -448,11 +403,6 @@ class Controller:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
-
-    @property
-    def is_preparing(self) -> bool:
-        """Whether pulls are being prepared in the background, and will be possible afterwards."""
-        return self._mode is Mode.PULL and self._preparing.fraction is not None
 
     def _prepare_pulls(self, *, again: bool = False) -> None:
         """Prepare the session for pulls in mode PULL; *again* even after an error or Escape.
@@ -470,16 +420,13 @@ class Controller:
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
 
-    def _is_free(self) -> bool:
+    def is_free(self) -> bool:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
         is_used |= widgets.puller.waiting.is_active
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
-
-    def _is_at_rest(self) -> bool:
-        return self._is_free() and self.queue.task(Kind.PREPARE) is None
 
     def _load_later(self) -> None:
         """Load kernels once the hand has rested: a press would wait for it."""
@@ -488,13 +435,14 @@ class Controller:
         def load() -> None:
             load_early()
 
-        may_begin = self._is_at_rest
-        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=may_begin, rest=_REST))
+        def is_at_rest() -> bool:
+            return self.is_free() and self.queue.task(Kind.PREPARE) is None
+
+        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=is_at_rest, rest=_REST))
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
-        was_modified, after = self.file.is_modified(session), self.neighbours.after(session)
+        was_modified = self.file.is_modified(session)
         session.accept(preparation)
-        self.neighbours.prepared(session, after)
         self._load_later()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
@@ -519,38 +467,25 @@ class Controller:
 
     # Files.
 
-    def once_settled(self, act: Callable[[], None]) -> None:
-        """Call *act* once the pose has settled: what is saved is the pose that is to come.
-
-        What would change the pose meanwhile, such as a press, lets *act* be called first, and so
-        does Escape, at which the pose remains as it is.
-        """
-        if not self.widgets.is_pose_to_come:
-            act()
-            return
-        may_begin = self._has_come
-        self.queue.add(Task(kind=Kind.SAVE, begin=act, may_begin=may_begin))
-        self.say("Saving once the pose has settled")
-
     def settle(self) -> None:
-        """Settle the pose now, which may take seconds, and save what waits; for scripts."""
+        """Settle the pose now, which may take seconds: what is saved is the pose that is to come.
+
+        Raises
+        ------
+        SessionError
+            If a released pull waits for the preparation of the mesh.
+        """
+        if self.widgets.puller.waiting.has_pull:
+            raise SessionError("The pull is not computed yet. Save again in a moment")
         if self.widgets.is_settling:
             self.session.refine()
             self.queue.cancel(Kind.SETTLE)
-        if not self.widgets.is_pose_to_come:
-            self.queue.hurry(Kind.SAVE)
-
-    def _has_settled(self) -> bool:
-        return not self.widgets.is_settling
-
-    def _has_come(self) -> bool:
-        return not self.widgets.is_pose_to_come
 
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""
         self.finishing.interrupt()
-        self.file.write(self.session, self.view_settings)
-        self.say(f"Saved to {self.file.path}{self.pose_remark}")
+        self.file.write(self.session, self.camera.settings(self._mode))
+        self.say(f"Saved to {self.file.path}{pose_remark(self.session)}")
 
     def read_again(self, written: WrittenMesh) -> None:
         """Read a mesh again in another thread, and say what the file has lost, if anything.
@@ -573,23 +508,13 @@ class Controller:
 
         self.queue.cancel(Kind.CHECK)
         self._is_intact = True
-        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self._is_free)
+        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self.is_free)
         self.queue.add(task)
 
     def saved_intact(self) -> bool:
         """Wait until the mesh that was saved last is read again; return whether nothing is lost."""
         self.queue.wait(Kind.CHECK)
         return self._is_intact
-
-    @property
-    def view_settings(self) -> dict[str, object]:
-        """Camera, mode, up axis, and what is hidden and locked, for a session file."""
-        return self.camera.settings(self._mode)
-
-    @property
-    def pose_remark(self) -> str:
-        """What to say about a saved pose; "" if it has settled."""
-        return ". The pose had not settled" if self.session.is_unsettled else ""
 
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""

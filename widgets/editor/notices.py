@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from vtk_segdeform.arrays import IntArray
 from vtk_segdeform.mesh import Kind
 from vtk_segdeform.session import Change, Session
 
-from ..scene import Highlights, Stop, View
+from ..scene import Highlights, View
 from .notice_line import NoticeLine
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
@@ -40,23 +39,14 @@ class Notice:
 
 def notices_of(session: Session) -> tuple[Notice, ...]:
     """Return the notices about the mesh of *session*: its borders, then each workaround."""
-    return (*_of_borders(session), *_of_workarounds(session))
-
-
-def _of_borders(session: Session) -> list[Notice]:
-    borders = session.mesh.borders
-    return [Notice(session.volume_summary, tuple(borders))] if len(borders) else []
-
-
-def _of_workarounds(session: Session) -> list[Notice]:
-    surface = session.surface
-    if surface is None:
-        return []
-    return [
+    borders, surface = session.mesh.borders, session.surface
+    of_borders = [Notice(session.volume_summary, tuple(borders))] if len(borders) else []
+    of_workarounds = [
         Notice(each.text, dots=surface.vertices_at(each.points))
-        for each in surface.workarounds
-        if each.kind is not Kind.HOLE  # see above
+        for each in (surface.workarounds if surface else ())
+        if surface and each.kind is not Kind.HOLE  # see the borders
     ]
+    return *of_borders, *of_workarounds
 
 
 class Notices:
@@ -79,16 +69,13 @@ class Notices:
         self._line = NoticeLine(view, foot)
         self._is_open = self._is_enabled = False
         self._was_edited = False
-        observe = view.observe
-        self._stops: list[Stop] = [
-            observe("LeftButtonPressEvent", self._press, _ABOVE_WIDGETS),
-            observe("MouseMoveEvent", self._hover, _ABOVE_WIDGETS),
-        ]
+        self._stop = view.observe("LeftButtonPressEvent", self._press, _ABOVE_WIDGETS)
 
     @property
     def text(self) -> str:
         """All notices in one line; "" if there are none."""
-        return "; ".join(_sentence(notice.text, k) for k, notice in enumerate(self._notices))
+        text = "; ".join(notice.text for notice in self._notices)
+        return text[:1].upper() + text[1:]
 
     @property
     def is_open(self) -> bool:
@@ -157,8 +144,7 @@ class Notices:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
-        for stop in self._stops:
-            stop()
+        self._stop()
         self._marks.hide()
         self._line.remove()
 
@@ -174,10 +160,12 @@ class Notices:
             show = _HIDE if self.are_marked else _SHOW
             self._line.show(self.text, (show, *self._offers, _CLOSE))
         else:
-            self._line.hide()
+            self._line.show("", ())
 
     def _press(self) -> bool:
-        button = self._line.button_at(self._pointer())
+        origin = self.view.renderer.GetOrigin()
+        pointer = np.subtract(self.view.interactor.GetEventPosition(), origin)
+        button = self._line.button_at(pointer)
         if button == _CLOSE:
             self.close()
         elif button in (_SHOW, _HIDE):
@@ -189,16 +177,3 @@ class Notices:
         elif button:
             self._offers[button]()
         return button is not None
-
-    def _hover(self) -> bool:
-        self._line.point_at(self._line.button_at(self._pointer()))
-        return False
-
-    def _pointer(self) -> Any:
-        origin = self.view.renderer.GetOrigin()
-        return np.subtract(self.view.interactor.GetEventPosition(), origin)
-
-
-def _sentence(text: str, position: int) -> str:
-    """Return *text* with a capital letter at the beginning of the line only."""
-    return text if position else text[:1].upper() + text[1:]

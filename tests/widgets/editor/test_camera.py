@@ -15,7 +15,7 @@ from vtkmodules.vtkInteractionStyle import (
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import show_rest
+from vtk_segdeform.widgets.editor.actions import show_rest
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")

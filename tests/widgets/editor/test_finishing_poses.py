@@ -23,7 +23,6 @@ from vtk_segdeform.widgets.editor import (
     Mode,
     exporting,
     finishing,
-    finishing_after_drags,
     opening,
     queue,
     saving,
@@ -98,7 +97,7 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
     bench.type("z")
     assert running.fraction is None
     pull_handle(bench, (5, 8))
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.hand.tick()
     assert running.fraction is None
 
@@ -131,7 +130,7 @@ def settling(bench, monkeypatch):  # noqa: F811
     """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
     monkeypatch.setattr(queue, "_SHOWN_AFTER", 0.0)
     monkeypatch.setattr("vtk_segdeform.widgets.handle_dragger.live_solve.STEPS", 3)
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4")
     pull_handle(bench, (-40, 90))
     assert bench.session.solution.status is Status.STEP_LIMIT
@@ -169,44 +168,21 @@ def test_escape_stops_a_pose_that_settles(bench, settling, tmp_path):  # noqa: F
     until(bench, lambda: bench.session.solution.status is not Status.STEP_LIMIT)
 
 
-@pytest.mark.parametrize("write", ["session", "mesh"])
-def test_saving_waits_until_the_pose_has_settled(bench, settling, tmp_path, write):  # noqa: F811
+@pytest.mark.parametrize("write", ["session", "mesh", "script"])
+def test_the_pose_settles_before_it_is_saved(bench, settling, tmp_path, write):  # noqa: F811
     path = tmp_path / ("posed.ply" if write == "mesh" else "work.segdeform")
-    bench.editor.do(exporting(path) if write == "mesh" else saving(path))
-    assert "Saving once the pose has settled" in bench.editor.status
-    assert status(bench.editor).work == "Saving"
-    until(bench, path.exists)
+    if write == "script":
+        bench.editor.save(path)
+    else:
+        bench.editor.do(exporting(path) if write == "mesh" else saving(path))
     assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert f"aved to {path}" in bench.editor.status
     read = read_mesh if write == "mesh" else load_session
     assert np.allclose(read(path).vertices, bench.session.vertices, rtol=0.0, atol=1e-6)
     assert bench.editor.controller.file.is_modified(bench.session) == (write == "mesh")
-
-
-@pytest.mark.parametrize("change", ["escape", "undo", "press", "off", "another mode"])
-def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, change):  # noqa: F811
-    bench.editor.path = tmp_path / "work.segdeform"
-    shown = bench.session.vertices
-    bench.type("ctrl+s")
-    assert settling.is_settling
-    assert not bench.editor.path.exists()
-    ends = {
-        "escape": lambda: bench.type("escape"),
-        "undo": lambda: bench.type("z"),
-        "press": lambda: pull_handle(bench, (5, 5)),
-        "off": bench.editor.Off,
-        "another mode": lambda: bench.type("3"),
-    }
-    ends[change]()
-    assert np.array_equal(load_session(bench.editor.path).vertices, shown)
-
-
-def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, tmp_path):  # noqa: F811
-    bench.editor.save(tmp_path / "work.segdeform")
-    assert not settling.is_settling
-    assert bench.session.solution.status is not Status.STEP_LIMIT
-    assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
+    bench.hand.tick(5)
+    until(bench, lambda: status(bench.editor).work == "")
 
 
 @pytest.mark.parametrize("end", ["Off", "remove"])
@@ -280,23 +256,6 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
     bench.hand.drag([beside, beside + 10.0])
     assert list(bench.session.handles) == ["pull 1", "pull 2"]
     assert dragger.handle == "pull 1"
-
-
-def test_pulls_are_finished_and_add_up(bench):  # noqa: F811
-    bench.session.bind()
-    bench.type("0")
-    poses = []
-    for fraction in (0.7, 0.3):
-        grabbed(bench, fraction)
-        assert bench.session.history.undo_label == "pull"
-        bench.type("shift+f")
-        until(bench, lambda: is_finished(bench))
-        assert bench.session.solution.handle_error < 1e-12
-        poses.append(bench.session.vertices)
-    bench.type("z")
-    assert np.array_equal(bench.session.vertices, poses[0])
-    bench.type("y")
-    assert np.array_equal(bench.session.vertices, poses[1])
 
 
 def glided(bench):  # noqa: F811
@@ -387,7 +346,7 @@ def test_another_mode_during_a_finish_does_not_stop_it(bench):  # noqa: F811
 
 
 def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4", "shift+f")
     assert "no pose to finish" in bench.editor.status.lower()
     bench.hand.failures.clear()
@@ -401,7 +360,7 @@ def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
 
 
 def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F811
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4")
     pull_handle(bench)
     bench.type("shift+f")
@@ -448,7 +407,7 @@ def test_a_part_that_no_handle_moves_is_named_once():
     session.handles.add(scene.handle)
     session.bind()
     made = Bench(plain_view((400, 320)), session, Mode.DEFORM)
-    made.editor.do(finishing_after_drags(False))
+    made.editor.controller.finishing.is_wanted = False
     said = f"Part 2 ({n} vertices) has no handle and no fixed vertices: it stays where it is"
     for is_said in (True, False):
         pull_handle(made)

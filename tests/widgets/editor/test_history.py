@@ -10,14 +10,7 @@ from scenes import sausage
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor.actions import redo, undo
-from vtk_segdeform.widgets.editor.history import (
-    jumping_to,
-    position_of,
-    preview,
-    states_of,
-)
-from vtk_segdeform.widgets.editor.neighbours import Neighbour
+from vtk_segdeform.widgets.editor import jumping_to, preview, states_of
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 UP = np.eye(4)
@@ -42,59 +35,13 @@ def editor():
     return editor
 
 
-def test_states_are_named_and_a_jump_reaches_even_the_one_before_the_session(editor):
-    controller, session, undone = editor.controller, editor.session, []
-    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
-    editor.do(jumping_to(1))
-    assert editor.status.startswith("History: Set tip")
-    assert (position_of(controller), len(states_of(controller))) == (1, 3)
-
-    def enter(position, message):
-        undone.append((session.history.position, position, message))
-
-    controller.neighbours.before = Neighbour("repair", ("Opened", "Pull"), enter)
-    assert states_of(controller) == ("Opened", "Pull", "Repair", "Set tip", "Drag tip")
-    editor.do(jumping_to(4))
-    assert (session.history.position, position_of(controller), undone) == (2, 4, [])
-    editor.do(jumping_to(0))
-    assert undone == [(0, 0, "History: Opened")]
-    assert controller.undo_label == "repair"
-    editor.do(undo)
-    assert undone[1:] == [(0, 1, "Undo: repair")]
-
-
-def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_replaces_them(
-    editor,
-):
-    controller, session, entered = editor.controller, editor.session, []
-    session.history.jump(1)
-
-    def enter(position, message):
-        entered.append((session.history.position, position, message))
-
-    after = Neighbour("repair", ("Pull",), enter)
-    controller.neighbours.follow(session, 1, after)
-    assert states_of(controller) == ("Opened", "Set tip", "Repair", "Pull")
-    assert controller.redo_label == "repair"
-    session.history.jump(0)
-    assert controller.redo_label == "set tip"
-    assert states_of(controller)[2:] == ("Repair", "Pull")
-    for position in (2, 3):
-        session.history.jump(0)
+def test_states_are_named_and_a_jump_reaches_each(editor):
+    session = editor.session
+    assert states_of(session) == ("Opened", "Set tip", "Drag tip")
+    for position in (1, 0, 2):
         editor.do(jumping_to(position))
-    session.history.jump(1)
-    editor.do(redo)
-    assert entered == [
-        (1, 2, "History: Repair"),
-        (1, 3, "History: Pull"),
-        (1, 2, "Redo: repair"),
-    ]
-    preview(controller, 2)
-    assert editor.widgets.surface.instead is None  # that pose is of another mesh
-    session.set_fixed([250])
-    assert states_of(controller) == ("Opened", "Set tip", "Set fixed vertices")
-    session.undo()
-    assert controller.redo_label == "set fixed vertices"
+        assert editor.status.startswith(f"History: {states_of(session)[position]}")
+        assert session.history.position == position
 
 
 def test_a_preview_shows_another_state_until_anything_happens(editor):
@@ -125,9 +72,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
     controller.start("Waiting", lambda _: None, lambda _: None)
     assert not shows_rest(0)  # during a job
     editor.wait()
-    controller.neighbours.before = Neighbour("repair", ("Opened",), lambda *_: None)
-    assert not shows_rest(0)  # the pose before the session is not known
-    assert shows_rest(1)
+    assert shows_rest(0)
 
 
 def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):

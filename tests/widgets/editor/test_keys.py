@@ -41,6 +41,16 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
             assert [key_name(key_cap(key)) for key in b.keys] == [*b.keys]
 
 
+def test_caps_of_keys_that_have_names_of_their_own():
+    caps = {"page_up": "PgUp", "page_down": "PgDown", "semicolon": ";", "kp_1": "Num 1"}
+    assert {name: key_cap(name) for name in caps} == caps
+    for name, cap in caps.items():
+        assert key_name(cap) == name
+    symbols = {"Prior": "page_up", "Next": "page_down", "quoteright": "apostrophe"}
+    for symbol, name in symbols.items():
+        assert event_key(symbol, control=False, alt=False, shift=False) == name
+
+
 class Nameless:
     """Has no text."""
 

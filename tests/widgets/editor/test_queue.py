@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from hands import Hand, plain_view
 
-from vtk_segdeform.errors import CageError, SessionError
+from vtk_segdeform.errors import CageError, Cancelled, SessionError
 from vtk_segdeform.widgets.editor import queue as queue_module
 from vtk_segdeform.widgets.editor.queue import Kind, Queue, Task
 
@@ -95,6 +95,7 @@ def test_a_job_begins_beside_the_worker_and_another_one_is_refused(bench):
     assert bench.heard == ["begin prepare", "begin Counting"]
     with pytest.raises(SessionError, match="Counting: wait"):
         bench.add(Kind.JOB, "Measuring")
+    assert bench.queue.text.startswith("Counting")
     bench.queue.refuse()
     assert bench.queue.text.startswith("Busy. Counting")
     bench.gates["Counting"].set()
@@ -132,7 +133,7 @@ def test_no_result_is_delivered_while_the_hand_is_active_but_the_worker_is_free(
     bench.until(lambda: "prepare" in bench.heard)
 
 
-def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
+def test_a_task_begins_after_a_rest_or_when_it_is_waited_for(bench, monkeypatch):
     now, is_free = [0.0], [True]
     monkeypatch.setattr(queue_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     how = {"rest": 1.0, "may_begin": lambda: is_free[0]}
@@ -143,10 +144,121 @@ def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
     now[0] = 2.6
     bench.hand.tick()
     assert bench.heard == ["loaded"]
-    bench.queue.add(Task(kind=Kind.SAVE, begin=lambda: bench.heard.append("saved"), **how))
-    bench.queue.hurry(Kind.SAVE)
+    bench.queue.add(Task(kind=Kind.AUTOSAVE, begin=lambda: bench.heard.append("saved"), **how))
+    bench.queue.wait(Kind.AUTOSAVE)
     bench.hand.tick()
     assert bench.heard == ["loaded", "saved"]
+
+
+def test_work_runs_in_another_thread_and_everything_else_in_this_one(bench):
+    threads = []
+
+    def here(*_):
+        threads.append(threading.get_ident())
+
+    def begin():
+        here()
+        return here
+
+    bench.queue = Queue(bench.hand.view, here)
+    bench.queue.add(Task(kind=Kind.JOB, begin=begin, done=here))
+    bench.until(lambda: bench.queue.job is None)
+    assert len(threads) == 5  # begin, changed, work, changed, done
+    assert [each for each in threads if each != threads[0]] in ([threads[1]], [threads[2]])
+    assert threads[0] == threads[-1] == threading.get_ident()
+
+
+@pytest.mark.parametrize("kind", [Kind.JOB, Kind.DOCUMENT, Kind.AUTOSAVE])
+def test_a_cancelled_task_stops_at_its_next_report(bench, kind):
+    stopped = threading.Event()
+
+    def work(progress):
+        try:
+            while True:
+                progress(0.5, "on and on")
+                time.sleep(0.001)
+        except Cancelled:
+            stopped.set()
+            raise
+
+    bench.queue.add(Task(kind=kind, begin=lambda: work, done=bench.heard.append))
+    bench.hand.tick(2)
+    assert bench.queue.cancel(kind)
+    assert (bench.queue.task(kind) is None) == (kind is Kind.DOCUMENT)  # nobody waits for that
+    bench.until(stopped.is_set)
+    bench.until(lambda: bench.queue.task(kind) is None)
+    assert bench.heard == bench.hand.failures == []
+
+
+def test_an_error_reaches_failed_if_it_is_given_and_otherwise_whoever_waits(bench):
+    error = CageError("no cage fits")
+    bench.add(Kind.JOB, "told", error=error, failed=bench.heard.append)
+    bench.gates["told"].set()
+    bench.until(lambda: error in bench.heard)
+    bench.add(Kind.JOB, "raised", error=error)
+    bench.gates["raised"].set()
+    with pytest.raises(CageError, match="no cage fits"):
+        bench.queue.wait(Kind.JOB)
+    bench.queue.wait(Kind.JOB)
+    assert bench.hand.failures == []
+
+
+def test_the_result_is_delivered_once_even_if_the_listener_raises(bench):
+    def changed():
+        if bench.queue.job is None:
+            raise RuntimeError("a listener without hands")
+
+    bench.queue = Queue(bench.hand.view, changed)
+    bench.queue.add(Task(kind=Kind.JOB, begin=lambda: lambda _: 0, done=lambda n: 1 // n))
+    bench.until(lambda: bench.hand.failures)
+    bench.hand.tick(3)
+    (failure,) = bench.hand.failures
+    assert isinstance(failure, ZeroDivisionError)
+    assert isinstance(failure.__context__, RuntimeError)
+
+
+def test_a_computing_thread_makes_progress_while_the_window_is_idle(bench):
+    # Each tick waits for the worker; otherwise 200 ticks would pass immediately.
+    def work(progress):
+        for k in range(20_000):
+            progress(k / 20_000, "counting")
+            sum(range(200))
+        return "counted"
+
+    bench.queue.add(Task(kind=Kind.JOB, begin=lambda: work, done=bench.heard.append))
+    for _ in range(200):
+        if bench.queue.job is not None:
+            bench.hand.tick()
+    assert bench.heard == ["counted"]
+
+
+def test_progress_is_reported_during_a_camera_drag_and_the_result_after_it():
+    view, told = plain_view((500, 300)), []
+    view.render()
+    hand, go_on = Hand(view), threading.Event()
+
+    def work(progress):
+        progress(0.5, "half")
+        assert go_on.wait(20.0)
+        return "all"
+
+    hand.press((100, 150))  # the camera style now receives all events exclusively
+    hand.move((120, 150))
+    queue = Queue(view, lambda: told.append(queue.text))
+    queue.add(Task(kind=Kind.JOB, name="Counting", begin=lambda: work, done=told.append))
+    end = time.monotonic() + 20.0
+    while told[-1] != "Counting: half":
+        assert time.monotonic() < end
+        hand.tick()
+    reports = len(told)
+    hand.tick(3)  # nothing new
+    go_on.set()
+    hand.tick(5)
+    assert len(told) == reports
+    hand.release((130, 150))
+    hand.tick(5)
+    assert told[reports:] == ["", "all"]
+    assert hand.failures == []
 
 
 def test_without_tasks_there_is_no_timer(bench):
