@@ -183,12 +183,12 @@ def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(models, "cactus", lambda _: MESH)
     monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
     soon = functools.partial(later, 50)  # instead of a second
-    # Windows of other tests may be open, so that closing this one would not end the loop.
-    ended = lambda do: soon(lambda: (do(), app.quit()))  # noqa: E731
+    # `quit` would close the windows of other tests, too.
+    ended = lambda do: soon(lambda: (do(), app.exit()))  # noqa: E731
     monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
     limit = QtCore.QTimer()
     limit.setSingleShot(True)
-    limit.timeout.connect(app.quit)
+    limit.timeout.connect(app.exit)
     limit.start(60_000)
     window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
     assert limit.isActive()  # it has ended by itself
@@ -196,7 +196,3 @@ def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
     assert not window.editor.editor.GetEnabled()
     window.deleteLater()
     delete_now()
-
-    # Several tests share a view.
-    later(0, app.quit)  # or that quit would end the dialogs of later tests at once
-    app.exec()
