@@ -110,7 +110,7 @@ class Menus:
 
     def _update_steps(self) -> None:
         window = self._window
-        history = window.session.history if window.has_mesh else None
+        history = window.editor.controller.history if window.has_mesh else None
         is_free = history is not None and not window.editor.is_busy
         for action, verb, label in (
             (self._undo, "undo", history and history.undo_label),

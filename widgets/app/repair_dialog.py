@@ -85,7 +85,9 @@ class RepairDialog(QtWidgets.QDialog):
             policy.setRetainSizeWhenHidden(True)
             each.setSizePolicy(policy)
         self.stage.setWordWrap(True)
-        self.advice = QtWidgets.QLabel("The repaired surface is not deformed.")
+        self.advice = QtWidgets.QLabel(
+            "The repaired surface is not deformed. Undo returns to the current pose."
+        )
         self.advice.setWordWrap(True)
         self.advice.setVisible(has_pose)
         roles = QtWidgets.QDialogButtonBox.ButtonRole

@@ -1,6 +1,7 @@
 """Repair and open: a closed copy of the document's surface, as a new document.
 
-Also for a file that cannot be opened as it is.  Nothing on disk changes.
+Also for a file that cannot be opened as it is.  Nothing on disk changes; undo returns to the
+original document, redo to the copy.
 """
 
 from __future__ import annotations
@@ -10,29 +11,28 @@ from typing import Any
 
 from vtk_segdeform.io import to_polydata
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from .documents import Document, Opened, Request, Unopenable
+from .documents import Document, Opened, Unopenable
 from .repair_dialog import RepairDialog
 
 
-def ask_repair(window: Any) -> Request | None:
-    """Show what a repair of the open document would do; return how to open the result, or None."""
+def ask_repair(window: Any) -> Opened | None:
+    """Show what a repair of the open document would do; return the repaired copy, or None."""
     session, camera = window.session, window.editor.view.camera
     given = to_polydata(session.mesh) if session.surface is None else session.surface.given
     has_pose = session.state.pose is not None
     return _ask(window, window.document, given, session.mesh, camera, has_pose=has_pose)
 
 
-def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Request | None:
+def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Opened | None:
     """Do `ask_repair` for a file that could not be opened."""
     return _ask(window, Document(path.name, source=path), error.given, error.valid, None)
 
 
 def _ask(
     window: Any, document: Document, given: Any, mesh: Mesh, camera: Any, *, has_pose: bool = False
-) -> Request | None:
+) -> Opened | None:
     dialog = RepairDialog(given, mesh, camera, window, has_pose=has_pose)
     try:
         repaired = dialog.repaired if dialog.exec() == dialog.DialogCode.Accepted else None
@@ -41,11 +41,6 @@ def _ask(
     if repaired is None:
         return None
     name = f"{Path(document.name).stem.removesuffix(' (repaired)')} (repaired)"
-
-    def read(progress: Progress) -> Opened:
-        progress(0.0, "Opening the repaired surface")
-        # Files are proposed beside the original, under the new name.
-        place = None if document.source is None else document.source.with_stem(name)
-        return Document(name, source=place), Session(repaired)
-
-    return Request(name, read, is_new=True)
+    # Files are proposed beside the original, under the new name.
+    place = None if document.source is None else document.source.with_stem(name)
+    return Document(name, source=place), Session(repaired)

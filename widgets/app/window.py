@@ -70,8 +70,6 @@ class Window(QtWidgets.QMainWindow):
 
     Attributes
     ----------
-    document : Document
-        The open document.
     editor_widget : DeformWidget or None
         The widget that edits it.
     keys : Keys
@@ -100,7 +98,7 @@ class Window(QtWidgets.QMainWindow):
         self.autosaves = autosaves or Autosaves()
         self.autosaver: Autosaver | None = None
         self._interval = interval
-        self.document = Document("")
+        self._documents: dict[Session, Document] = {}  # of the sessions in the history
         self.mesh_state: object = None
         self.editor_widget: Any = None
         self._request: Request | None = None  # that is being opened
@@ -141,9 +139,14 @@ class Window(QtWidgets.QMainWindow):
         """Whether the document has unsaved changes."""
         return self.has_mesh and self.editor.controller.is_modified
 
+    @property
+    def document(self) -> Document:
+        """The open document."""
+        return self._documents.get(self.session) or Document(self.editor.path.stem)
+
     def set_document(self, document: Document) -> None:
         """Change the files of the open document; the session is unchanged."""
-        self.document = document
+        self._documents[self.session] = document
         self._update_title()
 
     # Opening.
@@ -174,9 +177,12 @@ class Window(QtWidgets.QMainWindow):
 
     def repair(self) -> None:
         """Show what a repair would do; open the result as a new document if the user accepts."""
-        request = ask_repair(self)
-        if request is not None:
-            self._open(request)
+        repaired = ask_repair(self)
+        if repaired is not None:
+            document, session = repaired
+            self._documents[session] = document
+            file = document.file(session, is_new=True)
+            self.editor.do(lambda controller: controller.open_repaired(session, file))
 
     def _load_kernels(self) -> None:
         """Load the compiled kernels while the start page is shown, so that files open faster."""
@@ -227,21 +233,23 @@ class Window(QtWidgets.QMainWindow):
         self._request = None
         self._close_document()
         self.pages.delete_views()
-        self.document, session = opened
-        self.mesh_state = None
+        document, session = opened
+        self._documents, self.mesh_state = {session: document}, None
         widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
-        widget.editor.controller.file = self.document.file(session, is_new=request.is_new)
+        widget.editor.controller.file = document.file(session, is_new=request.is_new)
         widget.editor.show_cube = True
         widget.editor.keys = self.keys
         widget.taken_keys = lambda: menu_keys(self.menuBar())
         widget.keys_changed.connect(self._keep_keys)
-        own = self.document.session_path or self.document.source
+        own = document.session_path or document.source
         if (path := request.slot.path if request.slot else own) is not None:
             widget.editor.controller.restore_view(path)
         connect_panel(self)
-        if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
-            repair = partial(QtCore.QTimer.singleShot, 0, self, self.repair)  # after the press
-            widget.editor.controller.notices.offer("Repair ...", repair)
+        widget.editor.controller.notices.offer(
+            "Repair ...",
+            partial(QtCore.QTimer.singleShot, 0, self, self.repair),  # after the press
+            lambda session: not session.mesh.is_two_manifold,  # a closed one with seams needs none
+        )
         widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
         self.autosaver = Autosaver(
@@ -272,9 +280,9 @@ class Window(QtWidgets.QMainWindow):
         if path is None or not isinstance(error, Unopenable):
             show_error(self, title, text)
         elif ask_repair_instead(self, title, text):
-            repairing = ask_repair_of(self, path, error)
-            if repairing is not None:
-                self._open(repairing)
+            repaired = ask_repair_of(self, path, error)
+            if repaired is not None:
+                self._open(Request(repaired[0].name, lambda _: repaired, is_new=True))
 
     def _cancel_opening(self) -> None:
         """Cancel; the thread stops at its next progress report and is not waited for."""

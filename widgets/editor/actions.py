@@ -65,15 +65,17 @@ def undo(controller: Controller) -> None:
     if puller.waiting.has_pull and puller.cancel():
         controller.say("Undo: pull")
         return
-    label = controller.session.history.undo_label
-    controller.session.undo()
+    history, label = controller.history, controller.history.undo_label
+    if label:
+        history.jump(history.position - 1)
     controller.say(f"Undo: {label}" if label else "Nothing to undo")
 
 
 def redo(controller: Controller) -> None:
     """Redo the last undone step."""
-    label = controller.session.history.redo_label
-    controller.session.redo()
+    history, label = controller.history, controller.history.redo_label
+    if label:
+        history.jump(history.position + 1)
     controller.say(f"Redo: {label}" if label else "Nothing to redo")
 
 

@@ -73,8 +73,8 @@ class Autosaver:
 
     def _changed(self) -> None:
         session = self._controller.session
-        if session is not self._session:  # another file was opened in the editor
-            self._session, self._seen, self._tried = session, session.state, session.state
+        if session is not self._session:  # another one was opened in the editor
+            self._session, self._seen, self._tried = session, session.state, None
             self._drop()
         is_new, self._seen = session.state is not self._seen, session.state
         if not self.is_idle:

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
@@ -31,6 +33,7 @@ from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
 from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
+from .session_history import SessionHistory
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
@@ -54,6 +57,8 @@ class Controller:
     ----------
     file : SessionFile
         The file to save to and open from.
+    history : SessionHistory
+        The steps of `session`, and of those that it was repaired from.
     widgets : WidgetSet
         The widgets over `session`; replaced when another session is opened.
     help : HelpCard
@@ -99,6 +104,8 @@ class Controller:
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
+        self.history = SessionHistory(session, self._enter)
+        self._files: dict[Session, SessionFile] = {}  # of the other sessions in the history
         self._is_intact = True  # the mesh file that was saved last, as far as is known
         self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
@@ -520,17 +527,42 @@ class Controller:
         """Read the session or the mesh in *path* as a job, and then edit that."""
 
         def replace(session: Session) -> str:
-            self.widgets = self.widgets.replaced_by(session)
-            self.camera.follow(self.widgets)
-            self._stop_listening()
-            self._listen()
-            self.notices.follow(session)
+            is_other = not np.array_equal(self.session.mesh.vertices, session.mesh.vertices)
+            self._edit(session)
+            self.history.begin(session)
+            self._files.clear()
             self.file.opened(path, session)
+            if is_other:
+                self.camera.show_model()
             self.restore_view(path)
             self.view.render()  # before anything else is computed
             return f"Opened {path}"
 
         self.start(f"Opening {path}", lambda progress: read_session(path, progress), replace)
+
+    def open_repaired(self, session: Session, file: SessionFile) -> None:
+        """Edit *session*, a repaired copy of the current one, with a *file* of its own.
+
+        It is a step of the history: undo returns to the original.
+        """
+        self._files[session] = file
+        self.history.repaired(session)
+        self.say("Repaired")
+
+    def _enter(self, session: Session) -> None:
+        """Edit another session of the history, seen from the same side."""
+        self._preparing.interrupt()
+        self.finishing.interrupt()
+        self._files[self.session], self.file = self.file, self._files[session]
+        self._edit(session)
+        self._apply_mode()
+
+    def _edit(self, session: Session) -> None:
+        self.widgets = self.widgets.replaced_by(session)
+        self.camera.follow(self.widgets)
+        self._stop_listening()
+        self._listen()
+        self.notices.follow(session)
 
     def restore_view(self, path: Path) -> None:
         """Restore camera and mode from a session file; set the up axis that a mesh file has."""

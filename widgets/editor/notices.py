@@ -64,7 +64,7 @@ class Notices:
         self.view = view
         self._session: Session | None = None
         self._notices: tuple[Notice, ...] = ()
-        self._offers: dict[str, Callable[[], object]] = {}
+        self._offers: dict[str, tuple[Callable[[], object], Callable[[Session], bool]]] = {}
         self._marks = Highlights(view)
         self._line = NoticeLine(view, foot)
         self._is_open = self._is_enabled = False
@@ -76,6 +76,13 @@ class Notices:
         """All notices in one line; "" if there are none."""
         text = "; ".join(notice.text for notice in self._notices)
         return text[:1].upper() + text[1:]
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        """The buttons for this session, apart from those that all have."""
+        session = self._session
+        offers = self._offers.items()
+        return tuple(label for label, (_, suits) in offers if session and suits(session))
 
     @property
     def is_open(self) -> bool:
@@ -110,9 +117,11 @@ class Notices:
         elif change & Change.POSE and self.are_marked:
             self._marks.move(self._session.vertices)
 
-    def offer(self, label: str, act: Callable[[], object]) -> None:
-        """Add a button that calls *act*, to this line and those of later sessions."""
-        self._offers[label] = act
+    def offer(
+        self, label: str, act: Callable[[], object], suits: Callable[[Session], bool]
+    ) -> None:
+        """Add a button that calls *act*, to this line and later ones, of sessions that it suits."""
+        self._offers[label] = act, suits
         self._draw()
 
     def enable(self, enabled: bool) -> None:
@@ -158,7 +167,7 @@ class Notices:
     def _draw(self) -> None:
         if self.is_open and self._notices:
             show = _HIDE if self.are_marked else _SHOW
-            self._line.show(self.text, (show, *self._offers, _CLOSE))
+            self._line.show(self.text, (show, *self.offers, _CLOSE))
         else:
             self._line.show("", ())
 
@@ -175,5 +184,6 @@ class Notices:
                 self._mark()
             self._draw()
         elif button:
-            self._offers[button]()
+            act, _ = self._offers[button]
+            act()
         return button is not None

@@ -74,10 +74,10 @@ def words_of(hint: str, keys: Keys, mode: Mode) -> tuple[Word, ...]:
 
 def history(editor: DeformEditor) -> tuple[Entry, ...]:
     """Return the states of the session by name, the oldest first."""
-    here = editor.session.history.position
+    here = editor.controller.history.position
     return tuple(
         Entry(name, is_current=place == here, is_undone=place > here)
-        for place, name in enumerate(states_of(editor.session))
+        for place, name in enumerate(states_of(editor.controller))
     )
 
 

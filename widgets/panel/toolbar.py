@@ -41,8 +41,8 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
                 Field("save.mesh_as", "file", "Save mesh as ..."),
             ),
         ),
-        _step("undo", editor.session.history.undo_label, is_free=is_free),
-        _step("redo", editor.session.history.redo_label, is_free=is_free),
+        _step("undo", controller.history.undo_label, is_free=is_free),
+        _step("redo", controller.history.redo_label, is_free=is_free),
     ]
     modes = [
         key_button(

@@ -125,21 +125,22 @@ def test_a_dropped_surface_opens_at_once_and_one_line_says_how(hand, given, name
     notices = hand.window.editor.controller.notices
     assert notices.text == text or name == "soup.stl"  # which PyVista may weld when it reads
     assert notices.is_open is bool(notices.text)
-    assert ("Repair ..." in notices._offers) is (name in ("bottle.ply", "sheet.obj"))
+    assert ("Repair ..." in notices.offers) is (name in ("bottle.ply", "sheet.obj"))
 
 
 @BLANK
 def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, boxes, tmp_path):
+    """Undo returns to the original with its edits, redo to the copy with its own."""
     path = opened(hand, bottle(3, 3), tmp_path / "bottle.ply")
     content = path.read_bytes()
-    hand.window.session.set_fixed([0, 1, 2])
+    original = hand.window.session
+    original.set_fixed([0, 1, 2])
 
     def accept(dialog):
         assert lines(dialog)[0].startswith("Fill 3 holes of ")
         assert dialog.after.isChecked()
         click(dialog.accepting)
 
-    boxes.answers.append("Discard")
     repair(hand, accept)
     assert hand.title == "bottle (repaired)* - segdeform"
     session = hand.window.session
@@ -153,11 +154,36 @@ def test_a_repaired_copy_is_a_new_unsaved_document_and_the_original_stays(hand, 
     boxes.answers.append("Cancel")
     hand.window.open(path)
     assert hand.title == "bottle (repaired)* - segdeform"
+    session.set_fixed([5, 6])
+
+    def shows(row, wanted, title):
+        shown = rows(hand)
+        until(lambda: shown.count() == 4 and shown.currentRow() == row, "the history")
+        names = [shown.item(k).text() for k in range(4)]
+        assert names == ["Opened", "Set fixed vertices", "Repair", "Set fixed vertices"]
+        assert hand.window.session is wanted
+        assert hand.title == f"{title} - segdeform"
+
+    shows(3, session, "bottle (repaired)*")
+    hand.choose("Edit", "Undo set fixed vertices")
+    hand.choose("Edit", "Undo repair")
+    shows(1, original, "bottle.ply*")
+    assert hand.window.document.source == path
+    assert len(original.mesh.borders) == 3
+    hand.choose("Edit", "Undo set fixed vertices")
+    shows(0, original, "bottle.ply")
+    hand.choose("Edit", "Redo set fixed vertices")
+    hand.choose("Edit", "Redo repair")
+    shows(2, session, "bottle (repaired)*")
+    rows(hand).item(0).setSelected(True)
+    rows(hand).itemClicked.emit(rows(hand).item(0))
+    shows(0, original, "bottle.ply")
+    hand.choose("Edit", "Redo set fixed vertices")
     boxes.answers.append("Discard")
     hand.choose("File", "Open recent", "1  bottle.ply")
     hand.settle()
     assert hand.title == "bottle.ply - segdeform"
-    assert len(hand.window.session.mesh.borders) == 3
+    assert hand.window.session is not original
 
 
 @pytest.mark.campaign

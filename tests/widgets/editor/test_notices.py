@@ -229,7 +229,7 @@ def test_a_clean_view_has_no_line_and_no_marks(open_editor):
 )
 def test_the_line_covers_neither_the_status_line_nor_most_of_the_window(open_editor, size):
     scene = open_editor(Session(Surface(two_parts())), size)
-    scene.notices.offer("Repair ...", lambda: None)
+    scene.notices.offer("Repair ...", lambda: None, lambda _: True)
     View.render(scene.view)
     x, y, wide, high = scene.notices._line.box
     assert y >= scene.editor.controller.messages.height > 0
@@ -241,9 +241,14 @@ def test_the_line_covers_neither_the_status_line_nor_most_of_the_window(open_edi
 
 def test_a_button_that_is_offered_calls_its_function(open_editor):
     scene, calls = open_editor(Session(Surface(sheet()))), []
-    scene.notices.offer("Repair ...", lambda: calls.append(1))
+    session = scene.editor.session
+    scene.notices.offer("Repair ...", lambda: calls.append(1), lambda each: each is session)
     scene.click("Repair ...")
     assert calls == [1]
+    scene.notices.follow(Session(Surface(sheet())))
+    View.render(scene.view)
+    with pytest.raises(StopIteration):
+        scene.notices._line.centre_of("Repair ...")
 
 
 def test_a_press_beside_the_buttons_does_not_reach_the_camera(open_editor):
