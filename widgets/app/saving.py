@@ -1,6 +1,7 @@
 """Saving the window's document: as a session, a mesh or a picture, with the dialogs before.
 
-Every function takes the `Window` and returns whether the file was written.
+Every function takes the `Window` and returns whether the file was written, or will be once the pose
+has settled.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import MESH_FILES, Action, Controller, error_text, exporting, saving
+from ..editor import MESH_FILES, Action, Controller, Kind, error_text, exporting, saving
 from .dialogs import Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
@@ -62,21 +63,47 @@ def export_picture(window: Any) -> bool:
 
 def may_discard(window: Any) -> bool:
     """Return whether the document may be closed: it is saved, or the user discards it."""
+    if window.has_mesh and window.editor.controller.queue.task(Kind.SAVE):
+        _settle(window)
     if not window.is_modified:
         return True
     mesh_is_saved = _mesh_is_saved(window)
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
     if answer is Answer.SAVE_MESH:
-        return save_mesh(window) and _mesh_is_saved(window)
-    if answer is Answer.SAVE:
-        return save_session(window) and not window.is_modified
-    return answer is Answer.DISCARD
+        return _mesh_saved_now(window)
+    return _saved_now(window) if answer is Answer.SAVE else answer is Answer.DISCARD
+
+
+def _saved_now(window: Any) -> bool:
+    """Save the session, and wait until that is done."""
+    if not save_session(window):
+        return False
+    _settle(window)
+    return not window.is_modified
+
+
+def _mesh_saved_now(window: Any) -> bool:
+    """Save the mesh, and wait until that is done."""
+    if not save_mesh(window):
+        return False
+    _settle(window)
+    return _mesh_is_saved(window)
 
 
 def _mesh_is_saved(window: Any) -> bool:
     """Return whether a file contains the mesh as it is, without a loss that would be unseen."""
     is_written = window.mesh_state is window.session.state
     return is_written and window.editor.controller.saved_intact()
+
+
+def _settle(window: Any) -> None:
+    """Wait until the pose has settled and has been saved; the window is drawn meanwhile."""
+    events, controller = QtCore.QEventLoop.ProcessEventsFlag, window.editor.controller
+    while controller.widgets.is_pose_to_come:
+        QtWidgets.QApplication.processEvents(
+            events.ExcludeUserInputEvents | events.WaitForMoreEvents
+        )
+    controller.queue.hurry(Kind.SAVE)
 
 
 def _session_saved(window: Any, path: Path) -> None:
@@ -91,15 +118,7 @@ def _mesh_saved(window: Any, path: Path) -> None:
 
 
 def _done(window: Any, action: Action) -> bool:
-    """Run the action, even during a job; show an error in a dialog and in the status line.
-
-    The pose settles first, in the window, which is drawn meanwhile.
-    """
-    events, widgets = QtCore.QEventLoop.ProcessEventsFlag, window.editor.widgets
-    while widgets.is_pose_to_come:
-        QtWidgets.QApplication.processEvents(
-            events.ExcludeUserInputEvents | events.WaitForMoreEvents
-        )
+    """Run the action, even during a job; show an error in a dialog and in the status line."""
     error = window.editor.do(action, while_busy=True)
     if error is not None:
         show_error(window, "Could not save", error_text(error))

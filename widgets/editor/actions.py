@@ -100,8 +100,12 @@ def save(controller: Controller) -> None:
     """Save to the editor's file; another existing file is replaced only if confirmed."""
     question = f"{controller.file.path} already exists. Save again to replace it"
     if controller.file.may_overwrite or controller.messages.confirms(question):
-        controller.settle()
-        controller.save()
+        once_settled(Controller.save)(controller)
+
+
+def once_settled(action: Action) -> Action:
+    """Return the action that waits until the pose has settled."""
+    return lambda controller: controller.once_settled(lambda: action(controller))
 
 
 def opening(path: Path) -> Action:
@@ -112,16 +116,15 @@ def opening(path: Path) -> Action:
 def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that saves the session to *path*, which becomes its file.
 
-    A pose that still converges is settled first.  In the end *then* is called.
+    A pose that still converges is saved once it has settled, and *then* is called.
     """
 
     def save(controller: Controller) -> None:
-        controller.settle()
         controller.file.path = path
         controller.save()
         then()
 
-    return save
+    return once_settled(save)
 
 
 def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
@@ -129,14 +132,13 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
 
     The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
     left out is said.  The file is then read again in another thread, see `Controller.read_again`.
-    A pose that still converges is settled first.  In the end *then* is called.
+    A pose that still converges is written once it has settled, and *then* is called.
     """
 
     def export(controller: Controller) -> None:
         session = controller.session
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
-        controller.settle()
         controller.finishing.interrupt()
         written = write_posed(session, path)
         saved = f"Mesh saved to {path}{pose_remark(session)}"
@@ -144,7 +146,7 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         controller.read_again(written)
         then()
 
-    return export
+    return once_settled(export)
 
 
 def open_file(controller: Controller) -> None:

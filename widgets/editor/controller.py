@@ -155,6 +155,7 @@ class Controller:
                     if was_on:
                         self._interrupted = self.widgets.is_settling, self.finishing.is_pending
                     self.help.hide()
+                    self.queue.hurry(Kind.SAVE)
                     self._preparing.stop()
                     self.finishing.interrupt()
                     self.queue.cancel(Kind.JOB, Kind.LOAD)
@@ -313,6 +314,7 @@ class Controller:
         marker = self.widgets.puller.marker_under_pointer() if self._mode is Mode.PULL else None
         if marker is not None:
             self.widgets.dragger.handle = marker  # which the panel selects
+        self.queue.hurry(Kind.SAVE)
         self.finishing.interrupt()
         self.messages.clear()  # an error would hide the amount and the keys of the drag
         if is_compiling():
@@ -369,6 +371,7 @@ class Controller:
 
         with self.view.drawing_once():
             self.widgets.finish()  # before the job starts, because it may fail
+            self.queue.hurry(Kind.SAVE)
             self._preparing.interrupt()
             self.finishing.interrupt()
             task = Task(kind=Kind.JOB, name=name, begin=lambda: with_kernels, done=deliver)
@@ -394,7 +397,9 @@ class Controller:
             self.finishing.interrupt()
             self.widgets.stop_refining()
             self.queue.cancel(Kind.SETTLE)
-            self.say("Stopped. The pose has not settled")
+            self.messages.note("Stopped. The pose has not settled")
+            self.queue.hurry(Kind.SAVE)
+            self.refresh()
         elif self.finishing.interrupt():
             self.say("The pose is not finished on the mesh")
         elif self._preparing.cancel():
@@ -474,19 +479,30 @@ class Controller:
 
     # Files.
 
-    def settle(self) -> None:
-        """Settle the pose now, which may take seconds: what is saved is the pose that is to come.
+    def once_settled(self, act: Callable[[], None]) -> None:
+        """Call *act* once the pose has settled: what is saved is the pose that is to come.
 
-        Raises
-        ------
-        SessionError
-            If a released pull waits for the preparation of the mesh.
+        What would change the pose meanwhile, such as a press, lets *act* be called first, and so
+        does Escape, at which the pose remains as it is.
         """
-        if self.widgets.puller.waiting.has_pull:
-            raise SessionError("The pull is not computed yet. Save again in a moment")
+        if not self.widgets.is_pose_to_come:
+            act()
+            return
+        task = Task(
+            kind=Kind.SAVE,
+            begin=act,
+            may_begin=lambda: not self.widgets.is_pose_to_come,
+        )
+        self.queue.add(task)
+        self.say("Saving once the pose has settled")
+
+    def settle(self) -> None:
+        """Settle the pose now, which may take seconds, and save what waits; for scripts."""
         if self.widgets.is_settling:
             self.session.refine()
             self.queue.cancel(Kind.SETTLE)
+        if not self.widgets.is_pose_to_come:
+            self.queue.hurry(Kind.SAVE)
 
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""

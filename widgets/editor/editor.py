@@ -320,6 +320,8 @@ class DeformEditor:
                 return SessionError(controller.queue.refusal)
             controller.widgets.finish()
         controller.messages.clear()
+        if not while_busy:
+            controller.queue.hurry(Kind.SAVE)
         self._stop_waiting()
         is_edit = not while_busy and action is not show_rest
         if is_edit:  # the camera may move around the mesh at rest

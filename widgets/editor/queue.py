@@ -5,6 +5,7 @@ Of the tasks that may begin, the one of the first kind begins first:
     JOB       an action of the user; begins at once, and the widgets are off meanwhile
     DOCUMENT  reading or repairing a file, in a program with documents
     AUTOSAVE  writing unsaved work: `autosaver`
+    SAVE      saving a pose once it has settled
     SETTLE    the end of a pose that converges after its release
     PREPARE   what the first pull needs: `preparing`
     FINISH    a pose on the mesh itself, once the hand has rested: `finishing`
@@ -49,11 +50,12 @@ class Kind(enum.IntEnum):
     JOB = 0
     DOCUMENT = 1
     AUTOSAVE = 2
-    SETTLE = 3
-    PREPARE = 4
-    FINISH = 5
-    CHECK = 6
-    LOAD = 7
+    SAVE = 3
+    SETTLE = 4
+    PREPARE = 5
+    FINISH = 6
+    CHECK = 7
+    LOAD = 8
 
 
 _BY_THE_WORKER = Kind.PREPARE, Kind.FINISH, Kind.CHECK
@@ -231,7 +233,7 @@ class Queue:
         if preparing is not None and preparing < 1.0:  # else it is not accepted yet
             return "Preparing", preparing
         if settling is not None and time.monotonic() >= settling.since + _SHOWN_AFTER:
-            return "Settling", 0.0
+            return "Saving" if self.task(Kind.SAVE) else "Settling", 0.0
         return "Finishing", self.fraction(Kind.FINISH)
 
     @property
@@ -261,6 +263,12 @@ class Queue:
         task.since = time.monotonic()
         self._insert(task)
         self._advance()
+
+    def hurry(self, kind: Kind) -> None:
+        """Begin all waiting tasks of a kind now; an error in one is passed to the view."""
+        for task in [each for each in self._tasks if each.kind is kind and each.future is None]:
+            with self._ticker.guarded():
+                self._begin(task)
 
     def delay(self, kind: Kind) -> None:
         """Restart the waiting time of the tasks of a kind."""
@@ -295,8 +303,7 @@ class Queue:
         Exception
             The error of the work, unless the task was cancelled or *failed* was given.
         """
-        for waiting in [each for each in self._tasks if each.kind is kind and each.future is None]:
-            self._begin(waiting)
+        self.hurry(kind)
         while (task := self.task(kind)) is not None and task.future is not None:
             futures.wait([task.future])
             self._deliver(task)

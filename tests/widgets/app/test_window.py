@@ -34,6 +34,7 @@ from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app import documents, window
 from vtk_segdeform.widgets.editor import About, Autosaves, Slot, preparing
+from vtk_segdeform.widgets.handle_dragger import LiveSolve
 from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 
 BALL = models.sphere(300)
@@ -303,22 +304,37 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
 
 
 @BLANK
-@pytest.mark.parametrize("is_closing", [False, True])
-def test_a_pose_settles_before_it_is_saved(start, arm_file, boxes, is_closing):
+@pytest.mark.parametrize("is_saving", [False, True])
+def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes, is_saving):
     hand = start(arm_file)
-    session, dragger = hand.window.session, hand.window.editor.widgets.dragger
+    session, widgets = hand.window.session, hand.window.editor.widgets
+    tick, rests = LiveSolve._tick, [True]
+    monkeypatch.setattr(LiveSolve, "_tick", lambda live: None if rests else tick(live))
     hand.window.editor.mode = Mode.DEFORM
     hand.settle()
-    session.drag({"handle 1": session.targets["handle 1"] + [0.0, 0.0, 0.4]}, max_steps=1)
-    session.commit()
-    dragger.resume_refining()
-    assert hand.window.editor.widgets.is_settling
-    if is_closing:
-        boxes.answers.append("Save session")
-        assert hand.window.close()
-    else:
+
+    def bend(by):
+        session.drag({"handle 1": session.targets["handle 1"] + by}, max_steps=1)
+        session.commit()
+        hand.window.editor.widgets.dragger.resume_refining()
+        assert widgets.is_settling
+
+    bend([0.0, 0.0, 0.4])
+    hand.choose("File", "Save session")
+    assert "Saving once the pose has settled" in hand.window.editor.status
+    rests.clear()
+    until(lambda: not hand.window.is_modified, "the file")
+    assert_array_equal(load_session(arm_file).vertices, session.vertices)
+    rests.append(True)
+    bend([0.0, 0.3, -0.2])
+    if is_saving:  # so that there is nothing to ask
         hand.choose("File", "Save session")
-        assert not hand.window.is_modified
+    else:
+        boxes.answers.append("Save session")
+    n_asked = len(boxes.seen)
+    rests.clear()
+    assert hand.window.close()
+    assert len(boxes.seen) == n_asked + (not is_saving)
     assert session.solution.status is not Status.STEP_LIMIT
     assert_array_equal(load_session(arm_file).vertices, session.vertices)
 

@@ -168,21 +168,44 @@ def test_escape_stops_a_pose_that_settles(bench, settling, tmp_path):  # noqa: F
     until(bench, lambda: bench.session.solution.status is not Status.STEP_LIMIT)
 
 
-@pytest.mark.parametrize("write", ["session", "mesh", "script"])
-def test_the_pose_settles_before_it_is_saved(bench, settling, tmp_path, write):  # noqa: F811
+@pytest.mark.parametrize("write", ["session", "mesh"])
+def test_saving_waits_until_the_pose_has_settled(bench, settling, tmp_path, write):  # noqa: F811
     path = tmp_path / ("posed.ply" if write == "mesh" else "work.segdeform")
-    if write == "script":
-        bench.editor.save(path)
-    else:
-        bench.editor.do(exporting(path) if write == "mesh" else saving(path))
+    bench.editor.do(exporting(path) if write == "mesh" else saving(path))
+    assert "Saving once the pose has settled" in bench.editor.status
+    assert status(bench.editor).work == "Saving"
+    until(bench, path.exists)
     assert not settling.is_settling
     assert bench.session.solution.status is not Status.STEP_LIMIT
     assert f"aved to {path}" in bench.editor.status
     read = read_mesh if write == "mesh" else load_session
     assert np.allclose(read(path).vertices, bench.session.vertices, rtol=0.0, atol=1e-6)
     assert bench.editor.controller.file.is_modified(bench.session) == (write == "mesh")
-    bench.hand.tick(5)
-    until(bench, lambda: status(bench.editor).work == "")
+
+
+@pytest.mark.parametrize("change", ["escape", "undo", "press", "off", "another mode"])
+def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, change):  # noqa: F811
+    bench.editor.path = tmp_path / "work.segdeform"
+    shown = bench.session.vertices
+    bench.type("ctrl+s")
+    assert settling.is_settling
+    assert not bench.editor.path.exists()
+    ends = {
+        "escape": lambda: bench.type("escape"),
+        "undo": lambda: bench.type("z"),
+        "press": lambda: pull_handle(bench, (5, 5)),
+        "off": bench.editor.Off,
+        "another mode": lambda: bench.type("3"),
+    }
+    ends[change]()
+    assert np.array_equal(load_session(bench.editor.path).vertices, shown)
+
+
+def test_a_script_that_saves_waits_until_the_pose_has_settled(bench, settling, tmp_path):  # noqa: F811
+    bench.editor.save(tmp_path / "work.segdeform")
+    assert not settling.is_settling
+    assert bench.session.solution.status is not Status.STEP_LIMIT
+    assert np.array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
 
 
 @pytest.mark.parametrize("end", ["Off", "remove"])

@@ -133,7 +133,7 @@ def test_no_result_is_delivered_while_the_hand_is_active_but_the_worker_is_free(
     bench.until(lambda: "prepare" in bench.heard)
 
 
-def test_a_task_begins_after_a_rest_or_when_it_is_waited_for(bench, monkeypatch):
+def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
     now, is_free = [0.0], [True]
     monkeypatch.setattr(queue_module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     how = {"rest": 1.0, "may_begin": lambda: is_free[0]}
@@ -144,8 +144,8 @@ def test_a_task_begins_after_a_rest_or_when_it_is_waited_for(bench, monkeypatch)
     now[0] = 2.6
     bench.hand.tick()
     assert bench.heard == ["loaded"]
-    bench.queue.add(Task(kind=Kind.AUTOSAVE, begin=lambda: bench.heard.append("saved"), **how))
-    bench.queue.wait(Kind.AUTOSAVE)
+    bench.queue.add(Task(kind=Kind.SAVE, begin=lambda: bench.heard.append("saved"), **how))
+    bench.queue.hurry(Kind.SAVE)
     bench.hand.tick()
     assert bench.heard == ["loaded", "saved"]
 
@@ -230,35 +230,6 @@ def test_a_computing_thread_makes_progress_while_the_window_is_idle(bench):
         if bench.queue.job is not None:
             bench.hand.tick()
     assert bench.heard == ["counted"]
-
-
-def test_progress_is_reported_during_a_camera_drag_and_the_result_after_it():
-    view, told = plain_view((500, 300)), []
-    view.render()
-    hand, go_on = Hand(view), threading.Event()
-
-    def work(progress):
-        progress(0.5, "half")
-        assert go_on.wait(20.0)
-        return "all"
-
-    hand.press((100, 150))  # the camera style now receives all events exclusively
-    hand.move((120, 150))
-    queue = Queue(view, lambda: told.append(queue.text))
-    queue.add(Task(kind=Kind.JOB, name="Counting", begin=lambda: work, done=told.append))
-    end = time.monotonic() + 20.0
-    while told[-1] != "Counting: half":
-        assert time.monotonic() < end
-        hand.tick()
-    reports = len(told)
-    hand.tick(3)  # nothing new
-    go_on.set()
-    hand.tick(5)
-    assert len(told) == reports
-    hand.release((130, 150))
-    hand.tick(5)
-    assert told[reports:] == ["", "all"]
-    assert hand.failures == []
 
 
 def test_without_tasks_there_is_no_timer(bench):
