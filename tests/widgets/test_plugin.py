@@ -378,6 +378,13 @@ def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar, monkeyp
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_off_screen_the_command_says_that_nothing_can_be_edited(tmp_path, bar, capsys):
+    path = tmp_path / "bar.vtp"
+    convert.write_mesh(path, bar)
+    assert main(["edit", str(path)]) == 1
+    assert "pyvista renders off-screen" in capsys.readouterr().err
+
+
 def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):
     convert.write_mesh(tmp_path / "bar.glb", bar)
     whole = pv.read(tmp_path / "bar.glb")

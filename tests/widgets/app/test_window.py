@@ -199,6 +199,17 @@ def test_recent_files_are_there_after_a_restart_and_open_at_a_click(
 
 
 @BLANK
+def test_the_mesh_may_be_saved_on_closing(start, ball_file, tmp_path, monkeypatch, boxes):
+    hand = start(ball_file)
+    change(hand)
+    posed = hand.window.session.vertices
+    choose_file(monkeypatch, tmp_path / "posed.ply")
+    boxes.answers.append("Save mesh ...")
+    assert hand.window.close()
+    assert_allclose(Surface.read(tmp_path / "posed.ply").mesh.vertices, posed, atol=1e-6)
+
+
+@BLANK
 def test_a_mesh_that_lost_digits_is_told_of_and_closes_no_window(
     start, tmp_path, monkeypatch, boxes
 ):
@@ -479,6 +490,35 @@ def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, 
 
 
 # View and help.
+
+
+@BLANK
+def test_menus_and_start_page_are_reached_by_keys(start, monkeypatch, boxes):
+    monkeypatch.setattr(models, "cactus", lambda: BALL)
+    hand = start()
+    window, page = hand.window, hand.page
+    chain = set()
+    page.open.setFocus()
+    until(page.open.hasFocus, "the focus")
+    for _ in range(4):
+        chain.add(application().focusWidget())
+        QtTest.QTest.keyClick(application().focusWidget(), Qt.Key_Tab)
+    assert {page.open, page.sample} <= chain
+    page.sample.setFocus()
+    QtTest.QTest.keyClick(page.sample, Qt.Key_Return)
+    hand.settle()
+    assert hand.title == "cactus - segdeform"
+    view = window.editor_widget.plotter
+    assert view.hasFocus()
+    boxes.answers.append("OK")
+    QtTest.QTest.keyClick(view, Qt.Key_H, Qt.AltModifier)  # from the view
+    menu = window.menuBar().actions()[-1].menu()
+    until(menu.isVisible, "the menu")
+    QtTest.QTest.keyClick(menu, Qt.Key_A)
+    until(lambda: boxes.seen, "the dialog")
+    assert "vtk_segdeform" in boxes.seen[-1]
+    QtTest.QTest.keyClick(view, Qt.Key_Tab)
+    assert not view.hasFocus()  # but a control of the panel
 
 
 @BLANK

@@ -136,6 +136,23 @@ time.sleep(1000)
 """
 
 
+def test_of_two_simultaneous_programs_one_gets_the_autosave(folder):
+    for _ in range(5):
+        crash(folder)
+    found, ready = [], threading.Barrier(4)
+
+    def ask():
+        ready.wait()
+        found.extend(Autosaves(folder).abandoned())
+
+    threads = [threading.Thread(target=ask) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == len({slot.path for slot in found}) == 5
+
+
 def test_abandoned_autosaves_are_offered_until_removed_the_latest_first(folder):
     for name, seconds in (("old", 1000.0), ("new", 3000.0), ("older", 2000.0)):
         path = crash(folder, about=About(name)) / "session.segdeform"
@@ -152,6 +169,14 @@ def test_abandoned_autosaves_are_offered_until_removed_the_latest_first(folder):
     for slot in left[1:]:
         slot.release()
     assert [slot.about.name for slot in autosaves.abandoned()] == ["older", "old"]
+
+
+def test_removing_a_slot_also_removes_the_draft_of_a_killed_write(folder):
+    slot = Autosaves(folder).new(ABOUT)
+    slot.write(work())
+    (slot.path.parent / ".segdeform-0123456789abcdef.part").write_bytes(b"half")
+    slot.remove()
+    assert list(folder.iterdir()) == []
 
 
 def test_an_empty_slot_is_deleted_unless_it_is_locked(folder):
@@ -349,6 +374,18 @@ def test_a_foreign_file_in_a_slot_and_the_folder_are_kept(folder):
     }  # fmt: skip
     ask(folder)
     assert mine.read_text() == deeper.read_text() == "mine"
+
+
+def test_slots_of_earlier_versions_are_found_and_removed_too(folder):
+    path = crash(folder)
+    begun = Autosaves(folder).new(ABOUT)
+    begun.release()
+    for each in (path, begun.path.parent):  # an empty lock
+        (each / "lock").write_bytes(b"")
+    (slot,) = Autosaves(folder).abandoned()
+    assert slot.about == ABOUT
+    slot.remove()
+    assert list(folder.iterdir()) == []
 
 
 @posix

@@ -281,6 +281,23 @@ def test_what_is_pulled_again_without_touching_its_dot_is_selected(bench):  # no
     assert dragger.handle == "pull 1"
 
 
+def test_pulls_are_finished_and_add_up(bench):  # noqa: F811
+    bench.session.bind()
+    bench.type("0")
+    poses = []
+    for fraction in (0.7, 0.3):
+        grabbed(bench, fraction)
+        assert bench.session.history.undo_label == "pull"
+        bench.type("shift+f")
+        until(bench, lambda: is_finished(bench))
+        assert bench.session.solution.handle_error < 1e-12
+        poses.append(bench.session.vertices)
+    bench.type("z")
+    assert np.array_equal(bench.session.vertices, poses[0])
+    bench.type("y")
+    assert np.array_equal(bench.session.vertices, poses[1])
+
+
 def glided(bench):  # noqa: F811
     """Drag the handle until the surface glides to the finished pose; return the one before."""
     pull_handle(bench, (15, 25))

@@ -9,7 +9,7 @@ from hands import Hand, draw_seldom, picture, plain_view
 from open_surfaces import bottle, polydata, sheet, split_at_seam
 from solids import icosphere
 
-from vtk_segdeform import Regions, Session, Surface
+from vtk_segdeform import Options, Regions, Session, Surface
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.widgets import DeformEditor
@@ -259,6 +259,13 @@ def test_a_press_beside_the_buttons_does_not_reach_the_camera(open_editor):
     scene.hand.drag([start, start + [60.0, 0.0], start + [120.0, 40.0]])
     assert scene.view.camera.GetPosition() == before
     assert scene.hand.failures == []
+
+
+def test_for_a_sheet_the_volume_is_not_0_per_cent(open_editor):
+    scene = open_editor(Session(Surface(sheet())))
+    scene.hand.types("p")
+    assert "no volume" in scene.editor.status.lower()
+    assert scene.editor.session.options.preserve_volume is Options().preserve_volume
 
 
 def test_a_mesh_without_a_surface_has_notices_of_its_borders():

@@ -14,9 +14,24 @@ from solids import icosphere
 from vtk_segdeform import Regions, Session, Surface
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.widgets import DeformEditor, Mode, Paint, Tool
+from vtk_segdeform.widgets.editor import exporting
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
+
+
+def test_what_a_format_cannot_store_is_said(tmp_path):
+    given = bottle()
+    given.cell_data["Material"] = np.arange(given.n_cells)
+    given.point_data["heat"] = np.zeros(given.n_points)
+    scene = Scene(given)
+    scene.editor.do(exporting(tmp_path / "bottle.stl"))
+    status = scene.editor.status
+    assert f"Mesh saved to {tmp_path / 'bottle.stl'}. STL cannot store " in status
+    assert "'Material'" in status
+    assert "array" not in status
+    scene.editor.do(exporting(tmp_path / "bottle.vtp"))
+    assert "cannot store" not in scene.editor.status
 
 
 def finned():

@@ -328,6 +328,14 @@ def test_drags_during_the_first_compilation_say_so(bench, monkeypatch):
         bench.hand.release()
 
 
+def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):
+    asked = []
+    monkeypatch.setattr(controller, "load_for", asked.append)
+    bench.editor.controller.start("counting", lambda _: asked.append("work"), lambda _: None)
+    bench.until(lambda: not bench.editor.is_busy)
+    assert asked == [bench.session.mesh.n_vertices, "work"]
+
+
 @pytest.fixture
 def kernels(monkeypatch):
     """Return a list of what has been loaded; the clock of a rest stands still."""

@@ -17,7 +17,8 @@ from qt_moments import delete_now
 
 import pyvistaqt  # isort: skip
 import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt ignores pyvista's entry points
-from vtk_segdeform import models
+from vtk_segdeform import Regions, models
+from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.editor import Mode
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -102,6 +103,25 @@ def test_closing_a_background_plotter_removes_the_editor():
         window.close()
         assert not editor.is_busy
         assert not editor.GetEnabled()
+
+
+def test_a_job_is_stopped_by_escape_while_qt_runs(again, monkeypatch):
+    _, editor, hand, _ = again
+    end = time.monotonic() + 60.0
+
+    def endless(mesh, n_regions, *, progress):  # the real one may end before the key is pressed
+        while time.monotonic() < end:
+            progress(0.5, "looking everywhere")
+            time.sleep(0.001)
+        return Regions.single(mesh)
+
+    monkeypatch.setattr(actions, "segment_mesh", endless)
+    hand.key("g")
+    until(lambda: "looking everywhere" in editor.status, "the job")
+    hand.key("Escape")
+    until(lambda: not editor.is_busy, "the end")
+    assert editor.session.regions is None
+    assert "Cancelled" in editor.status
 
 
 def test_the_camera_rotates_beside_the_mesh_and_ctrl_erases(again):
