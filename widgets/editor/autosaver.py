@@ -77,10 +77,15 @@ class Autosaver:
             self._session, self._seen, self._tried = session, session.state, None
             self._drop()
         is_new, self._seen = session.state is not self._seen, session.state
-        if not self.is_idle:
+        task = self._queue.task(Kind.AUTOSAVE)
+        if not self._controller.is_modified:
+            if task is None or task.future is None:  # or else once it has been written
+                self._tried = session.state
+                self._drop()
+        elif task is not None:
             if is_new and not session.is_dragging:
                 self._queue.delay(Kind.AUTOSAVE)
-        elif session.state is not self._tried or (self._slot and not self._controller.is_modified):
+        elif session.state is not self._tried:
             self._add(_REST)
 
     def _add(self, rest: float) -> None:
@@ -97,9 +102,6 @@ class Autosaver:
 
     def _begin(self) -> Work | None:
         session, self._tried = self._session, self._session.state
-        if not self._controller.is_modified:
-            self._remove_slot()
-            return None
         try:
             slot = self._slot = self._slot or self._autosaves.new(self._about())
         except SegDeformError as error:
@@ -131,9 +133,6 @@ class Autosaver:
         """Stop writing and delete the slot."""
         self._queue.cancel(Kind.AUTOSAVE)
         self._queue.wait(Kind.AUTOSAVE)
-        self._remove_slot()
-
-    def _remove_slot(self) -> None:
         slot, self._slot = self._slot, None
         if slot is not None:
             slot.remove()
