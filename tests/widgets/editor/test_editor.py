@@ -492,6 +492,33 @@ def test_keys_make_a_pull_more_or_less_local(bench):
     assert "Locality: auto" in bench.editor.status
 
 
+SAID = [
+    ("c", "Cages shown"), ("c", "Cages hidden"), ("shift+g", "Regions shown"),
+    ("shift+g", "Regions hidden"), ("w", "Shaded with edges"), ("w", "Wireframe"), ("w", "Shaded"),
+    ("KP_5", "Orthographic"), ("KP_5", "Perspective"), ("p", "Volume preservation off"),
+    ("p", "Volume preservation on from the next move"), ("z", "Undo: volume preservation on"),
+    ("y", "Redo: volume preservation on"), ("v", "Brush: paint region 1 (X-ray)"),
+    ("i", "The mesh is closed and exactly as given: nothing to show"),
+    ("v", "Visible surface only"), ("x", "Split region 1"), ("4", "No cages yet. Press F"),
+    ("l", "Axes: local"), ("l", "Axes: global"), ("Home", "Pose reset"),
+    ("0", "Drag the surface. Shift-click pins. Shift+wheel: radius (5 %)"),
+]  # fmt: skip
+
+
+def test_each_key_says_what_it_has_done(bench):
+    bench.editor.widgets.puller.radius = 0.05 * bench.session.mesh.diagonal
+    for key, said in SAID:
+        bench.type(key)
+        assert bench.editor.status.startswith(said), key
+    bench.hand.wheel(1, bench.hand.at([0.0, 0.0, 0.0]), shift=True)
+    share = 100.0 * bench.editor.widgets.puller.radius / bench.session.mesh.diagonal
+    assert f"radius ({share:.1f} %)" in bench.editor.status
+    bench.hand.click(bench.hand.at([0.0, 0.0, 0.0]), shift=True)
+    bench.type("u")
+    assert "Removed 1 point" in bench.editor.status
+    assert list(bench.session.handles) == ["handle 1"]
+
+
 def test_keys_for_axes_the_pivot_and_pins(bench):
     session, dragger, hand = bench.session, bench.editor.widgets.dragger, bench.hand
     bench.type("4", "l")

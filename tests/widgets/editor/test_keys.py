@@ -42,11 +42,23 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
 
 
 def test_caps_of_keys_that_have_names_of_their_own():
-    caps = {"page_up": "PgUp", "page_down": "PgDown", "semicolon": ";", "kp_1": "Num 1"}
-    assert {name: key_cap(name) for name in caps} == caps
-    for name, cap in caps.items():
+    marks = {
+        "question": "?", "bracketleft": "[", "bracketright": "]", "plus": "+", "minus": "-",
+        "backslash": "\\", "period": ".", "comma": ",", "equal": "=", "semicolon": ";",
+        "apostrophe": "'", "grave": "`", "slash": "/",
+    }  # fmt: skip
+    words = {
+        "page_up": "PgUp", "page_down": "PgDown", "insert": "Ins", "delete": "Del",
+        "escape": "Esc", "return": "Enter", "ctrl+shift+a": "Ctrl+Shift+A", "kp_1": "Num 1",
+    }  # fmt: skip
+    for name, cap in (marks | words).items():
+        assert key_cap(name) == cap
         assert key_name(cap) == name
-    symbols = {"Prior": "page_up", "Next": "page_down", "quoteright": "apostrophe"}
+    symbols = {
+        "Prior": "page_up", "Next": "page_down", "quoteright": "apostrophe", "quoteleft": "grave",
+        "KP_Add": "plus", "KP_Subtract": "minus", "KP_Decimal": "period", "ISO_Left_Tab": "tab",
+        "KP_Home": "kp_7", "KP_Insert": "kp_0", "KP_Begin": "kp_5",
+    }  # fmt: skip
     for symbol, name in symbols.items():
         assert event_key(symbol, control=False, alt=False, shift=False) == name
 

@@ -190,6 +190,19 @@ def test_a_cancelled_task_stops_at_its_next_report(bench, kind):
     assert bench.heard == bench.hand.failures == []
 
 
+@pytest.mark.parametrize("error", [CageError("no cage fits"), None])
+def test_an_error_after_the_cancellation_is_only_logged(bench, caplog, error):
+    caplog.set_level("INFO", queue_module.__name__)
+    bench.add(Kind.JOB, "told", error=error, failed=bench.heard.append)
+    bench.until(lambda: bench.queue.job.fraction)  # the last report
+    bench.queue.cancel(Kind.JOB)
+    bench.gates["told"].set()
+    bench.until(lambda: bench.queue.job is None)
+    assert [record.exc_info[1] for record in caplog.records] == ([error] if error else [])
+    assert "told" not in bench.heard
+    assert bench.hand.failures == []
+
+
 def test_an_error_reaches_failed_if_it_is_given_and_otherwise_whoever_waits(bench):
     error = CageError("no cage fits")
     bench.add(Kind.JOB, "told", error=error, failed=bench.heard.append)
