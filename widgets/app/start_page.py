@@ -100,7 +100,10 @@ class _Target(QtWidgets.QLabel):
         """Highlight the area, or end that."""
         self.is_highlighted = on
         colour = "palette(highlight)" if on else "palette(mid)"
-        self.setStyleSheet(f"QLabel {{ border: 2px dashed {colour}; border-radius: 10px; }}")
+        fill = "palette(base)" if on else "rgba(128, 128, 128, 8%)"
+        self.setStyleSheet(
+            f"QLabel {{ border: 2px dashed {colour}; border-radius: 10px; background: {fill}; }}"
+        )
 
 
 def home_as_tilde(folder: Path) -> str:
