@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import every
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from vtkmodules.vtkInteractionStyle import (
     vtkInteractorStyleJoystickCamera,
     vtkInteractorStyleTerrain,
@@ -180,6 +180,10 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.history.undo_label is None
     assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
+    with_cube = picture(bench.view)
+    bench.editor.show_cube = False
+    assert not bench.editor.show_cube
+    assert (picture(bench.view) != with_cube).any()
     count = bench.view.window.GetRenderers().GetNumberOfItems()
     bench.editor.remove()
     assert bench.view.window.GetRenderers().GetNumberOfItems() < count
