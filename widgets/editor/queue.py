@@ -34,7 +34,8 @@ from vtk_segdeform.progress import Progress
 
 from ..scene import Stop
 
-_PERIOD = 20  # milliseconds between two checks of what may begin, and what has ended
+_PERIOD = 20  # milliseconds between two checks while a thread runs
+_WAITING_PERIOD = 100  # and while there is none: all timers of a view have the shortest period
 _SHARE = 0.01  # seconds of each tick in which the window's thread waits for the worker
 _REPORT_INTERVAL = 0.25  # seconds, at least, between two reports of progress
 _STEP = 0.05  # the fraction that is shown is a multiple of this: each change draws the view
@@ -190,7 +191,8 @@ class Queue:
         self._ticker, self._tell = ticker, changed
         self._tasks: list[Task] = []
         self._cancelled: list[Task] = []  # whose threads may still run
-        self._stop_ticking: Stop | None = None
+        self._period = 0  # of the timer, 0 if there is none
+        self._stop_ticking: Stop = _nothing
         self._stop_sparing: Stop | None = None
         self._told: list[object] = []  # the progress
         self._told_at = 0.0
@@ -373,7 +375,7 @@ class Queue:
     @property
     def _computing(self) -> list[Task]:
         """The tasks with threads that compute; writing a file leaves the window its time."""
-        return [task for task in self._tasks if task.future and task.kind is not Kind.AUTOSAVE]
+        return [task for task in self._tasks if task.is_working and task.kind is not Kind.AUTOSAVE]
 
     def _changed(self) -> None:
         self._told, self._told_at = self._progress(), time.monotonic()
@@ -388,13 +390,18 @@ class Queue:
 
     def _adjust(self) -> None:
         """Run a timer while there are tasks, and leave time to threads that compute."""
-        if self._tasks and self._stop_ticking is None:
-            self._stop_ticking = self._ticker.every(_PERIOD, self._tick)
-        elif not self._tasks and self._stop_ticking is not None:
+        runs = any(task.future for task in self._tasks)
+        period = _PERIOD if runs else _WAITING_PERIOD if self._tasks else 0
+        if period != self._period:
             self._stop_ticking()
-            self._stop_ticking = None
+            self._period = period
+            self._stop_ticking = self._ticker.every(period, self._tick) if period else _nothing
         if self._computing and self._stop_sparing is None:
             self._stop_sparing = self._ticker.spare()
         elif not self._computing and self._stop_sparing is not None:
             self._stop_sparing()
             self._stop_sparing = None
+
+
+def _nothing() -> None:
+    pass

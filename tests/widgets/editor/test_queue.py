@@ -127,7 +127,10 @@ def test_no_result_is_delivered_while_the_hand_is_active_but_the_worker_is_free(
     bench.add(Kind.PREPARE, "prepare", may_end=lambda: is_free)
     bench.add(Kind.FINISH, "finish")
     bench.gates["prepare"].set()
+    assert bench.hand.view.is_sparing
     bench.open("finish")
+    bench.hand.tick()
+    assert not bench.hand.view.is_sparing  # for nothing is computed
     assert "prepare" not in bench.heard
     is_free = True
     bench.until(lambda: "prepare" in bench.heard)
@@ -243,6 +246,21 @@ def test_a_computing_thread_makes_progress_while_the_window_is_idle(bench):
         if bench.queue.job is not None:
             bench.hand.tick()
     assert bench.heard == ["counted"]
+
+
+def test_the_timer_is_slow_while_no_thread_runs(bench, monkeypatch):
+    """All timers of a view have the shortest period, also that of a pose that converges."""
+    periods, view = [], bench.hand.view
+    monkeypatch.setattr(view, "every", lambda period, _: periods.append(period) or periods.pop)
+    bench.queue.add(Task(kind=Kind.SETTLE, begin=bench.heard.clear, may_begin=lambda: False))
+    assert periods == [100]
+    bench.add(Kind.CHECK, "check")
+    assert periods == [20]
+    bench.gates["check"].set()
+    bench.queue.wait(Kind.CHECK)
+    assert periods == [100]
+    bench.queue.cancel(Kind.SETTLE)
+    assert periods == []
 
 
 def test_without_tasks_there_is_no_timer(bench):
