@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,9 +12,17 @@ import pytest
 from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 
-from vtk_segdeform import Session, load_session, save_session
+from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import About, Autosaver, Autosaves, autosaver, queue
+from vtk_segdeform.widgets.editor import (
+    About,
+    Autosaver,
+    Autosaves,
+    Controller,
+    SessionFile,
+    autosaver,
+    queue,
+)
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 UP = np.eye(4)
@@ -138,3 +148,24 @@ def test_saving_now_waits_and_another_file_has_a_slot_of_its_own(bench, tmp_path
     bench.wait(0.3)
     assert [each.parent.name for each in bench.files if each.parent.name != "gone"]
     (bench.folder / "gone" / "session.segdeform").unlink()
+
+
+def test_a_repaired_copy_and_its_original_are_each_saved_while_they_are_open(bench):
+    bench.session.handles.add([40], "knob")
+    bench.autosaver.save()
+    (first,) = bench.files
+    copy = Session(models.sphere(300))
+    file = SessionFile(Path("copy.segdeform"), copy)
+    file.is_new, bench.name = True, "copy"
+    bench.editor.do(partial(Controller.open_repaired, session=copy, file=file))
+    bench.wait(0.3)
+    (second,) = bench.files
+    assert second != first
+    assert '"copy"' in second.with_name("about.json").read_text()
+    assert load_session(second).mesh.n_vertices == copy.mesh.n_vertices
+    bench.editor.run("undo")
+    bench.wait(0.3)
+    (third,) = bench.files
+    assert "knob" in load_session(third).handles
+    bench.session.undo()
+    assert bench.files == []

@@ -851,6 +851,17 @@ def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end
     assert bare.hand.failures == []
 
 
+def test_a_posed_session_is_bound_as_it_is_read_and_not_by_the_first_drag(bench, tmp_path):
+    bench.type("4")
+    pull_handle(bench)
+    bench.editor.save(tmp_path / "posed.segdeform")
+    stages = []
+    read = read_session(tmp_path / "posed.segdeform", lambda _, stage: stages.append(stage))
+    assert read.is_bound
+    assert stages  # which the window shows
+    assert_array_equal(read.vertices, bench.session.vertices)
+
+
 def test_another_session_can_be_opened_and_edited(bench, tmp_path):
     bench.type("4")
     pull_handle(bench)
