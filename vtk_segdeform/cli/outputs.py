@@ -61,6 +61,13 @@ def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
 
 
+def report_goals(solution: Solution, say: Say) -> None:
+    """Print the volumes with goals, and their changes, by name."""
+    for name, change in solution.volume_changes.items():
+        volume = solution.volumes[name]
+        say(f"volume          {name}: {volume:.6g}, {100 * change:+.4g} % of the original")
+
+
 def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:
     """Print how near a pose is to its minimum and what is wrong with its surface.
 

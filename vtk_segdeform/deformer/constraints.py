@@ -5,20 +5,23 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..freezing import read_only
 from ..mesh import SurfacePoint
 from ..solver import (
     Anchors,
     Contact,
     GaussNewton,
+    HeldVolumes,
     ScaledSurface,
+    Sliding,
     Term,
     connected_sets,
     errors_at,
@@ -27,6 +30,8 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
+from .slides import Guide, Slide, guides
+from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
@@ -40,6 +45,9 @@ class HoldOptions:
     preserve_region_volumes: bool
     avoid_contact: bool
     lids: bool | None
+    slides: tuple[Slide, ...] = ()
+    goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
+    parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +89,7 @@ class Constraints:
     preserved: Preserved
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
+    guides: tuple[Guide, ...] = ()  # of sliding vertices, in the coordinates of poses
     pulled: PulledPoints = field(default_factory=PulledPoints)
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
@@ -98,9 +107,16 @@ class Constraints:
 
         By default at rest.  Raises a ConstraintError if they are no sets of vertices.
         """
-        problem = enclosed.problem
-        mesh, energy = problem.mesh, problem.energy
+        mesh = enclosed.problem.mesh
         fixed, handle = map(read_only, checked_constraints(mesh, fixed, handle))
+        preserved = enclosed.preserved(
+            handle,
+            whole=options.preserve_volume,
+            by_region=options.preserve_region_volumes,
+            goals=options.goals,
+            parts=options.parts,
+        )
+        problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
         if places is not None:
             fixed_in_scene = checked_targets(places, len(fixed), "fixed_at", "fixed")
@@ -118,11 +134,12 @@ class Constraints:
             start = problem.rest_cages
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved = enclosed.preserved(
-            handle, whole=options.preserve_volume, by_region=options.preserve_region_volumes
-        )
         contact = _contact(problem, ids) if options.avoid_contact else None
-        terms: tuple[Term, ...] = () if contact is None else (contact,)
+        sliding = [
+            Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
+            for each in guides(options.slides, problem.rest, few=True)
+        ]
+        terms: tuple[Term, ...] = (*sliding, *(() if contact is None else (contact,)))
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
         return cls(
             problem=problem,
@@ -137,12 +154,28 @@ class Constraints:
             preserved=preserved,
             solver=GaussNewton(energy, positions, preserved.volumes, terms=terms),
             contact=contact,
+            guides=guides(options.slides, problem.rest_pose),
         )
 
     def __setstate__(self, state: dict[str, object]) -> None:
         vars(self).update(state)
         for each in (self.fixed, self.handle):
             each.setflags(write=False)
+
+    @property
+    def rest_cages(self) -> FloatArray:
+        """(m, 3): the cages of the shape without handles and fixed vertices."""
+        return self.preserved.rest_cages
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether volumes are set or bounded."""
+        return any(each.name for each in self.preserved.constraints)
+
+    @property
+    def n_bounds(self) -> int:
+        """Number of volumes that are bounded only."""
+        return sum(each.bound != 0 for each in self.preserved.constraints)
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
@@ -157,6 +190,15 @@ class Constraints:
         places[pulled.targets] += x[own] + frame.size * pulled.levers - pulled.at(x)
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
+
+    def held_volumes(self, x: FloatArray) -> HeldVolumes:
+        """Return the volumes of *x* (n, 3) that have goals."""
+        x = self.problem.frame.about_origin(x)
+        volumes = self.preserved.constraints
+        now = {each.name: each.target + each.violation(x) for each in volumes if each.name}
+        shares = {each.name: each.share * (1.0 + each.relative(x)) for each in volumes if each.name}
+        changes = {name: share - 1.0 for name, share in shares.items()}
+        return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
 
     @property
     def unmoved(self) -> IntArray:

@@ -11,8 +11,11 @@ from ..finish import Finish, Finisher
 from ..progress import Progress
 from .constraints import Constraints
 from .path import Path
+from .stiffness import rigid_places
 
-_VOLUME_KEPT = 1e-9  # relative; a finish with a larger error is not used
+VOLUME_MET = 1e-9
+"""Relative error of a volume, at most; a finish with a larger error is not used."""
+_FIRM = 1e6  # weight of a handle or fixed vertex in the place of a rigid part
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -31,6 +34,11 @@ def finish_of(
     places = np.array(problem.rest_pose.vertices)
     places[constraints.fixed] = frame.about_origin(constraints.fixed_at)
     places[constraints.handle] = frame.about_origin(frame.outward(path.targets))
+    for guide in constraints.guides:
+        free = ~held[guide.vertices]
+        places[guide.vertices[free]] = guide.track(pose[guide.vertices])[0][free]
+        held[guide.vertices] = True
+    _place_rigid_parts(path, places, held, pose)
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
@@ -38,19 +46,38 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
-    finisher = Finisher(
-        problem.rest_pose,
-        problem.cell_energy,
-        held,
-        preserved,
-        problem.cage_weights,
-        progress,
-        avoid_contact=constraints.contact is not None,
-    )
-    found = finisher.run(pose, places[held], progress, start=start)
+    active = set(path.active_volumes)
+    while True:
+        finisher = Finisher(
+            problem.rest_pose,
+            problem.cell_energy,
+            held,
+            [preserved[k] for k in sorted(active)],
+            problem.cage_weights,
+            progress,
+            avoid_contact=constraints.contact is not None,
+        )
+        found = finisher.run(pose, places[held], progress, start=start)
+        off = [each.missed(found.vertices) for each in preserved]
+        missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
+        if not missed:
+            break
+        active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    off = [abs(each.relative(found.vertices)) for each in preserved]
-    return replace(found, vertices=start) if max(off, default=0.0) > _VOLUME_KEPT else found
+    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
+
+
+def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:
+    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices."""
+    problem = path.constraints.problem
+    stiff = problem.inputs.stiffness
+    for ids in () if stiff is None else stiff.rigid:
+        own = held[ids]
+        near = np.where(own[:, None], places[ids], pose[ids])
+        weights = np.where(own, _FIRM, 1.0)
+        moved = rigid_places(problem.rest_pose.vertices[ids], near, weights)
+        places[ids[~own]] = moved[~own]
+        held[ids] = True
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

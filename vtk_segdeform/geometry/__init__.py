@@ -3,6 +3,7 @@
 The files, in reading order:
 
     volume          enclosed volume, eqs. (8) and (9)
+    chambers        the parts of space that a surface with inner walls encloses
     lids            lids over the borders of an open mesh, for its volume
     differential    mean-curvature normals, eq. (5)
     intrinsic       intrinsic triangulation: the surface without bad triangles
@@ -21,6 +22,7 @@ The files, in reading order:
 """
 
 from .attached import SMALL_COMPONENT, attached, component_shares, joints, nearest_pairs
+from .chambers import Chambers, chambers_of
 from .decimation import decimated
 from .differential import (
     area_gradients,
@@ -53,6 +55,7 @@ from .volume import (
 
 __all__ = [
     "SMALL_COMPONENT",
+    "Chambers",
     "IntrinsicTriangulation",
     "Lids",
     "LocalVolume",
@@ -60,6 +63,7 @@ __all__ = [
     "VertexNormals",
     "area_gradients",
     "attached",
+    "chambers_of",
     "closest_rotations",
     "cluster_positions",
     "cluster_within_parts",
