@@ -22,6 +22,7 @@ from __future__ import annotations
 import enum
 import logging
 import time
+from bisect import insort
 from collections.abc import Callable
 from concurrent import futures
 from contextlib import AbstractContextManager, ExitStack
@@ -192,7 +193,7 @@ class Queue:
         self._tasks: list[Task] = []
         self._cancelled: list[Task] = []  # whose threads may still run
         self._period = 0  # of the timer, 0 if there is none
-        self._stop_ticking: Stop = _nothing
+        self._stop_ticking: Stop | None = None
         self._stop_sparing: Stop | None = None
         self._told: list[object] = []  # the progress
         self._told_at = 0.0
@@ -202,10 +203,7 @@ class Queue:
 
     def task(self, kind: Kind) -> Task | None:
         """Return the first task of a kind; None if there is none."""
-        for task in self._tasks:
-            if task.kind is kind:
-                return task
-        return None
+        return next((task for task in self._tasks if task.kind is kind), None)
 
     def fraction(self, kind: Kind) -> float | None:
         """Return the completed fraction of the running task of a kind, 0..1, coarsely, or None."""
@@ -263,7 +261,7 @@ class Queue:
                 raise SessionError(self.refusal)
             self._has_refused = False
         task.since = time.monotonic()
-        self._insert(task)
+        insort(self._tasks, task, key=lambda each: each.kind)
         self._advance()
 
     def hurry(self, kind: Kind) -> None:
@@ -318,10 +316,6 @@ class Queue:
         for kind in _JOINED:
             self.wait(kind)
 
-    def _insert(self, task: Task) -> None:
-        self._tasks.append(task)
-        self._tasks.sort(key=lambda each: each.kind)
-
     def _tick(self) -> None:
         """Report progress, deliver what has ended, and begin what may begin."""
         futures.wait([task.future for task in self._computing if task.future], timeout=_SHARE)
@@ -355,7 +349,7 @@ class Queue:
         self._tasks.remove(task)
         work = task.begin()
         if work is not None:
-            self._insert(task)
+            insort(self._tasks, task, key=lambda each: each.kind)
             task.run(work)
             self._changed()
         self._adjust()
@@ -393,15 +387,12 @@ class Queue:
         runs = any(task.future for task in self._tasks)
         period = _PERIOD if runs else _WAITING_PERIOD if self._tasks else 0
         if period != self._period:
-            self._stop_ticking()
+            if self._stop_ticking is not None:
+                self._stop_ticking()
             self._period = period
-            self._stop_ticking = self._ticker.every(period, self._tick) if period else _nothing
+            self._stop_ticking = self._ticker.every(period, self._tick) if period else None
         if self._computing and self._stop_sparing is None:
             self._stop_sparing = self._ticker.spare()
         elif not self._computing and self._stop_sparing is not None:
             self._stop_sparing()
             self._stop_sparing = None
-
-
-def _nothing() -> None:
-    pass
