@@ -6,7 +6,6 @@ wanted stops at its next progress report.
 
 from __future__ import annotations
 
-import gc
 from typing import Any
 
 import numpy as np
@@ -117,7 +116,6 @@ class RepairDialog(QtWidgets.QDialog):
         self.setParent(None)
         self.deleteLater()
         QtCore.QCoreApplication.sendPostedEvents(self, getattr(_DELETE, "value", _DELETE))
-        gc.collect()  # as `Pages.delete_views`
 
     def _press_button(self) -> None:
         (self.cancelling if self.cancelling.hasFocus() else self.accepting).click()

@@ -6,6 +6,7 @@ original document, redo to the copy.
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,8 @@ def _ask(
         repaired = dialog.repaired if dialog.exec() == dialog.DialogCode.Accepted else None
     finally:
         dialog.release()
+        del dialog
+        gc.collect()  # as `Pages.delete_views`
     if repaired is None:
         return None
     name = f"{Path(document.name).stem.removesuffix(' (repaired)')} (repaired)"
