@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from weakref import WeakKeyDictionary
 
+from vtk_segdeform.session import Session
+
 from ..editor import Action, Controller, DeformEditor
 from ..handle_dragger import STEPS
 from ..volume_overlay import percent
@@ -38,7 +40,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "A volume of the mesh: of the whole, a body, a cavity, a wall or a region",
                 value=name,
                 enabled=len(names) > 1,
-                choices=tuple((each.capitalize(), each) for each in names) or (("-", ""),),
+                choices=tuple((_label(session, each), each) for each in names) or (("-", ""),),
                 act=_choosing,
             ),
             Field(
@@ -82,6 +84,16 @@ def volumes_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
+
+
+def _label(session: Session, name: str) -> str:
+    """Return what a volume is called in the window, where one counts from 1."""
+    kind, _, number = name.rpartition(" ")
+    if not (kind and number.isdecimal()):
+        return name.capitalize()
+    if kind == "region":
+        return session.region_name(int(number)).capitalize()
+    return f"{kind.capitalize()} {int(number) + 1}"
 
 
 def _choosing(name: str) -> Action:
