@@ -86,6 +86,7 @@ class BindingInputs:
         seen = hashlib.blake2b(digest_size=20)
         seen.update(repr((_FORMAT, self.stretch, self.n_clusters, regions.smoothness)).encode())
         arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership]
+        arrays += [] if regions.carrier is None else [regions.carrier]
         for array in [*arrays, *(a for cage in self.cages for a in (cage.vertices, cage.faces))]:
             seen.update(repr((array.shape, array.dtype.str)).encode())
             seen.update(np.ascontiguousarray(array).view(np.uint8).data)

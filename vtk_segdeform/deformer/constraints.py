@@ -6,6 +6,7 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 from ..freezing import read_only
+from ..geometry import Carrying
 from ..mesh import SurfacePoint
 from ..solver import (
     Anchors,
@@ -157,6 +159,11 @@ class Constraints:
         places[pulled.targets] += x[own] + frame.size * pulled.levers - pulled.at(x)
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How a finish moves components without fixed or handle vertices; see `finishing`."""
+        return self.problem.carrying_from(np.concatenate([self.handle, self.fixed]))
 
     @property
     def unmoved(self) -> IntArray:

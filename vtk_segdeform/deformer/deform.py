@@ -15,6 +15,7 @@ from ..arrays import FloatArray, is_whole
 from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag, require_sequence, shown
 from ..errors import ArgumentError, Cancelled, ConstraintError, SegDeformError
+from ..geometry import FREE, Attach, checked_attach
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -42,6 +43,7 @@ def deform(
     preserve_volume: bool = True,
     lids: bool | None = None,
     avoid_contact: bool = False,
+    attach: Attach | None = None,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -110,7 +112,9 @@ def deform(
     path = [checked_targets(each, len(moves), "through") for each in through]
     path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, progress=next(stages))
+    deform_alone = dict.fromkeys(map(int, mesh.components[np.append(stays, moves)]), FREE)
+    attach = deform_alone | checked_attach(attach, int(mesh.components.max()) + 1)
+    regions = segment(mesh, n_regions, attach=attach, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)

@@ -1,14 +1,20 @@
-"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`."""
+"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`.
+
+Components without fixed or handle vertices that follow others are not finished: they move by what
+the finish has moved their carriers, and along their normals onto their own volumes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import BoolArray, FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..finish import Finish, Finisher
 from ..progress import Progress
+from ..solver import VolumeConstraint, moved_along, steps_to_volume
 from .constraints import Constraints
 from .path import Path
 
@@ -38,6 +44,9 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
+    is_carried = constraints.carrying.is_carried
+    held |= is_carried
+    places[is_carried] = pose[is_carried]
     finisher = Finisher(
         problem.rest_pose,
         problem.cell_energy,
@@ -48,9 +57,41 @@ def finish_of(
         avoid_contact=constraints.contact is not None,
     )
     found = finisher.run(pose, places[held], progress, start=start)
+    if is_carried.any() and found.vertices is not start:
+        found = replace(found, vertices=_followed(constraints, pose, found.vertices))
     # Without enough free vertices exact handles and exact volumes exclude each other.
     off = [abs(each.relative(found.vertices)) for each in preserved]
     return replace(found, vertices=start) if max(off, default=0.0) > _VOLUME_KEPT else found
+
+
+def _followed(constraints: Constraints, pose: FloatArray, x: FloatArray) -> FloatArray:
+    """Return the finished mesh *x* (n, 3) with the followers moved from the *pose* along with it."""
+    carrying = constraints.carrying
+    moved = pose + carrying.carried(x - pose)
+    volumes = [
+        each
+        for each in constraints.preserved.constraints
+        if carrying.is_carried[each.faces[each.faces < len(x)]].any()
+    ]
+    stays = ~carrying.is_carried
+    landed = on_volumes(moved, volumes, np.flatnonzero(stays)) if volumes else moved
+    return np.where(stays[:, None], x, landed)
+
+
+def on_volumes(
+    x: FloatArray, constraints: Sequence[VolumeConstraint], stays: IntArray
+) -> FloatArray:
+    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*."""
+    centre = x.mean(axis=0)
+    moved, directions = x - centre, []
+    for constraint in constraints:
+        normals = constraint.gradient(moved)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.where(lengths > 0.0, lengths, 1.0)
+        normals[stays] = 0.0
+        directions.append(normals)
+    paths = np.hstack([moved, *directions])
+    return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

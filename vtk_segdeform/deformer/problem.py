@@ -16,6 +16,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy
 from ..finish import CellEnergy
+from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
 from ..regions import Regions
@@ -110,6 +111,14 @@ class Problem:
         n_regions, count = self.regions.components.shape
         part = connected(count + n_regions, component, count + region)
         return part[:count], part[count:]
+
+    def carrying_from(self, ids: IntArray) -> Carrying:
+        """Return how motions are carried from the components of vertices *ids* to the others."""
+        own = self.regions.carrier
+        return Carrying(
+            self.mesh,
+            towards(carriers(self.mesh) if own is None else own, self.mesh.components[ids]),
+        )
 
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
