@@ -47,6 +47,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_cage_vertices=options.cage_vertices,
         lids=lids,
         avoid_contact=options.avoid_contact,
+        attach=dict(options.attach),
         refine=options.refine,
         progress=progress,
     )

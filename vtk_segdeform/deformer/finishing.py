@@ -65,7 +65,7 @@ def finish_of(
 
 
 def _followed(constraints: Constraints, pose: FloatArray, x: FloatArray) -> FloatArray:
-    """Return the finished mesh *x* (n, 3) with the followers moved from the *pose* along with it."""
+    """Return the finished mesh *x* (n, 3) with the followers moved along from the *pose*."""
     carrying = constraints.carrying
     moved = pose + carrying.carried(x - pose)
     volumes = [

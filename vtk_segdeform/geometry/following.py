@@ -3,7 +3,8 @@
 A component *follows* another, its *carrier*, if it lies against it or is around it or inside of it:
 
     against      their gap is at most a tenth of their size, the geometric mean of the radii of two
-                 spheres with their areas
+                 spheres with their areas; of a component smaller than the smallest limb of a
+                 segmentation, a speck or a button, a twentieth of the diagonal
     around       the directions u from points of the smaller one to the nearest points of the other
                  go all around at least in a plane.  With the weights w = 1 / gap^4, |sum w u| is
                  less than half of sum w, and the second largest eigenvalue of sum w u u^T at least
@@ -36,7 +37,7 @@ from scipy import sparse
 from scipy.sparse import linalg
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray, is_whole
+from ..arrays import BoolArray, FloatArray, IntArray, is_whole
 from ..checks import require, shown
 from ..errors import ArgumentError
 from ..mesh import Mesh, nearest_shares
@@ -47,6 +48,7 @@ Attach = Mapping[int, "int | str"]
 FREE = "free"
 SMALL_COMPONENT = 0.0125  # of the whole area; also the smallest limb of a segmentation
 _AGAINST = 0.1  # largest gap of components that lie against each other, in their sizes
+_NEAR = 0.05  # diagonals: the same of a small component
 _AROUND, _WIDE = 0.5, 0.2  # least 1 - |sum w u| / sum w, and share of the second eigenvalue
 _POWER = 4  # of the gap, in w
 _COMPARED = 32  # components of which all pairs are compared; the others only with these
@@ -122,7 +124,7 @@ def carriers(mesh: Mesh, attach: Attach | None = None) -> IntArray:
     given = checked_attach(attach, count)
     if count == 1:
         return np.zeros(1, dtype=np.int64)
-    area = np.bincount(mesh.components, mesh.vertex_areas, count)
+    area = np.asarray(np.bincount(mesh.components, mesh.vertex_areas), dtype=np.float64)
     extent = _extents(mesh)
     links = _links(mesh, area, extent)
     carried_by = {k: int(other) for k, other in given.items() if other != FREE}
@@ -164,7 +166,7 @@ def checked_attach(attach: Attach | None, count: int) -> dict[int, int | str]:
                 f"attach must map components, 0..{count - 1}, to others or {FREE!r}; "
                 f"got {shown(k)}: {shown(other)}"
             )
-    return given
+    return {int(k): other if other == FREE else int(other) for k, other in given.items()}
 
 
 def _grow(found: IntArray, links: Sequence[_Link], carried_by: dict[int, int]) -> None:
@@ -194,13 +196,19 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
     ends = np.cumsum(np.bincount(of_face, minlength=len(extent)))[:-1]
     own = np.split(by_component, ends)
     samples = {int(k): _Samples(mesh, own[k]) for k in large}
-    size, found = np.sqrt(area / (4.0 * np.pi)), []
+    size, is_small = np.sqrt(area / (4.0 * np.pi)), area < SMALL_COMPONENT * area.sum()
+    found = []
+
+    def most(i: int, j: int) -> float:
+        near = _NEAR * mesh.diagonal if is_small[i] else 0.0
+        return max(near, _AGAINST * math.sqrt(size[i] * size[j]))
+
     boxes = {k: (each.points.min(axis=0), each.points.max(axis=0)) for k, each in samples.items()}
     for j, i in itertools.combinations(map(int, large), 2):  # i is the smaller one
-        most = _AGAINST * math.sqrt(size[i] * size[j])
+        far = most(i, j)
         (low, high), (lower, higher) = boxes[i], boxes[j]
-        if (low <= higher + most).all() and (lower <= high + most).all():
-            gap = _linked(samples[i], samples[j], most)
+        if (low <= higher + far).all() and (lower <= high + far).all():
+            gap = _linked(samples[i], samples[j], far)
             found += [] if gap is None else [_Link(gap, i, j)]
     if len(small):
         every = np.concatenate([own[k] for k in large])
@@ -209,7 +217,7 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
             mine = _Samples(mesh, own[i], _FEW)
             near = all_large.nearest(mine.points)
             j = int(mesh.components[near.corners[near.gaps.argmin(), 0]])
-            gap = _linked(mine, all_large, _AGAINST * math.sqrt(size[i] * size[j]))
+            gap = _linked(mine, all_large, most(i, j))
             found += [] if gap is None else [_Link(gap, i, j)]
     return sorted(found)
 
@@ -261,7 +269,7 @@ class Carrying:
     """
 
     def __init__(self, mesh: Mesh, carrier: IntArray) -> None:
-        self.is_carried = (carrier != np.arange(len(carrier)))[mesh.components]
+        self.is_carried: BoolArray = (carrier != np.arange(len(carrier)))[mesh.components]
         self._steps: list[_Step] = []
         if not self.is_carried.any():
             return

@@ -76,6 +76,7 @@ __all__ = [
     "least_angle",
     "mesh_of",
     "misoriented_shells",
+    "nearest_shares",
     "new_crossings",
     "next_half_edge",
     "normals",

@@ -18,15 +18,18 @@ from __future__ import annotations
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import sizes
-from ..arrays import BoolArray, IntArray, is_whole
+from ..arrays import BoolArray, IntArray, as_ids, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
 from ..geometry import (
+    FREE,
     SMALL_COMPONENT,
     Attach,
     carriers,
+    checked_attach,
     component_shares,
     decimated,
     nearest_pairs,
@@ -51,6 +54,7 @@ def segment(
     *,
     overlap: int | None = None,
     attach: Attach | None = None,
+    held: ArrayLike = (),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Regions:
@@ -72,6 +76,9 @@ def segment(
         For components, numbered as in `Mesh.components`, the one that each follows; ``"free"`` if
         it follows none.  By default a component follows one that it lies against, is around or
         inside of; see `geometry.following`.
+    held : (k,) int or (n,) bool
+        Vertices that will be fixed or in handles.  Components with any of them follow none, unless
+        *attach* has another carrier for them.
     seed : int
         Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
@@ -82,8 +89,8 @@ def segment(
     regions : Regions
         Before they are grown, their parts of one component are connected.  If *n_regions* is less
         than the number of components that follow none, each of the largest of these is a region,
-        and the others follow the one that they are nearest to.  For None, all but the 16 largest of
-        them share a region, and so do small ones.
+        and the others follow the one that they are nearest to.  For None, these are at most 16, and
+        small components far from all others share a region.
 
     Raises
     ------
@@ -106,7 +113,9 @@ def segment(
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "sampling vertices")
     whole, kept = mesh, np.arange(n)
-    carrier = carriers(mesh, attach)
+    given = checked_attach(attach, int(mesh.components.max()) + 1)
+    alone = mesh.components[as_ids(held, n, "held")]
+    carrier = carriers(mesh, dict.fromkeys(alone.tolist(), FREE) | given)
     main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)
@@ -201,17 +210,20 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
 def _main_components(mesh: Mesh, n_regions: int | None, carrier: IntArray) -> BoolArray:
     """Return which components are segmented, (c,) bool.
 
-    Others that nothing carries are far from them; if *n_regions* are too few for a region of their
-    own, they get the nearest one as their *carrier*.
+    If there are too many for regions of their own, the others get the nearest one as their
+    *carrier*; for None, small ones are far from all others and get none.
     """
-    main = carrier == np.arange(len(carrier))
+    main: BoolArray = carrier == np.arange(len(carrier))
     share = np.where(main, component_shares(mesh.vertex_areas, mesh.components), 0.0)
     if main.sum() <= (n_regions or 1):
         return main
     main[np.argsort(-share, kind="stable")[n_regions or _TYPICAL_REGIONS :]] = False
+    is_far = np.zeros_like(main)
     if n_regions is None:
-        return main & ((share >= SMALL_COMPONENT) | (share == share.max()))
+        is_far = (share > 0.0) & (share < SMALL_COMPONENT) & (share < share.max())
+        main &= ~is_far
     one, other, _ = nearest_pairs(_without_ties(mesh).vertices, mesh.components, main)
-    alone = carrier[mesh.components[one]] == mesh.components[one]
-    carrier[mesh.components[one[alone]]] = mesh.components[other[alone]]
+    here, there = mesh.components[one], mesh.components[other]
+    joins = (carrier[here] == here) & ~is_far[here]
+    carrier[here[joins]] = there[joins]
     return main

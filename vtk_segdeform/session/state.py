@@ -18,17 +18,20 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import checked_constraints, checked_place
-from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..errors import ArgumentError, CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
+from ..geometry import FREE, checked_attach
 from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
 
+Attachments: TypeAlias = tuple[tuple[int, int | str], ...]
+"""Components and their carriers; see `Options`."""
 Cages: TypeAlias = tuple[FloatArray, ...]
 """One (m_r, 3) float per region: the vertices of the cages in a pose."""
 
@@ -45,6 +48,7 @@ _WORDS = {
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
     "avoid_contact": "contact avoidance",
+    "attach": "attached components",
 }
 
 
@@ -71,6 +75,9 @@ class Options:
         Number of rotation clusters.
     avoid_contact : bool
         Keep parts of the surface from crossing each other, as `Deformer` does.
+    attach : mapping of int to int or "free"
+        The components that others follow, as of `segment`, used at the next segmentation; kept as
+        sorted pairs.
 
     Raises
     ------
@@ -86,6 +93,7 @@ class Options:
     stretch: float = 1.0
     rotation_groups: int = 300
     avoid_contact: bool = False
+    attach: Attachments = ()
 
     def __post_init__(self) -> None:
         flags = "preserve_volume", "preserve_region_volumes", "avoid_contact"
@@ -93,6 +101,7 @@ class Options:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")
+        object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
@@ -100,6 +109,21 @@ class Options:
         if self.offset is not None:
             _require_number("offset", self.offset, _TINY)
         _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+def _checked_attach(attach: Any) -> Attachments:
+    """Return *attach*, a mapping or pairs, as sorted pairs; SessionError if it is neither."""
+    try:
+        pairs = dict(attach)
+        return tuple(sorted(checked_attach(pairs, 1 + max(_numbers(pairs), default=0)).items()))
+    except (ArgumentError, TypeError, ValueError):
+        raise SessionError(
+            f"attach must map components to others or {FREE!r}; got {shown(attach)}"
+        ) from None
+
+
+def _numbers(pairs: Mapping[Any, Any]) -> list[int]:
+    return [each for pair in pairs.items() for each in pair if is_whole(each, 0)]
 
 
 def label_of_change(before: Options, after: Options) -> str:
