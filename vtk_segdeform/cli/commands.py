@@ -61,7 +61,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = _selected(options.fixed, surface, "fixed")
     handle, path = _handles(options.handles, surface, fixed)
-    held = np.append(fixed, handle)
+    held = np.union1d(fixed, handle)
     found = _regions(options, surface, part(progress, 0.0, 0.18), held)
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)

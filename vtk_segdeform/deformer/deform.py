@@ -118,7 +118,7 @@ def deform(
     path = [checked_targets(each, len(moves), "through") for each in through]
     path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    held = np.append(stays, moves)
+    held = np.union1d(stays, moves)
     regions = segment(mesh, n_regions, attach=attach, held=held, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")

@@ -103,7 +103,7 @@ class SegmentedCageDeformFilter(FilterSettings):
             vertices, _ = soup.targets_at(handle, soup.points[handle])
             targets = self._moved(soup.mesh.vertices[vertices])
         held = soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed)
-        both = np.append(held, vertices)
+        both = np.union1d(held, vertices)
         deformer = self._binding(soup.mesh, labels, _cages_of(cages), both)
         constrained = deformer.hold(
             fixed=held,

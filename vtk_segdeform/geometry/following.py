@@ -10,18 +10,19 @@ A component *follows* another, its *carrier*, if it lies against it or is around
                  less than half of sum w, and the second largest eigenvalue of sum w u u^T at least
                  a fifth of it
 
-Components that are linked so form a tree.  Its root is the largest of them, or one that is free;
-each other one is carried by the one to which it has the smallest gap, next after the root: a jacket
-by the shirt, and the shirt by the body.
+Components that are linked so form a tree.  Its root is the largest of them, or each that has fixed
+vertices or handles.  Each other one is carried by the one of those nearer to the root to which it
+has the smallest gap: a jacket by the shirt, and the shirt by the body.
 
 Values of a carrier, such as the blend weights of regions, are *carried* to its followers: each
-vertex has that of the nearest point of the carrier.  Where the gap D is wider than an edge, nearest
-points of neighbours may be far from each other, as those of a bone in a limb; so the values are
-smoothed along the follower over a length of D,
+vertex has that of the nearest point of the carrier.  Nearest points of neighbours may be far from
+each other, as those of a bone in a limb, so the values x are smoothed along the follower
 
     (A + D C D) y = A x          A areas, C the Laplacian, with no negative weights
 
-y is between the least and the largest x, and of values that sum to 1 the sum stays 1.
+over a length D, the distance of the nearest point from the follower.  Both walls of a sleeve have
+the same D, and move together.  y is between the least and the largest x, and of values that sum to
+1 the sum stays 1.
 """
 
 from __future__ import annotations
@@ -105,7 +106,9 @@ class _Samples:
         return Nearest(corners, shares, gaps)
 
 
-def carriers(mesh: Mesh, attach: Attach | None = None) -> IntArray:
+def carriers(
+    mesh: Mesh, attach: Attach | None = None, *, roots: IntArray | None = None
+) -> IntArray:
     """Return the carrier of each component of *mesh*, (c,) int; its own number if it has none.
 
     Parameters
@@ -113,7 +116,10 @@ def carriers(mesh: Mesh, attach: Attach | None = None) -> IntArray:
     mesh : Mesh
         c components.
     attach : mapping of int to int or "free", optional
-        The carriers of some components; those that are free have none.
+        The carriers of some components; those that are free have none, and carry only what is
+        attached to them here.
+    roots : (k,) int, optional
+        Other components without carriers.
 
     Raises
     ------
@@ -126,10 +132,12 @@ def carriers(mesh: Mesh, attach: Attach | None = None) -> IntArray:
         return np.zeros(1, dtype=np.int64)
     area = np.asarray(np.bincount(mesh.components, mesh.vertex_areas), dtype=np.float64)
     extent = _extents(mesh)
-    links = _links(mesh, area, extent)
     carried_by = {k: int(other) for k, other in given.items() if other != FREE}
+    free = given.keys() - carried_by.keys()
+    links = [link for link in _links(mesh, area, extent) if free.isdisjoint(link[1:])]
     own = np.arange(count)
-    found = np.where(np.isin(own, [k for k in given if k not in carried_by]), own, -1)
+    alone = free if roots is None else free | set(roots.tolist()) - carried_by.keys()
+    found = np.where(np.isin(own, list(alone)), own, -1)
     for root in np.lexsort((own, -extent)):
         _grow(found, links, carried_by)
         if found[root] < 0 and root not in carried_by:
@@ -147,7 +155,7 @@ def towards(carrier: IntArray, roots: IntArray) -> IntArray:
     """
     count = len(carrier)
     pairs = np.stack([np.arange(count), carrier])
-    one, other = np.hstack([pairs, pairs[::-1]])
+    one, other = np.hstack([pairs[::-1], pairs])  # of several, the own carrier
     found = np.arange(count)
     known = np.isin(found, roots)
     while (ready := ~known[one] & known[other]).any():

@@ -25,11 +25,9 @@ from ..arrays import BoolArray, IntArray, as_ids, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
 from ..geometry import (
-    FREE,
     SMALL_COMPONENT,
     Attach,
     carriers,
-    checked_attach,
     component_shares,
     decimated,
     nearest_pairs,
@@ -113,9 +111,7 @@ def segment(
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "sampling vertices")
     whole, kept = mesh, np.arange(n)
-    given = checked_attach(attach, int(mesh.components.max()) + 1)
-    alone = mesh.components[as_ids(held, n, "held")]
-    carrier = carriers(mesh, dict.fromkeys(alone.tolist(), FREE) | given)
+    carrier = carriers(mesh, attach, roots=mesh.components[as_ids(held, n, "held")])
     main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)

@@ -9,6 +9,7 @@ step as the edit.  Pins and pulled points do not count: they move all that lies 
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -38,7 +39,9 @@ def separated(poses: Poses, state: State) -> State:
     x, at_rest = poses.vertices(state), after.at_rest()
     posed = solving.carried(poses, at_rest, x)
     at_rest = replace(at_rest, fixed_at=state.fixed_at)
-    return replace(at_rest, pose=solving.free_form(poses, at_rest, posed))
+    pose = solving.free_form(poses, at_rest, posed)
+    targets = MappingProxyType({**pose.targets, **state.pose.targets})
+    return replace(at_rest, pose=replace(pose, targets=targets))
 
 
 def _separated(state: State) -> Regions | None:
