@@ -113,12 +113,17 @@ class Problem:
         return part[:count], part[count:]
 
     def carrying_from(self, ids: IntArray) -> Carrying:
-        """Return how motions are carried from the components of vertices *ids* to the others."""
-        own = self.regions.carrier
-        return Carrying(
-            self.mesh,
-            towards(carriers(self.mesh) if own is None else own, self.mesh.components[ids]),
-        )
+        """Return how motions are carried from the components of vertices *ids* to the others.
+
+        Regions without carriers may have several components as well: then each of these follows one
+        with which it shares regions.
+        """
+        roots, carrier = self.mesh.components[ids], self.regions.carrier
+        if carrier is None:
+            part, _ = self.linked_parts
+            found = carriers(self.mesh, roots=roots)
+            carrier = np.where(part[found] == part, found, np.arange(len(part)))
+        return Carrying(self.mesh, towards(carrier, roots))
 
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
