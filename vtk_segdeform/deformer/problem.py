@@ -161,6 +161,6 @@ class Problem:
         """Weights w (n,) of `finish.finisher`: 1 / 4 of a cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
-        areas = own[:, ~self.regions.is_carried].sum(axis=1)  # followers make cages no coarser
+        areas = np.where(self.regions.is_carried, 0.0, own).sum(axis=1)  # cages are no coarser
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
         return np.asarray(density @ own) / _SPACINGS**2
