@@ -288,7 +288,7 @@ def test_no_rotation_cluster_spans_two_bodies_or_regions():
     rest_cages = np.concatenate([cage.vertices for cage in cages])
     inputs = binding.BindingInputs(mesh, regions, cages, rest_cages, 1.0, 8)
     assert len(np.unique(inputs.parts)) == 3
-    clusters = binding._clusters(inputs)
+    clusters = inputs.clusters
     assert len(np.unique(clusters)) == 8
     for k in range(8):
         assert len(np.unique(inputs.parts[clusters == k])) == 1

@@ -85,7 +85,10 @@ def test_a_pose_that_cannot_be_finished_is_returned_as_it_is(monkeypatch):
 
 @pytest.mark.parametrize("handle", [[], np.zeros(SCENE.mesh.n_vertices, dtype=bool)])
 def test_a_pose_without_a_handle_is_an_error(handle):
-    with pytest.raises(ConstraintError, match=r"at least one vertex in handle; got none\. Select"):
+    with pytest.raises(
+        ConstraintError,
+        match=r"at least one vertex in handle, or goals for volumes; got none",
+    ):
         deform(SCENE.mesh, SCENE.fixed, handle, [], **OPTIONS)
 
 

@@ -254,7 +254,7 @@ def test_the_faces_of_a_lid_belong_to_the_regions_at_its_border():
     labels = (mesh.vertices[:, thin] > 1e-9).astype(int)
     one, other = (abs(each.target) for each in region_volumes(mesh, labels))
     lids = lids_of(mesh)
-    faces, of_faces = lids.closed(mesh), _labels_of_faces(mesh, labels, lids)
+    faces, of_faces = lids.closed(mesh), _labels_of_faces(mesh, labels, lids.closed(mesh))
     for corners, label in zip(faces[mesh.n_faces :], of_faces[mesh.n_faces :], strict=True):
         beside = (np.isin(mesh.faces, corners[:2]).sum(axis=1) == 2).nonzero()[0]
         assert label == of_faces[beside[0]]

@@ -125,7 +125,7 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
             (len(mesh.borders[k]) for k in np.flatnonzero(~lids.of_wall)), reverse=True
         ),
         "encloses": lids.encloses.tolist(),
-        "volume_under_lids": bool(lids.holes.any()),
+        "volume_under_lids": bool(lids.used.any()),
         "volume": lids.summary(),
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
     }

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, clamped, finished, solved_along
+from ..deformer import Deformer, Slide, clamped, finished, solved_along
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -30,10 +30,12 @@ from ..session import Session, load_session
 from . import motion
 from .outputs import (
     HANDLE_TOLERANCE,
+    LIDS,
     Say,
     coloured_cages,
     coloured_regions,
     report_cages,
+    report_goals,
     report_pose,
     report_regions,
     report_session,
@@ -45,7 +47,6 @@ from .selection import Role, parse_selection
 from .turns import turns_off
 
 SESSION = ".segdeform"  # suffix of session files
-LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -59,8 +60,11 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     if not mesh.is_closed:
         enclosed = lids_of(mesh, LIDS[options.lids])
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
-    fixed = _selected(options.fixed, surface, "fixed")
-    handle, path = _handles(options.handles, surface, fixed)
+    fixed = np.zeros(0, dtype=np.int64)
+    if options.fixed is not None:
+        fixed = _selected(options.fixed, surface, "fixed")
+    has_goals = bool(options.volume)
+    handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
     held = np.union1d(fixed, handle)
     found = _regions(options, surface, part(progress, 0.0, 0.18), held)
     size = _size(options, found)
@@ -74,15 +78,16 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options),
+        **_settings(options), **constraints_of(options, surface),
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options.output, LIDS[options.lids])
+    stored = written(surface, solution, options)
     report_solution(stored, seconds, say)
+    report_goals(stored, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")
     if options.picture is not None:
@@ -215,8 +220,59 @@ def _settings(options: Namespace) -> dict[str, Any]:
     return settings
 
 
+def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
+    """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
+    goals = dict(_named("--volume", text) for text in options.volume)
+    parts = dict(_named("--part", text) for text in options.part)
+    return {
+        "volumes": goals or None,
+        "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
+        "stiffness": _stiffness(options, surface),
+        "slides": [_slide(text, surface) for text in options.slide],
+        "symmetry": options.symmetry,
+    }
+
+
+def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:
+    """Return the stiffness (n,) of the vertices; None if it is the same everywhere."""
+    if not (options.stiffness or options.rigid):
+        return None
+    stiffness = np.ones(surface.mesh.n_vertices)
+    for text in options.stiffness:
+        selection, _, times = text.rpartition("=")
+        try:
+            value = float(times)
+        except ValueError:
+            value = math.nan
+        if not (selection and value > 0.0):
+            raise ConstraintError(
+                f"--stiffness must be a selection and how many times stiffer it is, as z>80%=5; "
+                f"got {text!r}"
+            )
+        stiffness[_selected(selection, surface, "handle")] = value
+    for text in options.rigid:
+        stiffness[_selected(text, surface, "handle")] = math.inf
+    return stiffness
+
+
+def _slide(text: str, surface: Surface) -> Slide:
+    selection, colon, along = text.rpartition(":")
+    if not colon or along not in ("plane", "line", "surface"):
+        selection, along = text, "plane"
+    return Slide(_selected(selection, surface, "handle"), along)
+
+
+def _named(option: str, text: str) -> tuple[str, str]:
+    """Return the name and the value of an *option* "name=value"."""
+    name, equals, value = (word.strip() for word in text.partition("="))
+    if not (name and equals and value):
+        example = "whole=+10%" if option == "--volume" else "tip=z>90%"
+        raise ConstraintError(f"{option} must be a name and a value, as {example}; got {text!r}")
+    return name, value
+
+
 def _handles(
-    handles: list[dict[str, str]], surface: Surface, fixed: IntArray
+    handles: list[dict[str, str]], surface: Surface, fixed: IntArray, *, has_goals: bool
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the vertices (k,) of all handles, and their targets (k, 3): on the way, and last."""
     ids, mesh = [], surface.mesh
@@ -227,10 +283,17 @@ def _handles(
                 "after it"
             )
         ids.append(_selected(handle["select"], surface, "handle"))
+    if not ids:
+        if not has_goals:
+            raise ConstraintError("nothing would move: add --handle SEL with a motion, or --volume")
+        return np.zeros(0, dtype=np.int64), [np.empty((0, 3))]
     together = np.concatenate(ids)
     if len(np.unique(together)) < len(together):
         raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
-    at_rest, centre = [mesh.vertices[own] for own in ids], mesh.vertices[fixed].mean(axis=0)
+    at_rest, centre = (
+        [mesh.vertices[own] for own in ids],
+        mesh.vertices[fixed if len(fixed) else slice(None)].mean(axis=0),
+    )
     pairs = list(zip(at_rest, handles, strict=True))
     return together, [
         np.concatenate([_moved(points, handle, centre, share) for points, handle in pairs])

@@ -76,6 +76,7 @@ examples:
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
+  segdeform deform heart.ply -o pumped.ply --volume 'cavity=-40%' --volume wall=keep
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
@@ -396,6 +397,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     _attach(parser)
+    _constraints(parser)
     _contact_and_lids(parser)
     _refine(parser, "with --avoid-contact")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
@@ -403,7 +405,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
 
 def _handles(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--fixed", required=True, metavar="SEL", help="fixed points")
+    add("--fixed", metavar="SEL", help="fixed points")
     handle = parser.add_argument_group("handles (motion options follow the handle they apply to)")
     for name, metavar, text in [
         ("handle", "SEL", "handle vertices; may be repeated"),
@@ -415,11 +417,10 @@ def _handles(parser: argparse.ArgumentParser) -> None:
          "(default: handle)"),
         ("translate", "X,Y,Z", "translation, applied last"),
     ]:  # fmt: skip
-        required = name == "handle"
-        handle.add_argument(
-            f"--{name}", action=_HandleOption, metavar=metavar, help=text, required=required
-        )
+        handle.add_argument(f"--{name}", action=_HandleOption, metavar=metavar, help=text)
+    parser.set_defaults(handles=[])
     add("--no-volume", action="store_true", help="do not preserve the volume")
+    _constraints(parser)
     _contact_and_lids(parser)
     text = "stretch resistance relative to detail preservation (default: 1)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
@@ -427,6 +428,35 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--rotation-groups", type=_count, default=None, metavar="N", help=text)
     _refine(parser, f"up to {sizes.FINISHED:,} vertices")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
+
+
+def _constraints(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    text = (
+        "a volume: keep, free, 2.5 (in the mesh's unit, cubed), 40%%, +10%% or -40%%, also after "
+        "'at least' or 'at most'; NAME is whole, body 0, cavity, wall, component 0, region 0, or a "
+        "part; may be repeated"
+    )
+    add("--volume", action="append", default=[], metavar="NAME=GOAL", help=text)
+    text = "a part of the surface, whose volume is that under a lid; may be repeated"
+    add("--part", action="append", default=[], metavar="NAME=SEL", help=text)
+    text = "points that move as one body, as bones and buttons; may be repeated"
+    add("--rigid", action="append", default=[], metavar="SEL", help=text)
+    text = "points that are so many times stiffer than others; may be repeated"
+    add("--stiffness", action="append", default=[], metavar="SEL=TIMES", help=text)
+    text = (
+        "points that move along a plane only, the nearest to them; with :line or :surface after "
+        "SEL along a line, or along the surface; may be repeated"
+    )
+    add("--slide", action="append", default=[], metavar="SEL", help=text)
+    text = "mirror motions about a plane with this normal, whose place is found, or auto"
+    add("--symmetry", choices=("x", "y", "z", "auto"), default=None, help=text)
+    text = "an array of vectors or tensors that turns with the surface; may be repeated"
+    add("--turn", action="append", default=[], metavar="ARRAY", help=text)
+    text = "the same, pushed forward with the surface: lengths change; may be repeated"
+    add("--push", action="append", default=[], metavar="ARRAY", help=text)
+    text = "add a point array of this name: how far each point has moved"
+    add("--displacement", default=None, metavar="NAME", help=text)
 
 
 def _contact_and_lids(parser: argparse.ArgumentParser) -> None:

@@ -5,6 +5,11 @@ The files, in reading order:
     deformer         `Deformer`: targets in, `Solution` out
     problem          the mesh, its cages and its energy, made once
     enclosed_volume  the volume under its lids, and what of it is preserved
+    slides           vertices that slide along a plane, a line or a surface
+    stiffness        stiff and rigid parts
+    symmetry         motions that are mirrored about a plane
+    volume_goals     goals for volumes, as texts
+    growth           the shape that has the volumes that are set
     constraints      fixed vertices, handles and volumes, made once for a set of them
     path             the last pose, and how the next one is reached from there
     local            constraints that move the surface near a grabbed point only
@@ -43,21 +48,29 @@ from .deformer import Deformer
 from .finishing import on_volumes
 from .problem import Problem
 from .pull import pull
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
+from .volume_goals import Goals, checked_goals
 
 __all__ = [
     "FARTHEST_APART",
     "LOCALITY",
     "SPREAD",
     "Deformer",
+    "Goals",
     "PaperDeformer",
     "PaperSolution",
     "Problem",
+    "Slide",
+    "Stiffness",
     "automatic_locality",
     "checked_constraints",
+    "checked_goals",
     "checked_locality",
     "checked_place",
     "checked_point",
     "checked_radius",
+    "checked_slides",
     "checked_targets",
     "checked_vertex",
     "clamped",

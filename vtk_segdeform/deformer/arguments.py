@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import (
+    BoolArray,
     FloatArray,
     IntArray,
     as_ids,
@@ -89,6 +90,19 @@ def checked_constraints(
             "remove them from one of the two"
         )
     return fixed, handle
+
+
+def checked_parts(mesh: Mesh, parts: Mapping[str, ArrayLike] | None) -> Mapping[str, BoolArray]:
+    """Return the masks (n,) of *parts*, by name; ConstraintError if one is no set of vertices."""
+    found = {}
+    for name, vertices in ({} if parts is None else parts).items():
+        try:
+            ids = as_ids(vertices, mesh.n_vertices, f"parts[{name!r}]")
+        except ValueError as fault:
+            raise ConstraintError(str(fault)) from None
+        found[name] = np.zeros(mesh.n_vertices, dtype=bool)
+        found[name][ids] = True
+    return found
 
 
 def checked_vertex(mesh: Mesh, vertex: int) -> int:

@@ -69,13 +69,14 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
         if "cells" in arrays:
             surface = _subspace(arrays, "c", int(arrays["n_cells"]))
             coarse = CoarseVolume(surface, arrays["cells"], arrays["shares"])
+        binding = Binding(energy, arrays["interior"], coarse)
         os.utime(path)  # recently used files are deleted last
     except FileNotFoundError:
         return None
     except Exception as fault:  # noqa: BLE001 - damaged files raise a dozen kinds
         _warn_once(path, f"ignored, {getattr(fault, 'strerror', None) or fault}")
         return None
-    return Binding(energy, coarse)
+    return binding
 
 
 def write_binding(path: Path, binding: Binding) -> None:
@@ -88,6 +89,7 @@ def write_binding(path: Path, binding: Binding) -> None:
         "scale": np.array(energy.scale),
         "mass": energy.mass,
         "operator": energy.rotation_operator,
+        "interior": binding.interior,
         **_arrays(energy.subspace, "w"),
     }
     if coarse.cells is not None:

@@ -5,6 +5,7 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..freezing import read_only
 from ..geometry import Carrying
 from ..mesh import SurfacePoint
@@ -20,7 +21,9 @@ from ..solver import (
     Anchors,
     Contact,
     GaussNewton,
+    HeldVolumes,
     ScaledSurface,
+    Sliding,
     Term,
     connected_sets,
     errors_at,
@@ -29,8 +32,12 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
+from .slides import Guide, Slide, guides
+from .symmetry import Mirror
+from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
+_MIRROR_SHARE = 0.1  # weight of the symmetry of the cages, as a share of that of a handle
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
@@ -42,6 +49,10 @@ class HoldOptions:
     preserve_region_volumes: bool
     avoid_contact: bool
     lids: bool | None
+    slides: tuple[Slide, ...] = ()
+    mirror: Mirror | None = None
+    goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
+    parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +94,10 @@ class Constraints:
     preserved: Preserved
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
+    guides: tuple[Guide, ...] = ()  # of sliding vertices, in the coordinates of poses
+    mirror: Mirror | None = None
+    mates: IntArray = field(default_factory=lambda: _NONE)
+    """(e,): the handle vertices whose mates are the last e ones of `handle`."""
     pulled: PulledPoints = field(default_factory=PulledPoints)
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
@@ -100,12 +115,28 @@ class Constraints:
 
         By default at rest.  Raises a ConstraintError if they are no sets of vertices.
         """
-        problem = enclosed.problem
-        mesh, energy = problem.mesh, problem.energy
-        fixed, handle = map(read_only, checked_constraints(mesh, fixed, handle))
+        mesh = enclosed.problem.mesh
+        fixed, handle = checked_constraints(mesh, fixed, handle)
+        mirror, mates, fixed_mates = options.mirror, _NONE, _NONE
+        if mirror is not None:
+            fixed, fixed_mates = mirror.with_mates(fixed, handle)
+            handle, mates = mirror.with_mates(handle, fixed)
+        fixed, handle = read_only(fixed), read_only(handle)
+        preserved = enclosed.preserved(
+            handle,
+            whole=options.preserve_volume,
+            by_region=options.preserve_region_volumes,
+            goals=options.goals,
+            parts=options.parts,
+            mirror=options.mirror,
+        )
+        problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
         if places is not None:
-            fixed_in_scene = checked_targets(places, len(fixed), "fixed_at", "fixed")
+            count = len(fixed) - len(fixed_mates)
+            fixed_in_scene = checked_targets(places, count, "fixed_at", "fixed")
+            if mirror is not None:
+                fixed_in_scene = mirror.moved(mesh, fixed, fixed_mates, fixed_in_scene)
             inside = problem.frame.inward(fixed_in_scene)
             check_distance(inside)
         handles, patches = connected_sets(mesh, handle), connected_sets(mesh, fixed)
@@ -120,11 +151,14 @@ class Constraints:
             start = problem.rest_cages
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
-        preserved = enclosed.preserved(
-            handle, whole=options.preserve_volume, by_region=options.preserve_region_volumes
-        )
         contact = _contact(problem, ids) if options.avoid_contact else None
-        terms: tuple[Term, ...] = () if contact is None else (contact,)
+        sliding = [
+            Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
+            for each in guides(options.slides, problem.rest, few=True)
+        ]
+        terms: list[Term] = [*sliding, *(() if contact is None else (contact,))]
+        if mirror is not None:
+            terms.append(mirror.term(problem.subspace, problem.rest_cages, _MIRROR_SHARE * weight))
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
         return cls(
             problem=problem,
@@ -133,18 +167,50 @@ class Constraints:
             fixed_at=fixed_in_scene,
             handles=handles,
             places_of_targets=gathered[:, : len(handle)].tocsr(),
-            places_of_fixed=gathered[:, len(handle) :] @ inside,
+            places_of_fixed=np.asarray(gathered[:, len(handle) :] @ inside),
             fixed_box=fixed_box,
             anchors=_centres(problem, preserved.scaled, fixed, inside),
             preserved=preserved,
-            solver=GaussNewton(energy, positions, preserved.volumes, terms=terms),
+            solver=GaussNewton(energy, positions, preserved.volumes, terms=tuple(terms)),
             contact=contact,
+            guides=guides(options.slides, problem.rest_pose),
+            mirror=mirror,
+            mates=mates,
         )
 
     def __setstate__(self, state: dict[str, object]) -> None:
         vars(self).update(state)
         for each in (self.fixed, self.handle):
             each.setflags(write=False)
+
+    @property
+    def rest_cages(self) -> FloatArray:
+        """(m, 3): the cages of the shape without handles and fixed vertices."""
+        return self.preserved.rest_cages
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether volumes are set or bounded."""
+        return any(each.name for each in self.preserved.constraints)
+
+    @property
+    def n_bounds(self) -> int:
+        """Number of volumes that are bounded only."""
+        return sum(each.bound != 0 for each in self.preserved.constraints)
+
+    @property
+    def n_given(self) -> int:
+        """Number of handle vertices that targets are given for; the others are their mates."""
+        return len(self.handle) - len(self.mates)
+
+    def goal(self, targets: FloatArray) -> FloatArray:
+        """Return the targets (k, 3) of all handle vertices, in solver coordinates.
+
+        *targets* (n_given, 3) are in scene coordinates.
+        """
+        if self.mirror is not None:
+            targets = self.mirror.moved(self.problem.mesh, self.handle, self.mates, targets)
+        return self.problem.frame.inward(targets)
 
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
@@ -162,8 +228,22 @@ class Constraints:
 
     @cached_property
     def carrying(self) -> Carrying:
-        """How a finish moves components without fixed or handle vertices; see `finishing`."""
-        return self.problem.carrying_from(np.concatenate([self.handle, self.fixed]))
+        """How a finish moves components without anything that is held; see `finishing`."""
+        stiff = self.problem.inputs.stiffness
+        rigid = () if stiff is None else stiff.rigid
+        guided = (each.vertices for each in self.guides)
+        return self.problem.carrying_from(
+            np.concatenate([self.handle, self.fixed, *guided, *rigid])
+        )
+
+    def held_volumes(self, x: FloatArray) -> HeldVolumes:
+        """Return the volumes of *x* (n, 3) that have goals."""
+        x = self.problem.frame.about_origin(x)
+        volumes = self.preserved.constraints
+        now = {each.name: each.target + each.violation(x) for each in volumes if each.name}
+        shares = {each.name: each.share * (1.0 + each.relative(x)) for each in volumes if each.name}
+        changes = {name: share - 1.0 for name, share in shares.items()}
+        return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
 
     @property
     def unmoved(self) -> IntArray:

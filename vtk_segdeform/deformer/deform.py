@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -23,20 +23,29 @@ from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
 from .clamping import clamped
 from .deformer import Deformer
+from .slides import Slide
+from .symmetry import Symmetry
+from .volume_goals import Goals, checked_goals
 
 _log = logging.getLogger(__name__)
 
 # Of the progress, at the ends of segmentation, fitting, binding, solve and finish: about the mean
 # shares of the time for 5,000 to 100,000 vertices.  Of large meshes the finish takes most of it.
 _ENDS = 0.06, 0.22, 0.4, 0.6, 1.0
+_NO_TARGETS = np.empty((0, 3))
 
 
 def deform(
     mesh: Mesh,
-    fixed: ArrayLike,
-    handle: ArrayLike,
-    targets: ArrayLike,
+    fixed: ArrayLike = (),
+    handle: ArrayLike = (),
+    targets: ArrayLike = _NO_TARGETS,
     *,
+    volumes: Goals | None = None,
+    parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
+    slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
@@ -47,7 +56,7 @@ def deform(
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
-    """Return *mesh* deformed so that its handle vertices are at *targets*.
+    """Return *mesh* deformed so that its handle vertices are at *targets*, with volumes as given.
 
     For one pose only.  To drag, or to choose regions and cages, use a `Deformer`.
 
@@ -60,6 +69,17 @@ def deform(
     targets : (len(handle), 3) float
         Positions of the handle vertices, in the order of *handle* (of its true entries, if it is a
         mask).  A handle turns the shorter way to them, or from the last ones of *through*.
+    volumes : mapping of str to str or float, optional
+        Goals by the names of volumes, as ``{"cavity": "-40%", "whole": "keep"}``; see `Deformer`.
+        With some, there need be no handle.
+    parts : mapping of str to (k,) int or (n,) bool, optional
+        Vertices by the names of parts of the surface, for *volumes*.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     through : sequence of (len(handle), 3) float
         Targets on the way, such as those of a quarter and of half a turn before those of
         three quarters; each less than half a turn from the last ones.
@@ -94,7 +114,8 @@ def deform(
     Raises
     ------
     ConstraintError
-        If *fixed*, *handle* or *targets* are invalid, or *handle* is empty.
+        If *fixed*, *handle*, *targets* or *volumes* are invalid, or there is neither a handle nor a
+        goal for a volume.
     ArgumentError
         If *attach* is for other components, or they follow each other.
     Cancelled
@@ -110,9 +131,10 @@ def deform(
             f"n_cage_vertices must be a whole number, 4 or more; got {shown(n_cage_vertices)}"
         )
     stays, moves = checked_constraints(mesh, fixed, handle)
-    if not len(moves):
+    if not len(moves) and not checked_goals(volumes):
         raise ConstraintError(
-            "deform requires at least one vertex in handle; got none. Select the vertices to move"
+            "deform requires at least one vertex in handle, or goals for volumes; got none. Select "
+            "the vertices to move"
         )
     require_sequence(through, "through")
     path = [checked_targets(each, len(moves), "through") for each in through]
@@ -136,6 +158,11 @@ def deform(
         handle=handle,
         preserve_volume=preserve_volume,
         lids=lids,
+        volumes=volumes,
+        parts=parts,
+        stiffness=stiffness,
+        slides=slides,
+        symmetry=symmetry,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

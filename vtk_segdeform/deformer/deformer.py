@@ -26,16 +26,17 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
 from types import EllipsisType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, is_number, largest_length
+from ..arrays import FloatArray, IntArray, as_points, is_number, largest_length
 from ..cages import Cage
 from ..checks import all_of, as_callable, as_flag, as_path, require, shown
 from ..errors import ArgumentError, ConstraintError
@@ -50,6 +51,7 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_parts,
     checked_place,
     checked_targets,
     require_together,
@@ -58,10 +60,14 @@ from .arguments import (
 from .as_printed import PaperDeformer
 from .constraints import Constraints, HoldOptions
 from .enclosed_volume import EnclosedVolume
-from .finishing import finish_of
+from .finishing import VOLUME_MET, finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
+from .symmetry import Mirror, Symmetry
+from .volume_goals import Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
@@ -96,6 +102,22 @@ class Deformer:
         each connected part: a bottle does, a sheet does not (`geometry.lids`).  True: all do.
         False: only closed ones do.  Without any volume, as `has_volume` tells, nothing is
         preserved and volume changes are 0.
+    volumes : mapping of str to str or float, optional
+        Goals by the names of volumes, as ``{"cavity": "-40%", "whole": "keep", "body 1": 2.5}``;
+        see `volume_goals` and `volume_names`.  They take precedence over what is preserved by
+        default.
+    parts : mapping of str to (k,) int or (n,) bool, optional
+        Vertices by the names of parts of the surface, whose volumes are those under a lid over
+        their borders; for *volumes*.
+    stiffness : (n,) float, optional
+        How stiff the surface is at each vertex, relative to elsewhere; infinite where it is rigid.
+        See `stiffness`.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only; see `slides`.
+    symmetry : str or pair of (3,) float, optional
+        Mirror all motions on one side of a plane on the other side: "x", "y" or "z", the normal of
+        the plane, whose place is found; "auto", which finds the plane; or a point of it and its
+        normal.  See `symmetry`.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -141,6 +163,11 @@ class Deformer:
         preserve_volume: bool = True,
         preserve_region_volumes: bool = False,
         lids: bool | None = None,
+        volumes: Goals | None = None,
+        parts: Mapping[str, ArrayLike] | None = None,
+        stiffness: ArrayLike | None = None,
+        slides: Iterable[Slide] = (),
+        symmetry: Symmetry = None,
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -155,11 +182,16 @@ class Deformer:
         check_options(stretch, rotation_groups)
         load_for(mesh.n_vertices)
         self._limits = SolverOptions(tolerance, max_steps)
+        mirror = Mirror.of(mesh, symmetry)
         self._options = HoldOptions(
             preserve_volume=as_flag(preserve_volume, "preserve_volume"),
             preserve_region_volumes=as_flag(preserve_region_volumes, "preserve_region_volumes"),
             avoid_contact=as_flag(avoid_contact, "avoid_contact"),
             lids=as_lids(lids),
+            goals=checked_goals(volumes),
+            parts=checked_parts(mesh, parts),
+            slides=checked_slides(mesh, slides),
+            mirror=mirror,
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -168,6 +200,7 @@ class Deformer:
             cages,
             stretch=stretch,
             rotation_groups=rotation_groups,
+            stiffness=Stiffness.of(mesh, stiffness, mirror),
             cache=None if cache is None else as_path(cache, "cache"),
             progress=part(progress, 0.0, _BOUND),
         )
@@ -200,20 +233,30 @@ class Deformer:
         preserve_volume: bool | None = None,
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
+        volumes: Goals | None = None,
+        slides: Iterable[Slide] | None = None,
+        symmetry: Symmetry | EllipsisType = ...,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...`` and
-        ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
-        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
+        None, or for *lids* and *symmetry* ``...``, are the values of this deformer.  The fixed
+        vertices stay at *fixed_at* (f, 3), in the order that they are given in, by default at rest.
         """
         flags = {
             "preserve_volume": preserve_volume,
             "preserve_region_volumes": preserve_region_volumes,
             "avoid_contact": avoid_contact,
         }
-        given = {name: as_flag(flag, name) for name, flag in flags.items() if flag is not None}
+        given: dict[str, Any] = {
+            name: as_flag(flag, name) for name, flag in flags.items() if flag is not None
+        }
+        if volumes is not None:
+            given["goals"] = checked_goals(volumes)
+        if symmetry is not ...:
+            given["mirror"] = Mirror.of(self.mesh, symmetry)
+        if slides is not None:
+            given["slides"] = checked_slides(self.mesh, slides)
         options = replace(self._options, **given)
         other = self._shared()
         if lids is not ... and as_lids(lids) is not options.lids:
@@ -223,6 +266,20 @@ class Deformer:
         other._hold(
             Constraints.of(other._enclosed, options, fixed=fixed, handle=handle, places=fixed_at)
         )
+        return other
+
+    @one_blas_thread()
+    def stiffened(self, stiffness: ArrayLike | None) -> Deformer:
+        """Return a deformer at rest without constraints, with another *stiffness* (n,).
+
+        It has the options of this one and shares its subspace, which takes most of the time.
+        """
+        other = self._shared()
+        other._problem = self._problem.stiffened(
+            Stiffness.of(self.mesh, stiffness, self._options.mirror)
+        )
+        other._enclosed = EnclosedVolume.under(other._problem, self._options.lids)
+        other._hold(Constraints.of(other._enclosed, self._options, fixed=(), handle=()))
         return other
 
     @one_blas_thread()
@@ -304,8 +361,8 @@ class Deformer:
 
     @property
     def handle(self) -> IntArray:
-        """Vertices that follow targets, (k,)."""
-        return self._constraints.handle
+        """Vertices that follow targets, (k,); without the mates of a symmetric deformer."""
+        return self._constraints.handle[: self._constraints.n_given]
 
     @property
     def subspace(self) -> Subspace:
@@ -316,6 +373,29 @@ class Deformer:
     def has_volume(self) -> bool:
         """Whether the mesh encloses a volume, with its lids if it is open."""
         return self._enclosed.total.has_volume
+
+    @property
+    def volume_names(self) -> tuple[str, ...]:
+        """The names of volumes, for *volumes*.
+
+        "whole"; "body 0", "body 1" ..., if there are several; of hollow bodies "cavity 0" ..., or
+        "cavity" and "wall" if there is one only; "component 0" ... of `Mesh.components`, if they
+        are several; "region 0" ... of the regions that enclose some; and the *parts*.
+        """
+        return (*self._enclosed.volume_names, *self._options.parts)
+
+    @one_blas_thread()
+    def volumes(self, vertices: ArrayLike | None = None) -> dict[str, float]:
+        """Return all volumes by name, in the mesh's unit cubed, at *vertices* (n, 3) or at rest."""
+        rest = self.mesh.vertices
+        x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
+        x = self._problem.frame.about_origin(x)
+        return self._enclosed.volumes(x, self._options.parts)
+
+    @property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry, with its error and the mates of the vertices."""
+        return self._constraints.mirror
 
     @property
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -360,7 +440,7 @@ class Deformer:
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Continue from an earlier pose: its `Solution.cage_vertices` and its targets."""
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         self._path = Path.begin(self._constraints, self._inward(cage_vertices), goal)
 
     @one_blas_thread()
@@ -393,7 +473,7 @@ class Deformer:
             If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
             from the mesh or from the fixed vertices, that it must be in another unit.
         """
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         check_distance(goal)
         require_together(self._problem.rest, goal, self._constraints.fixed_box)
         before = self._path.copy()
@@ -402,7 +482,7 @@ class Deformer:
         if self._is_plausible(solution.vertices, goal, before.p):
             return solution
         self._path = before
-        return self._missed(goal, solution)
+        return self._far(goal, solution)
 
     @one_blas_thread()
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
@@ -461,11 +541,12 @@ class Deformer:
             errors=partial(self._constraints.errors, self._path.targets),
             volume=partial(self._enclosed.total.relative, found.vertices),
             region_volumes=self._enclosed.changes_of_regions,
+            held_volumes=self._constraints.held_volumes,
             remaining=found.remaining / self.mesh.diagonal,
             unfinished=unfinished,
             unmoved=self._constraints.unmoved,
         )
-        return replace(finished, status=self._missed_status if _is_off(finished) else found.status)
+        return replace(finished, status=self._missed(finished) or found.status)
 
     def _inward(self, cage_vertices: Sequence[ArrayLike]) -> FloatArray:
         """Return the *cage_vertices* of all cages in the coordinates of the solver, (m, 3)."""
@@ -474,7 +555,7 @@ class Deformer:
     def _hold(self, constraints: Constraints) -> None:
         """Begin at rest, held by *constraints*."""
         rest = self._problem.rest.vertices[constraints.handle]
-        self._path = Path.begin(constraints, self._problem.rest_cages, rest)
+        self._path = Path.begin(constraints, constraints.rest_cages, rest)
 
     def _take_trial_step(self) -> None:
         """Compile the kernels, or load them, before the first frame needs them."""
@@ -512,6 +593,7 @@ class Deformer:
             errors=partial(self._constraints.errors, self._path.targets),
             volume=partial(self._enclosed.total.relative, x),
             region_volumes=self._enclosed.changes_of_regions,
+            held_volumes=self._constraints.held_volumes,
             crossed=partial(new_crossings, rest=rest, faces=faces),
             folded=partial(turned_over, rest=rest, faces=faces),
             remaining=0.0 if status is Status.CONVERGED else np.inf,
@@ -537,14 +619,14 @@ class Deformer:
         """
         problem, some = self._problem, slice(None, None, 1 + len(x) // _SEEN)
         rest = self.mesh.vertices[some]
-        moved = largest_length(goal - problem.rest.vertices[self.handle])
+        moved = largest_length(goal - problem.rest.vertices[self._constraints.handle])
         limit = problem.frame.size * (_SIZES + _MOTIONS * moved)
         if largest_length(x[some] - rest) <= limit:
             return True
         at = problem.frame.in_scene(problem.map(before))
         return largest_length(x[some] - rest) <= largest_length(at[some] - rest)
 
-    def _missed(self, goal: FloatArray, solution: Solution) -> Solution:
+    def _far(self, goal: FloatArray, solution: Solution) -> Solution:
         """Return the current pose instead of *solution*, which is far from every reasonable one."""
         x = self._problem.frame.in_scene(self._problem.map(self._path.p))
         return replace(
@@ -558,18 +640,16 @@ class Deformer:
         )
 
     def _or_missed(self, status: Status, solution: Solution) -> Status:
-        """Return *status*, but that handles are off if a converged *solution* misses its places."""
-        return self._missed_status if status is Status.CONVERGED and _is_off(solution) else status
+        """Return *status*, or what a converged *solution* misses."""
+        return (self._missed(solution) if status is Status.CONVERGED else None) or status
 
-    @property
-    def _missed_status(self) -> Status:
-        is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
-        return Status.MISSED if is_free else Status.ALL_HELD
-
-
-def _is_off(solution: Solution) -> bool:
-    """Return whether handles or fixed vertices of *solution* are off their places."""
-    return max(solution.handle_error, solution.fixed_error) > _MET
+    def _missed(self, solution: Solution) -> Status | None:
+        """Return the status of a *solution* whose handles or volumes are off, or None."""
+        if max(solution.handle_error, solution.fixed_error) > _MET:
+            is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
+            return Status.MISSED if is_free else Status.ALL_HELD
+        is_off = self._constraints.has_goals and solution.volume_error > VOLUME_MET
+        return Status.VOLUME_MISSED if is_off else None
 
 
 def _counting(progress: Progress | None) -> Progress | None:

@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import sizes
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..checks import shown
+from ..errors import ConstraintError
 from ..geometry import Lids, lids_of
 from ..solver import (
     Bodies,
     ScaledSurface,
     VolumeConstraint,
     Volumes,
-    region_volumes,
     total_volume,
+    volumes_by_label,
+    with_same_points,
 )
+from .growth import grown_cages
 from .problem import Problem
+from .symmetry import Mirror
+from .volume_goals import VolumeGoal, consistent, with_goal
 
 _NONE = np.zeros(0, dtype=np.int64)
+_OVERLAP = 0.5  # share of a part that is its own mirror image, from which it is one part
+_MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
+_NO_GOALS: Mapping[str, VolumeGoal | None] = MappingProxyType({})
+_NO_PARTS: Mapping[str, BoolArray] = MappingProxyType({})
 
 
 class Preserved(NamedTuple):
@@ -33,6 +46,10 @@ class Preserved(NamedTuple):
     """On the surface of the steps."""
     scaled: ScaledSurface | None
     """If poses are scaled to their exact volume."""
+    problem: Problem
+    """With the shape that has these volumes; see `growth`."""
+    rest_cages: FloatArray
+    """(m, 3): its cages."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +59,7 @@ class EnclosedVolume:
     problem: Problem
     lids: Lids
     total: VolumeConstraint
-    _known: dict[bytes | bool, Preserved] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[object, ...], Preserved] = field(default_factory=dict, repr=False)
 
     @classmethod
     def under(cls, problem: Problem, lids: bool | None) -> EnclosedVolume:
@@ -50,28 +67,169 @@ class EnclosedVolume:
         found = lids_of(problem.rest_pose, lids)
         return cls(problem, found, total_volume(problem.rest_pose, found))
 
-    def preserved(self, handle: IntArray, *, whole: bool, by_region: bool) -> Preserved:
+    def preserved(
+        self,
+        handle: IntArray,
+        *,
+        whole: bool,
+        by_region: bool,
+        goals: Mapping[str, VolumeGoal | None] = _NO_GOALS,
+        parts: Mapping[str, BoolArray] = _NO_PARTS,
+        mirror: Mirror | None = None,
+    ) -> Preserved:
         """Return the volumes to preserve: of the *whole*, body by body, or *by_region*.
 
-        Small bodies have one of their own if vertices of the *handle* (k,) move them.
+        Small bodies have one of their own if vertices of the *handle* (k,) move them.  *goals*
+        take precedence; those of *parts* are of the faces around these vertices.  With a *mirror*,
+        the mirror images of parts and regions have the same goals.
         """
+        if mirror is not None:
+            goals, parts = self._mirrored(goals, parts, mirror)
         by_region = self.total.has_volume and by_region
         whole = self.total.has_volume and whole and not by_region
-        numbers = self._bodies.numbers(handle) if whole else _NONE
-        key = numbers.tobytes() if whole else by_region
-        if (found := self._known.get(key)) is None:
-            problem = self.problem
-            preserved = self.regions if by_region else ()
-            if whole:
-                preserved = self._bodies.constraints(numbers)
-            coarse, scaled = problem.binding.coarse_volume, None
-            volumes = coarse.volumes(preserved, problem.rest.vertices)
-            is_large = problem.mesh.n_vertices > sizes.SCALED_VOLUME and coarse.cells is not None
-            if whole and is_large:
-                body, rest = numbers[problem.mesh.components], problem.rest_pose.vertices
-                scaled = ScaledSurface.of(problem.subspace, rest, preserved, body)
-            found = self._known[key] = Preserved(preserved, volumes, scaled)
+        count = len(self.bodies.volumes) if whole else 0
+        named = [k for k in range(count) if f"body {k}" in goals]
+        numbers = self.bodies.numbers(handle, named) if whole else _NONE
+        key: tuple[object, ...] = numbers.tobytes() if whole else by_region, ()
+        if goals:
+            key = key[0], tuple(goals.items()), *(mask.tobytes() for mask in parts.values())
+        if (found := self._known.get(key)) is not None:
+            return found
+        problem = self.problem
+        preserved = self.regions if by_region else ()
+        if whole:
+            preserved = self.bodies.constraints(numbers)
+        if goals:
+            preserved = self._with_goals(preserved, goals, parts)
+        coarse, scaled = problem.binding.coarse_volume, None
+        volumes = coarse.volumes(preserved, problem.rest.vertices)
+        is_large = problem.mesh.n_vertices > sizes.SCALED_VOLUME and coarse.cells is not None
+        of_component = self.bodies.of_component if whole and is_large else _NONE
+        if len(of_component) and of_component.min() >= 0 and not goals:
+            body = numbers[of_component][problem.mesh.components]
+            rest = problem.rest_pose.vertices
+            scaled = ScaledSurface.of(problem.subspace, rest, preserved, body)
+        cages = problem.rest_cages
+        if goals and (grown := grown_cages(problem, volumes)) is not cages:
+            problem, cages = problem.grown(grown), grown
+        found = Preserved(preserved, volumes, scaled, problem, cages)
+        for old in [old for old in self._known if goals and old[1]]:
+            del self._known[old]  # one set of goals is enough
+        self._known[key] = found
         return found
+
+    def _with_goals(
+        self,
+        kept: tuple[VolumeConstraint, ...],
+        goals: Mapping[str, VolumeGoal | None],
+        parts: Mapping[str, BoolArray],
+    ) -> tuple[VolumeConstraint, ...]:
+        """Return the constraints of *goals*, and those *kept* that go with them."""
+        given = [self.named(name, parts) for name in goals]
+        every = with_same_points([*given, *kept])
+        around, kept = every[: len(given)], every[len(given) :]
+        keys = [_keys_of(each.faces) for each in around]
+        kept = tuple(
+            each
+            for each, own in zip(kept, (_keys_of(each.faces) for each in kept), strict=True)
+            if not any(np.isin(own, key).all() for key in keys)
+        )
+        wanted = [
+            with_goal(each, name, goal)
+            for each, (name, goal) in zip(around, goals.items(), strict=True)
+            if goal is not None
+        ]
+        if not wanted and not kept:
+            return ()
+        return consistent(wanted, kept, self.problem.rest_pose.vertices)
+
+    def _mirrored(
+        self,
+        goals: Mapping[str, VolumeGoal | None],
+        parts: Mapping[str, BoolArray],
+        mirror: Mirror,
+    ) -> tuple[Mapping[str, VolumeGoal | None], Mapping[str, BoolArray]]:
+        """Return *goals* and *parts*, and those of mirror images that overlap the parts little."""
+        goals, parts = dict(goals), dict(parts)
+        labels = self.problem.regions.labels
+        for name, goal in list(goals.items()):
+            kind, number = _split(name)
+            mask = parts.get(name, labels == number if kind == "region" else None)
+            if mask is None:
+                continue
+            image = np.zeros_like(mask)
+            image[mirror.mates[mask]] = True
+            if np.count_nonzero(image & mask) < _OVERLAP * np.count_nonzero(mask):
+                parts[f"{name}, mirrored"] = image
+                goals[f"{name}, mirrored"] = goal
+        return goals, parts
+
+    def named(self, name: str, parts: Mapping[str, BoolArray] = _NO_PARTS) -> VolumeConstraint:
+        """Return the volume called *name* at rest; see `volume_names`.
+
+        Raises
+        ------
+        ConstraintError
+            If there is none.
+        """
+        kind, number = _split(name)
+        found: VolumeConstraint | None = None
+        if name in parts:
+            by_label = volumes_by_label(
+                self.problem.rest_pose, parts[name].astype(np.int64), self.lids
+            )
+            found = by_label.get(1)
+        elif name == "whole":
+            found = self.total
+        elif kind in ("cavity", "wall") and name == kind and len(self.bodies.cavities) == 1:
+            (cavity,) = self.bodies.cavities
+            found = self.bodies.component(cavity) if kind == "cavity" else self._wall(cavity)
+        elif number is not None:
+            found = self._numbered(kind, number)
+        if found is None or not found.target:
+            known = ", ".join([*self.volume_names, *parts])
+            raise ConstraintError(f"there is no volume {shown(name)}; there are {known or 'none'}")
+        if found.target < 0.0:
+            found = replace(found, faces=found.faces[:, [0, 2, 1]], target=-found.target)
+        return replace(found, name=name)
+
+    def _wall(self, cavity: int) -> VolumeConstraint:
+        """Return the volume of the body around a *cavity*."""
+        return self.bodies.body(int(self.bodies.of_component[cavity]))
+
+    def _numbered(self, kind: str, number: int) -> VolumeConstraint | None:
+        bodies = self.bodies
+        if kind == "body" and number < len(bodies.volumes):
+            return bodies.body(number)
+        if kind == "component" and number < len(bodies.of_component):
+            return bodies.component(number)
+        if kind == "cavity" and number < len(bodies.cavities):
+            return bodies.component(int(bodies.cavities[number]))
+        if kind == "region":
+            return self._by_region.get(number)
+        return None
+
+    @cached_property
+    def volume_names(self) -> tuple[str, ...]:
+        """The names of volumes of the mesh.
+
+        "whole"; "body 0", "body 1" ..., if there are several; of hollow bodies "cavity 0" ..., or
+        "cavity" and "wall" if there is one only; and "region 0" ... of the regions that enclose
+        some.  "component 0" ... are the shells of `Mesh.components`.
+        """
+        bodies, found = self.bodies, ["whole"] if self.total.has_volume else []
+        several = np.flatnonzero(bodies.volumes > 0.0)
+        found += [f"body {k}" for k in several] if len(several) > 1 else []
+        cavities = len(bodies.cavities)
+        found += ["cavity", "wall"] if cavities == 1 else [f"cavity {k}" for k in range(cavities)]
+        shells = np.flatnonzero(self.lids.encloses)
+        found += [f"component {k}" for k in shells] if len(shells) > 1 else []
+        return (*found, *(f"region {k}" for k in self._by_region))
+
+    def volumes(self, x: FloatArray, parts: Mapping[str, BoolArray]) -> dict[str, float]:
+        """Return all volumes by name, at the vertices *x* (n, 3)."""
+        every = {name: self.named(name, parts) for name in (*self.volume_names, *parts)}
+        return {name: each.target + each.violation(x) for name, each in every.items()}
 
     def changes_of_regions(self, x: FloatArray) -> FloatArray:
         """Return the relative change of the volume of each region in the pose *x* (n, 3)."""
@@ -80,8 +238,25 @@ class EnclosedVolume:
     @cached_property
     def regions(self) -> tuple[VolumeConstraint, ...]:
         """The volume of each region."""
-        return region_volumes(self.problem.rest_pose, self.problem.regions.labels, self.lids)
+        return tuple(self._by_region.values())
 
     @cached_property
-    def _bodies(self) -> Bodies:
+    def _by_region(self) -> dict[int, VolumeConstraint]:
+        return volumes_by_label(self.problem.rest_pose, self.problem.regions.labels, self.lids)
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The bodies of the mesh."""
         return Bodies(self.problem.rest_pose, self.total, self.lids)
+
+
+def _keys_of(faces: IntArray) -> NDArray[np.uint64]:
+    """Return one number for each of *faces* (m, 3), the same for all orders of its corners."""
+    corners = np.sort(faces, axis=1).astype(np.uint64)
+    return np.asarray(corners @ _MIXING)
+
+
+def _split(name: str) -> tuple[str, int | None]:
+    """Return the kind and the number of a volume: "body", 2 of "body 2"."""
+    kind, _, number = name.rpartition(" ")
+    return (kind, int(number)) if kind and number.isdecimal() else (name, None)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -23,6 +24,7 @@ from ..solver import (
     waypoints,
 )
 from .constraints import Constraints
+from .growth import VOLUME_LEG
 from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
@@ -30,6 +32,7 @@ _SOLVES_PER_SCALING = 4  # at most
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
+_MISSED = 1e-9  # relative error of a volume that is not met
 _CLEARANCE = 0.1  # mesh sizes: farther parts are not looked for
 _CONTACT_TOLERANCE, _CONTACT_STEPS = 1e-5, 300  # of a solve with active contacts
 
@@ -54,13 +57,23 @@ class Path:
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
     targets: FloatArray  # (k, 3)
+    active: tuple[int, ...] = ()  # `active_volumes`, of a mesh that is not scaled
+    is_on_volumes: bool = True
 
     @classmethod
     def begin(cls, constraints: Constraints, p: FloatArray, targets: FloatArray) -> Path:
         """Return a path that begins at cages *p* (m, 3), which are a pose for *targets* (k, 3)."""
         path = cls(constraints, constraints.solver.fresh(), p, p, targets)
-        is_rest = p is constraints.problem.rest_cages
-        if constraints.preserved.scaled is not None and not is_rest:
+        preserved, scaled = constraints.preserved.constraints, constraints.preserved.scaled
+        is_rest = p is constraints.rest_cages
+        if scaled is not None:
+            if not is_rest:
+                path._continue_from(p)
+            return path
+        path.active = tuple(k for k, each in enumerate(preserved) if not each.bound)
+        off = () if is_rest and not constraints.has_goals else path._missed()
+        path.is_on_volumes = not any(off)
+        if len(path.active) < len(preserved) or not path.is_on_volumes:
             path._continue_from(p)
         return path
 
@@ -79,7 +92,8 @@ class Path:
         to the exact ones.  If by more than `_SCALED`, they are taken again with the coarse volumes
         of the scaled mesh.
         """
-        steps = self._follow_waypoints(goal, options)
+        steps = 0 if self.is_on_volumes else self._change_volumes(options)
+        steps += self._follow_waypoints(goal, options)
         self.targets = goal
         contact = self.constraints.contact
         if contact is not None and contact.is_active(self.end):
@@ -88,10 +102,13 @@ class Path:
                 tolerance=max(options.tolerance, _CONTACT_TOLERANCE),
                 max_steps=min(options.max_steps, _CONTACT_STEPS),
             )
-        for _ in range(1 + _SOLVES_PER_SCALING):
+        released: set[int] = set()
+        for _ in range(1 + _SOLVES_PER_SCALING + 2 * self.constraints.n_bounds):
             result = self._minimise(goal, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)
+            if self._exchange_bounds(x, goal, released):
+                continue
             if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
                 break
         return Pose(x, result, steps)
@@ -108,7 +125,85 @@ class Path:
     def _continue_from(self, p: FloatArray) -> None:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
-        self.solver.volumes = self.solver.volumes.preserved_at(p)
+        volumes = self.constraints.preserved.volumes.among(self.active_volumes)
+        self.solver.volumes = volumes.preserved_at(p)
+
+    @property
+    def active_volumes(self) -> tuple[int, ...]:
+        """The numbers of the volumes that hold: all but bounds that the pose is within."""
+        scaled = self.constraints.preserved.scaled
+        preserved = self.constraints.preserved.constraints
+        return self.active if scaled is None else tuple(range(len(preserved)))
+
+    @property
+    def _preserved(self) -> list[VolumeConstraint]:
+        """The volumes that hold."""
+        return [self.constraints.preserved.constraints[k] for k in self.active_volumes]
+
+    def _missed(self) -> list[bool]:
+        """Return which volumes the pose misses."""
+        x = self._problem.map(self.p)
+        return [each.missed(x) > _MISSED for each in self.constraints.preserved.constraints]
+
+    def _change_volumes(self, options: SolverOptions) -> int:
+        """Change the volumes to their targets, in legs; return the number of steps."""
+        preserved, volumes, *_ = self.constraints.preserved
+        x = self._problem.map(self.p)
+        missed = {k for k, each in enumerate(preserved) if each.missed(x) > _MISSED}
+        self.active = tuple(sorted({*self.active, *missed}))
+        begin = volumes.among(self.active).preserved_at(self.p)
+        ratios = [1.0 / (1.0 + preserved[k].relative(x)) for k in self.active]
+        farthest = max(abs(math.log(ratio)) if ratio > 0.0 else 1.0 for ratio in ratios)
+        legs, steps = math.ceil(farthest / VOLUME_LEG), 0
+        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
+        for leg in range(1, legs + 1):
+            share = leg / legs
+            ends = zip(begin.constraints, ratios, strict=True)
+            self._set_volumes(
+                replace(each, target=each.target * (1.0 + share * (ratio - 1.0)))
+                for each, ratio in ends
+            )
+            if leg < legs:
+                steps += self._minimise(self.targets, options).steps
+        self.is_on_volumes = True
+        return steps
+
+    def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> None:
+        """Let the active volumes have the targets of *constraints*, and move the cages there."""
+        volumes = self.constraints.preserved.volumes.among(self.active)
+        self.solver.volumes = replace(volumes, constraints=tuple(constraints))
+        self.p = self.end = self.solver.landed(self.end)
+
+    def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
+        """Let bounds hold that the mesh *x* (n, 3) misses, or release those that it pulls against.
+
+        Returns whether any did; each is *released* once at most.
+        """
+        if not self.constraints.n_bounds:
+            return False
+        preserved = self.constraints.preserved.constraints
+        missed = {
+            k
+            for k, each in enumerate(preserved)
+            if k not in self.active and each.missed(x) > _MISSED
+        }
+        multipliers = self.solver.multipliers(self.end, self.constraints.places(goal))
+        slack = {
+            k
+            for k, multiplier in zip(self.active, multipliers, strict=True)
+            if multiplier * preserved[k].bound > 0.0 and k not in released
+        }
+        if not missed and not slack:
+            return False
+        released |= slack
+        last = dict(zip(self.active, self.solver.volumes.constraints, strict=True))
+        self.active = tuple(sorted({*self.active, *missed} - slack))
+        now = self.constraints.preserved.volumes.among(self.active).preserved_at(self.end)
+        self._set_volumes(
+            last.get(k, replace(each, target=each.target / (1.0 + preserved[k].relative(x))))
+            for k, each in zip(self.active, now.constraints, strict=True)
+        )
+        return True
 
     def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
         """Move through the waypoints before *goal*; return the number of steps."""
@@ -152,7 +247,7 @@ class Path:
         directions = result.directions
         if not directions:
             return self._problem.map(self.p), 0.0
-        preserved, _, scaled = self.constraints.preserved
+        scaled, preserved = self.constraints.preserved.scaled, self._preserved
         if scaled is not None:
             return self._scaled(scaled)
         lengths = np.array([np.abs(each).max() for each in directions])

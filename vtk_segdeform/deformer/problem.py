@@ -6,9 +6,10 @@ Positions are in the coordinates of the solver, where the mesh has size 1; see `
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from .binding import Binding, BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
 from .locality import SurfaceSamples
+from .stiffness import Stiffness
 
 _NO_POINTS = np.empty((0, 3))
 # l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
@@ -45,6 +47,8 @@ class Problem:
     rest: Mesh  # in the coordinates of the solver
     rest_pose: Mesh  # in those of poses
     rest_cages: FloatArray  # (m, 3), stacked
+    shape: Mesh  # whose detail and lengths are kept, in the coordinates of poses: at rest or grown
+    inputs: BindingInputs
     binding: Binding
 
     @classmethod
@@ -56,6 +60,7 @@ class Problem:
         *,
         stretch: float,
         rotation_groups: int,
+        stiffness: Stiffness | None = None,
         cache: FilePath | None = None,
         progress: Progress | None = None,
     ) -> Problem:
@@ -64,11 +69,31 @@ class Problem:
         rest = mesh.with_vertices(frame.inward(mesh.vertices))
         inside = [frame.inward(cage.vertices) for cage in cages]
         rest_cages = np.concatenate([_NO_POINTS, *inside])
-        inputs = BindingInputs(rest, regions, cages, rest_cages, stretch, rotation_groups)
+        given = rest, regions, cages, rest_cages, stretch, rotation_groups
+        inputs = BindingInputs(*given, stiffness=stiffness)
         binding = cached_binding(inputs, cache, progress)
         at_origin = frame.about_origin(mesh.vertices)
         rest_pose = mesh.with_vertices(at_origin) if frame.is_far else mesh
-        return cls(mesh, regions, cages, frame, rest, rest_pose, rest_cages, binding)
+        parts = mesh, regions, cages, frame, rest, rest_pose, rest_cages
+        return cls(*parts, shape=rest_pose, inputs=inputs, binding=binding)
+
+    def stiffened(self, stiffness: Stiffness | None) -> Problem:
+        """Return the problem with another stiffness."""
+        inputs = replace(self.inputs, stiffness=stiffness)
+        return self._with(inputs=inputs, binding=self.binding.stiffened(inputs))
+
+    def grown(self, p: FloatArray) -> Problem:
+        """Return the problem whose shape to keep is that of cages *p* (m, 3); see `growth`."""
+        shape = self.rest_pose.with_vertices(self.map(p))
+        return self._with(shape=shape, binding=self.binding.grown(self.inputs, p))
+
+    def _with(self, **changes: Any) -> Problem:
+        """Return the problem with *changes* on which `samples` and `linked_parts` do not depend."""
+        other = replace(self, **changes)
+        vars(other).update(
+            {name: vars(self)[name] for name in ("samples", "linked_parts") if name in vars(self)}
+        )
+        return other
 
     @property
     def energy(self) -> Energy:
@@ -154,7 +179,9 @@ class Problem:
     @cached_property
     def cell_energy(self) -> CellEnergy:
         """The energy of the finish."""
-        return CellEnergy.of(self.rest_pose, self.mesh.n_vertices / len(self.rest_cages))
+        per_cage = self.mesh.n_vertices / len(self.rest_cages)
+        stiff = self.inputs.stiffness
+        return CellEnergy.of(self.shape, per_cage, None if stiff is None else stiff.factors)
 
     @cached_property
     def cage_weights(self) -> FloatArray:
@@ -163,4 +190,6 @@ class Problem:
         counts = np.array([len(cage.vertices) for cage in self.cages])
         areas = np.where(self.regions.is_carried, 0.0, own).sum(axis=1)  # cages are no coarser
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
-        return np.asarray(density @ own) / _SPACINGS**2
+        weights = np.asarray(density @ own) / _SPACINGS**2
+        stiff = self.inputs.stiffness
+        return weights if stiff is None else weights * stiff.factors

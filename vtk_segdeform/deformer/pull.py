@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, require_cage_vertices, suggested_size
@@ -26,6 +28,10 @@ from .arguments import (
 )
 from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
+from .symmetry import Symmetry
+from .volume_goals import Goals
 
 
 def pull(
@@ -38,6 +44,11 @@ def pull(
     locality: float | None = None,
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
+    volumes: Goals | None = None,
+    parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
+    slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
     attach: Attach | None = None,
@@ -69,6 +80,14 @@ def pull(
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
         Total number of cage vertices; by default it follows the number of regions.
+    volumes, parts : mappings, optional
+        Goals for volumes, by name, and named parts of the surface; see `Deformer`.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
@@ -78,8 +97,8 @@ def pull(
         moves all that lies together.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
-        None does so only with *avoid_contact*: triangles are less distorted then, but a smooth
-        bend may get a step where the finish ends.
+        None does so only with *avoid_contact*, and to place rigid and sliding vertices exactly:
+        triangles are less distorted then, but a smooth bend may get a step where the finish ends.
     progress : Progress, optional
         Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
         before every step.  It cancels by raising `Cancelled`.
@@ -109,7 +128,9 @@ def pull(
     as_lids(lids)
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
-    refine = False if refine is None and not avoid_contact else refine
+    slides, stiff = checked_slides(mesh, slides), Stiffness.of(mesh, stiffness)
+    if refine is None and not (avoid_contact or slides or (stiff is not None and stiff.rigid)):
+        refine = False
     point = checked_place(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")
     target = checked_point(to)[None] - point.at(mesh.vertices) + mesh.vertices[handle]
@@ -124,7 +145,8 @@ def pull(
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
-        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, avoid_contact=avoid_contact,
+        mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, volumes=volumes, parts=parts,
+        stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
         progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)

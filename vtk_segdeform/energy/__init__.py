@@ -11,7 +11,7 @@ The files, in reading order:
 
 from .energy import Energy, shape_energy, with_cage_stiffness, with_rotating_rows
 from .hessian import Factor, full_factor, quadratic_factor, rotation_term
-from .interior import Interior, with_interior
+from .interior import Interior, grown_gradients, interior_weights, with_interior
 from .operators import reduced_operators, surface_operators
 
 __all__ = [
@@ -19,6 +19,8 @@ __all__ = [
     "Factor",
     "Interior",
     "full_factor",
+    "grown_gradients",
+    "interior_weights",
     "quadratic_factor",
     "reduced_operators",
     "rotation_term",

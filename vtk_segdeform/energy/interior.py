@@ -46,7 +46,13 @@ class Interior:
     weights: FloatArray  # (r, k): the blend weights
 
     @classmethod
-    def of(cls, mesh: Mesh, weights: FloatArray, encloses: BoolArray) -> Interior:
+    def of(
+        cls,
+        mesh: Mesh,
+        weights: FloatArray,
+        encloses: BoolArray,
+        stiffness: FloatArray | None = None,
+    ) -> Interior:
         """Return points in those components of *mesh* that are bodies.
 
         Parameters
@@ -57,11 +63,14 @@ class Interior:
             Blend weights of the regions.
         encloses : (c,) bool
             Whether each component is a body.
+        stiffness : (n,) float, optional
+            Factors of the volumes; by default 1.
         """
         component = mesh.components
         if mesh.n_vertices > sizes.DECIMATED:
             mesh, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
             component, weights = component[kept], weights[:, kept]
+            stiffness = None if stiffness is None else stiffness[kept]
         x, area = mesh.vertices, mesh.vertex_areas
         inward, _, diameters = inner_balls(x, mesh.faces)
         radius = 0.5 * diameters
@@ -69,6 +78,8 @@ class Interior:
         own &= diameters < mesh.diagonal  # otherwise nothing is opposite
         x, radius, area, component = x[own], radius[own], area[own], component[own]
         points, volume = x + 0.75 * radius[:, None] * inward[own], area * radius
+        if stiffness is not None:
+            volume = volume * stiffness[own]
         if not len(x):
             return cls(points, radius, volume, weights[:, own])
         patch = cluster_positions(x, _PATCHES)
@@ -97,7 +108,19 @@ class Interior:
         return found
 
 
-def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) -> Energy:
+def interior_weights(energy: Energy, gradients: FloatArray, volumes: FloatArray) -> FloatArray:
+    """Return v (k,): the *volumes* (k,) around the points, in units of *energy*, of the surface.
+
+    *gradients* (k, 3, m) are those of the map of the cages at the points.
+    """
+    if not len(volumes):
+        return volumes
+    flat = gradients.reshape(3 * len(volumes), -1)
+    stiffness = float(np.repeat(volumes, 3) @ np.einsum("km,km->k", flat, flat))
+    return _TRACE_SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
+
+
+def with_interior(energy: Energy, gradients: FloatArray, weights: FloatArray) -> Energy:
     """Return *energy* plus that inside the body.
 
     Parameters
@@ -106,18 +129,29 @@ def with_interior(energy: Energy, gradients: FloatArray, volumes: FloatArray) ->
         Of the surface.
     gradients : (k, 3, m) float
         Of the map of the cages, at k points.
-    volumes : (k,) float
-        Around them.
+    weights : (k,) float
+        v.
     """
-    if not len(volumes):
+    if not len(weights):
         return energy
-    flat = gradients.reshape(3 * len(volumes), -1)
-    stiffness = float(np.repeat(volumes, 3) @ np.einsum("km,km->k", flat, flat))
-    v = _TRACE_SHARE * float(np.trace(energy.quadratic)) / stiffness * volumes
-    load = np.repeat(v, 3)[:, None] * flat
+    flat = gradients.reshape(3 * len(weights), -1)
+    load = np.repeat(weights, 3)[:, None] * flat
     return replace(
         energy,
         quadratic=energy.quadratic + flat.T @ load,
-        constant=energy.constant + 3.0 * float(v.sum()),
+        constant=energy.constant + 3.0 * float(weights.sum()),
         rotation_operator=np.concatenate([energy.rotation_operator, load]),
     )
+
+
+def grown_gradients(energy: Energy, weights: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the gradients (k, 3, m) over the body with cages *p* (m, 3) instead of that at rest.
+
+    *energy* contains those at rest with *weights* v (k,), as its last rotation clusters.  Where the
+    body at *p* is turned inside out, they stay those at rest.
+    """
+    rows = energy.rotation_operator[len(energy.rotation_operator) - 3 * len(weights) :]
+    at_rest = rows.reshape(len(weights), 3, -1) / weights[:, None, None]
+    jacobian = at_rest @ p
+    jacobian[np.linalg.det(jacobian) <= 0.0] = np.eye(3)
+    return np.asarray(np.linalg.solve(jacobian, at_rest), dtype=np.float64)

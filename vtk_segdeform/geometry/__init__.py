@@ -3,6 +3,7 @@
 The files, in reading order:
 
     volume          enclosed volume, eqs. (8) and (9)
+    chambers        the parts of space that a surface with inner walls encloses
     lids            lids over the borders of an open mesh, for its volume
     differential    mean-curvature normals, eq. (5)
     intrinsic       intrinsic triangulation: the surface without bad triangles
@@ -22,6 +23,7 @@ The files, in reading order:
 """
 
 from .attached import component_shares, joints, nearest_pairs
+from .chambers import Chambers, chambers_of
 from .decimation import decimated
 from .differential import (
     area_gradients,
@@ -66,6 +68,7 @@ __all__ = [
     "SMALL_COMPONENT",
     "Attach",
     "Carrying",
+    "Chambers",
     "IntrinsicTriangulation",
     "Lids",
     "LocalVolume",
@@ -73,6 +76,7 @@ __all__ = [
     "VertexNormals",
     "area_gradients",
     "carriers",
+    "chambers_of",
     "checked_attach",
     "closest_rotations",
     "cluster_positions",

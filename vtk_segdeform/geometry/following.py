@@ -41,7 +41,7 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, is_whole
 from ..checks import require, shown
 from ..errors import ArgumentError
-from ..mesh import Mesh, nearest_shares
+from ..mesh import Mesh, nearest_on_triangles
 
 Attach = Mapping[int, "int | str"]
 """For components by number: the number of the carrier, or `FREE`."""
@@ -100,7 +100,7 @@ class _Samples:
         corners, shares = np.empty((len(points), 3), dtype=np.int64), np.empty((len(points), 3))
         gaps = np.full(len(points), np.inf)
         for faces in self._faces[self.face[np.asarray(found).T]]:
-            own, away = nearest_shares(self._x[faces], points[:, None])
+            own, away = nearest_on_triangles(self._x[faces], points)
             nearer = away < gaps
             corners[nearer], shares[nearer], gaps[nearer] = faces[nearer], own[nearer], away[nearer]
         return Nearest(corners, shares, gaps)

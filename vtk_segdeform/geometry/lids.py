@@ -20,12 +20,13 @@ q = a / 2 pi, so that of a long half pipe is 1/2; above 1 the surface is rolled 
     closed                                      yes
     open, 0.48 <= abs(q) <= 1.3                 yes: a bottle, a tube, half of a ball
     any other open one                          no: a sheet, a cloth, a shallow cap, a roll
+    with inner walls, see `chambers`            if it has a chamber; its walls need no lids
     one-sided, such as a Moebius strip          no
     its volume, with lids, is 0 to rounding     no: a closed shell that is folded flat
     the sum of all volumes is 0 to rounding     no
 
-Along the border of a wall between two bodies three faces meet, so it is part of the boundary and
-gets a lid as well, which closes one of the bodies; but it is not counted as a hole.
+Along the border of a wall between two bodies three faces meet.  It is part of the boundary, but no
+hole, and its lid is not used.
 
 The absolute value is taken because an open surface may be turned inside out.
 
@@ -47,6 +48,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import shown
 from ..errors import ArgumentError
 from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
+from .chambers import NO_CHAMBERS, Chambers, chambers_of
 from .volume import corner_and_edges, signed_volume
 
 _LEAST_WINDING, _MOST_WINDING = 0.48, 1.3  # abs(q) of an open component that encloses a volume
@@ -77,6 +79,8 @@ class Lids:
         Whether each component of the mesh encloses a volume.
     option : bool or None
         As in `lids_of`.
+    chambers : Chambers
+        Of the components with inner walls, over the n vertices and k centres.
     """
 
     faces: IntArray
@@ -86,6 +90,7 @@ class Lids:
     of_wall: BoolArray
     encloses: BoolArray
     option: bool | None = None
+    chambers: Chambers = NO_CHAMBERS
 
     @property
     def has_volume(self) -> bool:
@@ -95,21 +100,16 @@ class Lids:
     @property
     def used(self) -> BoolArray:
         """(k,) bool: the loops whose lids close an enclosed volume."""
-        return self.encloses[self.component]
-
-    @property
-    def holes(self) -> BoolArray:
-        """(k,) bool: those of the `used` loops that are holes, not borders of walls."""
-        return self.used & ~self.of_wall
+        return self.encloses[self.component] & ~self.of_wall
 
     @property
     def is_open(self) -> BoolArray:
-        """(c,) bool: the components of the mesh that have borders."""
-        return np.bincount(self.component, minlength=len(self.encloses)) > 0
+        """(c,) bool: the components of the mesh that have holes."""
+        return np.bincount(self.component[~self.of_wall], minlength=len(self.encloses)) > 0
 
     def summary(self, *, preserved: bool = True) -> str:
         """Return in one line what has a volume, and whether it is *preserved*."""
-        is_open, holes, walls = self.is_open, int(self.holes.sum()), int(self.of_wall.sum())
+        is_open, holes, inside = self.is_open, int(self.used.sum()), len(self.chambers.inside)
         if not self.has_volume:
             if not is_open.any() or self.option:
                 return "No enclosed volume: nothing to preserve"
@@ -119,11 +119,11 @@ class Lids:
             sheets = _counted(many, "open sheet") if many > 1 else "Open sheet"
             return f"{sheets}: no volume to preserve"
         done = "kept" if preserved else "measured"
-        inside = f" with {'an inner wall' if walls == 1 else 'inner walls'}" if walls else ""
-        parts = [f"Closed surface{inside}: volume {done}"]
-        if holes:
-            lids = "a lid" if holes == 1 else "lids"
-            parts = [f"{_counted(holes, 'hole')}: volume {done} under {lids}"]
+        what = [f"{_counted(inside, 'chamber')} with common walls"] if inside else []
+        what += [_counted(holes, "hole")] if holes else []
+        volume = f"volume{' of each' if inside else ''} {done}"
+        under = f" under {'a lid' if holes == 1 else 'lids'}" if holes else ""
+        parts = [f"{', '.join(what) or 'Closed surface'}: {volume}{under}"]
         without = int((~self.encloses).sum())
         if without:
             are_sheets = is_open[~self.encloses].all()
@@ -133,11 +133,22 @@ class Lids:
         return "; ".join(parts)
 
     def closed(self, mesh: Mesh) -> IntArray:
-        """Return the faces of *mesh* and of lids around the enclosed volumes, (m', 3)."""
-        if not len(self.component) and self.encloses.all():
+        """Return the faces of *mesh* and of lids around the enclosed volumes, (m', 3).
+
+        Of chambers, those around all of them.
+        """
+        if not len(self.component) and self.encloses.all() and not self.chambers.hulls:
             return mesh.faces
-        around = self.encloses[mesh.components[mesh.faces[:, 0]]]
-        return np.concatenate([mesh.faces[around], self.faces[self.used[self.loop]]])
+        plain = self.encloses.copy()
+        plain[self.with_chambers(mesh)] = False
+        around = plain[mesh.components[mesh.faces[:, 0]]]
+        lids = (self.used & plain[self.component])[self.loop]
+        return np.concatenate([mesh.faces[around], self.faces[lids], *self.chambers.hulls])
+
+    def with_chambers(self, mesh: Mesh) -> IntArray:
+        """Return the components of *mesh* that have chambers, (h,) int."""
+        first = np.array([hull.min() for hull in self.chambers.hulls], dtype=np.int64)
+        return np.unique(mesh.components[first])
 
 
 def lids_of(mesh: Mesh, lids: bool | None = None) -> Lids:
@@ -185,7 +196,19 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
     every = np.ones(int(mesh.components.max()) + 1, dtype=bool)
     of_wall = _walls(mesh, tail, head, loop, k)
     found = Lids(faces, loop, extension, component, of_wall, every, wanted)
+    if _may_have_walls(mesh):
+        own = np.concatenate([mesh.components, component])
+        is_two_sided = ~np.isin(own, mesh.components[mesh.faces[_one_sided(mesh)]])
+        closing = faces[~of_wall[loop]] if wanted is not False else faces[:0]
+        walls = np.concatenate([mesh.faces, closing])
+        walls = walls[is_two_sided[walls[:, 0]]]
+        found = replace(found, chambers=chambers_of(extension @ mesh.vertices, walls))
     return replace(found, encloses=_enclosing(mesh, found, wanted))
+
+
+def _may_have_walls(mesh: Mesh) -> bool:
+    """Return whether three or more faces meet at an edge: there are fewer edges than without."""
+    return 3 * mesh.n_faces > 2 * len(mesh.edges) - len(mesh.boundary)
 
 
 def _walls(mesh: Mesh, tail: IntArray, head: IntArray, loop: IntArray, k: int) -> BoolArray:
@@ -285,10 +308,13 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     is_open = lids.is_open
     encloses = ~is_open | (wanted is not False)
     encloses[component[_one_sided(mesh)]] = False
+    encloses[lids.component[lids.of_wall]] = False
     _, first = np.unique(mesh.components, return_index=True)
-    volumes = _volumes(mesh, lids, component, mesh.vertices[first])
+    volumes = _volumes(mesh, lids, mesh.vertices[first])
     areas = np.bincount(component, mesh.face_areas, count)
     encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
+    chambered = lids.with_chambers(mesh)
+    encloses[chambered], is_open[chambered] = True, False
     asked = np.flatnonzero(encloses & is_open)
     if wanted is None and len(asked):
         sizes = np.bincount(component, minlength=count)
@@ -320,12 +346,17 @@ def _one_sided(mesh: Mesh) -> BoolArray:
     return half_edges.one_sided[half_edges.shells]
 
 
-def _volumes(mesh: Mesh, lids: Lids, component: IntArray, origins: FloatArray) -> FloatArray:
+def _volumes(mesh: Mesh, lids: Lids, origins: FloatArray) -> FloatArray:
     """Return the volume of each component under lids, (c,), with its origin of *origins* (c, 3)."""
-    if mesh.is_closed and len(origins) == 1:
+    hulls = lids.chambers.hulls
+    if mesh.is_closed and len(origins) == 1 and not hulls:
         return np.array([signed_volume(mesh.vertices, mesh.faces)])
-    owner = np.concatenate([component, lids.component[lids.loop]])
-    faces = np.concatenate([mesh.faces, lids.faces])
+    faces = np.concatenate([mesh.faces, lids.faces[~lids.of_wall[lids.loop]]])
+    component = np.concatenate([mesh.components, lids.component])
+    if hulls:
+        has_chambers = np.isin(component, lids.with_chambers(mesh))
+        faces = np.concatenate([faces[~has_chambers[faces[:, 0]]], *hulls])
+    owner = component[faces[:, 0]]
     a, e, f = corner_and_edges(lids.extension @ mesh.vertices, faces)
     determinants = np.einsum("ij,ij->i", a - origins[owner], np.cross(e, f))
     return np.bincount(owner, determinants, len(origins)) / 6.0

@@ -198,12 +198,13 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
         changed = shifts + np.where(shifted[:, None], change[known], 0.0)
         if np.abs(changed - shifts).max() > _TURNED * np.ptp(x, axis=0).max():
             shifts = changed  # else the targets of the cages stay, so that they converge
-    constraints = poses.constrained(state).preserved_volumes
+    preserved = poses.constrained(state).preserved_volumes
+    constraints = tuple(v for v in preserved if not v.bound or v.missed(moved) > VOLUME_TOLERANCE)
     if constraints:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
             tried.append(on_volumes(moved, constraints, stays))
-            if max(abs(each.relative(tried[-1])) for each in constraints) <= VOLUME_TOLERANCE:
+            if max(each.missed(tried[-1]) for each in constraints) <= VOLUME_TOLERANCE:
                 exact.append(tried[-1])
                 if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
                     exact = exact[-1:]

@@ -129,7 +129,12 @@ class Poses:
                 progress=progress,
             )
 
-        return self.memo.get("bound", _binding(state), bound, _KEPT)
+        def stiffened() -> Deformer:
+            return self.memo.get("bound", _binding(state), bound, _KEPT).stiffened(state.stiffness)
+
+        if state.stiffness is None:
+            return self.memo.get("bound", _binding(state), bound, _KEPT)
+        return self.memo.get("stiffened", (*_binding(state), state.stiffness), stiffened)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
@@ -167,8 +172,7 @@ class Poses:
             return known
         deformer = held.copy()
         deformer.reset()
-        # Every step of the solver meets the constraints, so its starting pose must do so too.
-        if pose is not None and self._meets_constraints(state, pose, held):
+        if pose is not None:
             places, shift = stacked(pose.targets), self.shift(state)
             places = places if shift is None else places - shift[held.handle]
             deformer.resume(pose.cage_vertices, places)
@@ -203,10 +207,6 @@ class Poses:
             return pulls.localised(held, locality, self.surface(state, locality.cage_vertices))
 
         return self.memo.get("local", (held, locality), local)
-
-    def _meets_constraints(self, state: State, pose: Pose, deformer: Deformer) -> bool:
-        x = self.surface(state, pose.cage_vertices)
-        return all(abs(v.relative(x)) <= VOLUME_TOLERANCE for v in deformer.preserved_volumes)
 
     # Surfaces.
 
@@ -303,4 +303,10 @@ def _binding(state: State) -> tuple[Any, ...]:
 def _volumes(state: State) -> dict[str, Any]:
     """Return the options of *state* for `Deformer.hold`."""
     names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
-    return {name: getattr(state.options, name) for name in names}
+    given = {name: getattr(state.options, name) for name in names}
+    return {
+        **given,
+        "volumes": dict(state.options.volumes),
+        "slides": state.slides,
+        "symmetry": state.options.symmetry,
+    }

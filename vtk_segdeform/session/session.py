@@ -26,7 +26,7 @@ Long because it is the interface of one class; the implementation is in the othe
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -40,6 +40,7 @@ from ..cages import Cage
 from ..checks import Described, require, require_sequence, shown
 from ..deformer import (
     Deformer,
+    Slide,
     checked_constraints,
     checked_locality,
     checked_place,
@@ -66,9 +67,11 @@ from .state import (
     Pose,
     State,
     checked_state,
+    checked_stiffness,
     fitting_cages,
     label_of_change,
     of_mesh,
+    owned_slides,
 )
 from .timeline import Timeline
 
@@ -441,6 +444,22 @@ class Session(Described):
 
     # The pose.
 
+    def set_stiffness(self, stiffness: ArrayLike | None) -> None:
+        """Let the surface have a *stiffness* (n,), as `Deformer` takes it; None: the same all over.
+
+        The pose stays; call `refine` to apply it.
+        """
+        checked = checked_stiffness(self.mesh, stiffness)
+        self.history.step("set stiffness", replace(self.state, stiffness=checked))
+
+    def set_slides(self, slides: Iterable[Slide]) -> None:
+        """Let vertices slide along planes, lines or the surface at rest only; see `Slide`.
+
+        The pose stays; call `refine` to apply them.
+        """
+        owned = owned_slides(self.mesh, slides)
+        self.history.step("set slides", replace(self.state, slides=owned))
+
     def drag(
         self,
         targets: Mapping[str, ArrayLike] | ArrayLike,
@@ -615,6 +634,34 @@ class Session(Described):
         name = f"the cage of {self.region_name(region)}"
         grip = _Placed(pose, tuple(places))
         self.history.move(replace(self.state, pose=pose), name, grip=grip)
+
+    def volumes(self) -> dict[str, float]:
+        """Return all volumes of the pose by name, in the mesh's unit cubed; see `Deformer`."""
+        return self.deformer.volumes(self.vertices)
+
+    def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
+        """Change the volume called *name*, as part of a drag, like `drag`.
+
+        Parameters
+        ----------
+        name : str
+            One of `Deformer.volume_names`, as of `deformer`.
+        goal : str or float
+            As "keep", "free", "-40%", "at most 2.5" or 2.5; see `Deformer`.
+        max_steps : int, optional
+            As in `drag`.
+
+        Raises
+        ------
+        SessionError, ConstraintError
+            If it is no goal, there is no such volume, or it contradicts others that are set.
+        """
+        state = self._released(self.state)
+        goals = {**dict(state.options.volumes), name: goal}
+        options = replace(state.options, volumes=tuple(goals.items()))
+        state = replace(state, options=options)
+        places = handles.targets_of(self.mesh, state)
+        return self._drag(state, places, [f"the volume of {name}"], max_steps)
 
     def refine(
         self,

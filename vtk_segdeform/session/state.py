@@ -11,17 +11,25 @@ Long because each part of a state is checked here, where it enters.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
-from ..deformer import checked_constraints, checked_place
+from ..deformer import (
+    Slide,
+    Stiffness,
+    checked_constraints,
+    checked_goals,
+    checked_place,
+    checked_slides,
+)
 from ..errors import ArgumentError, CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
 from ..geometry import FREE, checked_attach
@@ -44,6 +52,8 @@ _WORDS = {
     "offset": "cage offset",
     "preserve_volume": "volume preservation",
     "preserve_region_volumes": "volume preservation per region",
+    "volumes": "volumes",
+    "symmetry": "symmetry",
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
@@ -69,6 +79,10 @@ class Options:
     lids : bool, optional
         Whether an open surface encloses a volume under lids over its borders; None decides it for
         each connected part, as `Deformer` does.
+    volumes : mapping of str to str or float
+        Goals by the names of volumes, as `Deformer` takes them; kept as pairs.
+    symmetry : str, optional
+        Mirror motions about a plane: "x", "y", "z" or "auto", as `Deformer` does.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int
@@ -94,8 +108,11 @@ class Options:
     rotation_groups: int = 300
     avoid_contact: bool = False
     attach: Attachments = ()
+    volumes: tuple[tuple[str, str | float], ...] = ()
+    symmetry: str | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "volumes", _pairs(self.volumes))
         flags = "preserve_volume", "preserve_region_volumes", "avoid_contact"
         for name in flags:
             value = getattr(self, name)
@@ -104,6 +121,10 @@ class Options:
         object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
+        if self.symmetry not in (None, "x", "y", "z", "auto"):
+            raise SessionError(
+                f"symmetry must be x, y, z, auto or None; got {shown(self.symmetry)}"
+            )
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:
@@ -124,6 +145,16 @@ def _checked_attach(attach: Any) -> Attachments:
 
 def _numbers(pairs: Mapping[Any, Any]) -> list[int]:
     return [each for pair in pairs.items() for each in pair if is_whole(each, 0)]
+
+
+def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
+    try:
+        goals = dict(volumes)  # type: ignore[call-overload]
+        checked_goals(goals)
+    except (TypeError, ValueError) as fault:
+        text = str(fault) if isinstance(fault, ConstraintError) else f"got {shown(volumes)}"
+        raise SessionError(f"volumes must be goals by name: {text}") from None
+    return tuple(goals.items())
 
 
 def label_of_change(before: Options, after: Options) -> str:
@@ -214,6 +245,10 @@ class State(Described, Frozen):
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
     fixed_at: FloatArray | None = None
     """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
+    stiffness: FloatArray | None = None
+    """(n,) float: as `Deformer` takes it."""
+    slides: tuple[Slide, ...] = ()
+    """As `Deformer` takes them, with read-only arrays."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -243,8 +278,9 @@ class State(Described, Frozen):
         return np.concatenate([np.empty(0, dtype=np.int64), *self.handles.values()])
 
     def at_rest(self) -> State:
-        """Return the state without its pose."""
-        return replace(self, pose=None, locality=None, fixed_at=None)
+        """Return the state without its pose and goals for volumes."""
+        options = replace(self.options, volumes=())
+        return replace(self, pose=None, locality=None, fixed_at=None, options=options)
 
     def changes(self, other: State) -> Change:
         """Return the parts in which *other* differs."""
@@ -256,7 +292,9 @@ class State(Described, Frozen):
                 Change.CONSTRAINTS,
                 self.fixed is other.fixed
                 and self.handles is other.handles
-                and self.fixed_at is other.fixed_at,
+                and self.fixed_at is other.fixed_at
+                and self.stiffness is other.stiffness
+                and self.slides is other.slides,
             ),
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
@@ -312,8 +350,25 @@ def checked_state(mesh: Mesh, state: State) -> State:
     constraints = frozen(fixed.copy()), owned
     places = None if pose is None else _checked_places(mesh, fixed, state)
     return State(
-        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places
-    )
+        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
+        checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
+    )  # fmt: skip
+
+
+def checked_stiffness(mesh: Mesh, stiffness: ArrayLike | None) -> FloatArray | None:
+    """Return a read-only copy of *stiffness* (n,); ConstraintError if it is none."""
+    if stiffness is None:
+        return None
+    Stiffness.of(mesh, stiffness)
+    return frozen(np.array(stiffness, dtype=np.float64))
+
+
+def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
+    """Return checked *slides* with read-only arrays; ConstraintError if they are none."""
+    checked = checked_slides(mesh, slides)
+    for each in checked:
+        frozen(np.asarray(each.vertices))
+    return checked
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:

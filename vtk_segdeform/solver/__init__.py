@@ -5,18 +5,22 @@ The files, in reading order:
     newton                  the iteration of both levels, eqs. (11) to (14) and (21)
     gauss_newton            its objective over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
+    bodies                  the volume of each body
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
     anderson                Anderson acceleration
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
+    sliding                 vertices that stay on a plane, a line or a surface
+    mirror_term             symmetry of the cages
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
 """
 
 from .anderson import Anderson
+from .bodies import Bodies
 from .coarse_volume import CoarseVolume
 from .contact import Contact, ContactSurface
 from .exact_volume import (
@@ -27,16 +31,21 @@ from .exact_volume import (
     steps_to_volume,
 )
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
+from .mirror_term import MirrorTerm
 from .newton import Step, constrained_step, minimise
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
-from .solution import CONVERGED, Solution, Status
+from .sliding import Sliding, Track
+from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .terms import Term
 from .volume_constraints import (
-    Bodies,
     VolumeConstraint,
     Volumes,
+    gradients,
     region_volumes,
     total_volume,
+    violations,
+    volumes_by_label,
+    with_same_points,
 )
 from .waypoints import LONGEST_MOVE, waypoints
 
@@ -50,19 +59,24 @@ __all__ = [
     "Contact",
     "ContactSurface",
     "GaussNewton",
+    "HeldVolumes",
+    "MirrorTerm",
     "ScaledSurface",
+    "Sliding",
     "Solution",
     "SolverOptions",
     "SolverResult",
     "Status",
     "Step",
     "Term",
+    "Track",
     "VolumeConstraint",
     "Volumes",
     "are_met",
     "connected_sets",
     "constrained_step",
     "errors_at",
+    "gradients",
     "minimise",
     "moved_along",
     "position_term",
@@ -70,5 +84,8 @@ __all__ = [
     "scale_to_volume",
     "steps_to_volume",
     "total_volume",
+    "violations",
+    "volumes_by_label",
     "waypoints",
+    "with_same_points",
 ]

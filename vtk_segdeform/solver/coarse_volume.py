@@ -86,14 +86,17 @@ class CoarseVolume:
     def volumes(self, constraints: Sequence[VolumeConstraint], rest: FloatArray) -> Volumes:
         """Return *constraints* on the mesh as constraints on the cages.
 
-        Their targets are the coarse volumes of *rest* (n, 3), which may be scaled and moved.
+        Their targets are shares of the coarse volumes of *rest* (n, 3), which may be scaled and
+        moved.
         """
         points = rest
         if self.cells is not None and self.shares is not None:
             constraints = _over_cells(constraints, self.cells)
             points = _matrix(self.cells, self.shares) @ rest
         free = [replace(each, target=0.0) for each in constraints]
-        preserved = tuple(replace(each, target=each.violation(points)) for each in free)
+        preserved = tuple(
+            replace(each, target=each.share * each.violation(points)) for each in free
+        )
         hessian = _VolumeHessian(self.surface, preserved, points) if preserved else None
         return Volumes(self.surface, preserved, hessian)
 
@@ -153,7 +156,7 @@ def _over_cells(
     added = 0 if given is None else given.shape[0] - n
     places = np.concatenate([cells, count + np.arange(added)])
     return tuple(
-        VolumeConstraint(faces_between(places, each.faces), each.target, extension)
+        replace(each, faces=faces_between(places, each.faces), extension=extension)
         for each in constraints
     )
 

@@ -279,10 +279,16 @@ class GaussNewton:
             return _Iterate(p, p, math.inf, p, (), math.inf, p)
         if not directions:
             return self.evaluate(p, self._surface(p))
+        return self.evaluate(*self._on_volumes(p, directions))
+
+    def _on_volumes(
+        self, p: FloatArray, directions: Sequence[FloatArray]
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return *p* moved along *directions* onto the volumes, and their surface there."""
         paths = self.volumes.surface.map(np.hstack([p, *directions]))
         t = steps_to_volume(self.volumes.constraints, paths)
         p = p + sum(tk * z for tk, z in zip(t, directions, strict=True))
-        return self.evaluate(p, moved_along(paths, t))
+        return p, moved_along(paths, t)
 
     def residual(self, h: FloatArray) -> FloatArray:
         """Return *h* in the norm of the constant H of the paper.
@@ -296,7 +302,8 @@ class GaussNewton:
         rows = [self.volumes.surface.adjoint(g) for g in gradients(self.volumes.constraints, x)]
         energy, slope = self.energy.value_and_slope(p)
         value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
-        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
+        is_active = value != energy or any(term.is_always_active for term in self.terms)
+        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, is_active)
         return here.toward(self._term)
 
     def compliance(self, rows: FloatArray) -> FloatArray:
@@ -311,6 +318,22 @@ class GaussNewton:
     def directions(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
         """Return H^-1 of *rows* (m, 3) each, with the H of (21), as directions of volumes."""
         return self._factor.solve_all([np.asarray(row) for row in rows])
+
+    def landed(self, p: FloatArray) -> FloatArray:
+        """Return cages *p* (m, 3) moved onto the volumes along Z, with the H of (21)."""
+        if not self.volumes.constraints:
+            return p
+        slopes = gradients(self.volumes.constraints, self._surface(p))
+        at, _ = self._on_volumes(
+            p, self.directions([self.volumes.surface.adjoint(g) for g in slopes])
+        )
+        return at if np.isfinite(at).all() else p
+
+    def multipliers(self, p: FloatArray, targets: FloatArray) -> FloatArray:
+        """Return lambda (c,) at *p*: minus the change of half the minimum with each volume."""
+        here = self._at(p, targets)
+        still = np.zeros(len(here.rows))
+        return constrained_step(self._state.factor.solve_all, here.slope, here.rows, still)[1]
 
     def steadying(self, p: FloatArray, least: float) -> float:
         """Return the weight of anchors over the surface that make *p* a firm minimum.

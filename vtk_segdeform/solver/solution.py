@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..mesh import Mesh
 
 _T = TypeVar("_T")
 _NAMED = 3  # parts in a sentence
+_NOTHING: dict[str, float] = {}
 
 
 CONVERGED = 1e-4
@@ -43,6 +44,10 @@ class Status(enum.Enum):
         "the cages cannot reach this pose: add cage vertices, move less, or leave more room "
         "between handle and fixed vertices"
     )
+    VOLUME_MISSED = (
+        "a volume cannot be reached: change it less, set another one free, or leave more room "
+        "between handle and fixed vertices"
+    )
     ALL_HELD = (
         "all vertices are fixed or in handles, so nothing is free to move: subdivide the mesh, or "
         "leave vertices between handle and fixed vertices free"
@@ -50,6 +55,14 @@ class Status(enum.Enum):
 
     def __str__(self) -> str:
         return self.value
+
+
+class HeldVolumes(NamedTuple):
+    """The volumes of a pose that have goals, by name, their changes, and the largest error."""
+
+    volumes: Mapping[str, float] = _NOTHING
+    changes: Mapping[str, float] = _NOTHING
+    error: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,6 +95,10 @@ class Solution(Described):
     solve with ``max_steps`` that has not converged."""
     unfinished: FloatArray | None = None
     """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
+    held_volumes: Callable[[FloatArray], HeldVolumes] = field(
+        default=lambda _: HeldVolumes(), repr=False
+    )
+    """Computes `volumes`, `volume_changes` and `volume_error`."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(k,) int: the connected parts of the mesh, numbered as in `Mesh.components`, that stay where
     they are: they have no handle and no fixed vertices, and share no region with a part that has
@@ -108,6 +125,7 @@ class Solution(Described):
             "errors": partial(_known, self._errors),
             "volume": partial(_known, self.volume_change),
             "region_volumes": partial(_known, self.region_volume_change),
+            "held_volumes": partial(_known, self._held_volumes),
         }
         return {each.name: vars(self)[each.name] for each in fields(self)} | measured
 
@@ -133,6 +151,25 @@ class Solution(Described):
     def fixed_error(self) -> float:
         """Largest distance of a fixed vertex from its place, in diagonals of the mesh."""
         return self._errors[1]
+
+    @cached_property
+    def _held_volumes(self) -> HeldVolumes:
+        return self.held_volumes(self.vertices)
+
+    @property
+    def volumes(self) -> dict[str, float]:
+        """The volumes with goals, by name, in the mesh's unit cubed; see `Deformer`."""
+        return dict(self._held_volumes.volumes)
+
+    @property
+    def volume_changes(self) -> dict[str, float]:
+        """(V - V0) / V0 of the same, signed."""
+        return dict(self._held_volumes.changes)
+
+    @property
+    def volume_error(self) -> float:
+        """Largest error of a volume that is preserved, set or bounded, relative to it."""
+        return self._held_volumes.error
 
     @cached_property
     def volume_change(self) -> float:

@@ -1,9 +1,6 @@
-"""Volume constraints: the volume of each body of the mesh, or of each of its regions, is preserved.
+"""Volume constraints: the volume of each body of the mesh (`bodies`), or of each region.
 
     g_c(x) = V_c(x) - V_c(rest) = 0                                                     (9)
-
-A *body* is a connected component, with the cavities in it.  The paper has one constraint for the
-whole mesh; with several bodies one could then grow while the others shrink.
 
 A region is an open surface, and is closed at its border: each connected part of the border is
 spanned by a fan of triangles around its centre, which the regions on both sides share.  Region
@@ -28,33 +25,30 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import (
     Lids,
-    corner_and_edges,
     lids_of,
-    outer_components,
     signed_volume,
     step_to_volume,
     volume_along_path,
     volume_gradient,
 )
-from ..kernels import in_parallel
-from ..mesh import Mesh
+from ..mesh import Mesh, edge_keys
 from ..subspace import Subspace
-
-_MOST_BODIES = 6  # with a constraint of their own, the largest ones: each takes a few solves a step
-_LEAST_BODY = 1e-4  # relative to the largest: too small for one of its own
-_PIECE = 1 << 15  # faces processed together
 
 
 @dataclass(frozen=True, eq=False)
 class VolumeConstraint:
     """The volume enclosed by *faces* over the points ``extension @ x`` is equal to *target*.
 
-    These points are *x* and the centres of lids and fans.
+    These points are *x* and the centres of lids and fans.  With a *bound* of 1 it is at least
+    *target*, of -1 at most.  *share* is *target* as a share of the volume at rest.
     """
 
     faces: IntArray
     target: float
     extension: sparse.csr_array | None = None  # None: the mesh's own vertices
+    name: str = ""
+    share: float = 1.0
+    bound: int = 0
 
     def violation(self, x: FloatArray) -> float:
         """Return g(x), in units of volume."""
@@ -63,6 +57,11 @@ class VolumeConstraint:
     def relative(self, x: FloatArray) -> float:
         """Return g(x) / target; 0 if nothing is enclosed."""
         return self.violation(x) / self.target if self.target else 0.0
+
+    def missed(self, x: FloatArray) -> float:
+        """Return by how much x is off, as a share of *target*; 0 within the bound."""
+        off = self.relative(x)
+        return 0.0 if off * self.bound > 0.0 else abs(off)
 
     @property
     def has_volume(self) -> bool:
@@ -111,6 +110,27 @@ class VolumeConstraint:
         return self.extension[self.extension.shape[1] :]
 
 
+def with_same_points(constraints: Sequence[VolumeConstraint]) -> tuple[VolumeConstraint, ...]:
+    """Return the *constraints* over points that all of them share."""
+    distinct: list[sparse.csr_array] = []
+    for each in constraints:
+        if each.extension is not None and not any(each.extension is one for one in distinct):
+            distinct.append(each.extension)
+    if not distinct or all(each.extension is distinct[0] for each in constraints):
+        return tuple(constraints)
+    n = distinct[0].shape[1]
+    added = [each[n:] for each in distinct]
+    extension = sparse.csr_array(sparse.vstack([sparse.eye_array(n), *added]))
+    starts = np.cumsum([0, *(each.shape[0] for each in added)])
+    found = []
+    for each in constraints:
+        at = [k for k, one in enumerate(distinct) if each.extension is one]
+        shift = int(starts[at[0]]) if at else 0
+        faces = np.where(each.faces >= n, each.faces + shift, each.faces)
+        found.append(replace(each, faces=faces, extension=extension))
+    return tuple(found)
+
+
 def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
     """Return g(x) of all *constraints*, (c,), in units of volume."""
     each = _with_points(constraints, x)
@@ -150,6 +170,21 @@ class Volumes:
     constraints: tuple[VolumeConstraint, ...]
     hessian: Callable[[FloatArray, FloatArray], FloatArray] | None = None
 
+    def among(self, which: Sequence[int]) -> Volumes:
+        """Return those constraints only whose numbers are *which*, in ascending order."""
+        if len(which) == len(self.constraints):
+            return self
+        chosen = tuple(self.constraints[k] for k in which)
+        whole, count = self.hessian, len(self.constraints)
+
+        def hessian(p: FloatArray, multipliers: FloatArray) -> FloatArray:
+            assert whole is not None
+            every = np.zeros(count)
+            every[list(which)] = multipliers
+            return whole(p, every)
+
+        return Volumes(self.surface, chosen, hessian if chosen and whole else None)
+
     def preserved_at(self, p: FloatArray) -> Volumes:
         """Return the constraints with the volumes at cage vertices *p* (m, 3) as their targets."""
         x = self.surface.map(p)
@@ -169,81 +204,6 @@ def total_volume(mesh: Mesh, lids: Lids | None = None) -> VolumeConstraint:
     return replace(free, target=free.violation(mesh.vertices))
 
 
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """The bodies of a mesh, and the constraints that preserve the volume of each.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        n vertices, c components.
-    whole : VolumeConstraint
-        The total volume.
-    lids : Lids
-        Of the mesh.
-    """
-
-    mesh: Mesh
-    whole: VolumeConstraint
-    lids: Lids
-
-    def numbers(self, moved: IntArray) -> IntArray:
-        """Return the constraint of each component, (c,) int.
-
-        At most six bodies have one of their own: first those with vertices among *moved* (k,), then
-        the largest; the others share one, and very small ones that of the largest.
-        """
-        if np.count_nonzero(self.lids.encloses) < 2:
-            return np.zeros(len(self.lids.encloses), dtype=np.int64)
-        is_moved = np.zeros(len(self._volumes), dtype=bool)
-        is_moved[self._outer[self.mesh.components[moved]]] = True
-        sizes = np.abs(np.bincount(self._outer, self._volumes, len(is_moved)))
-        least = _LEAST_BODY * sizes.max()
-        alone = np.lexsort((-sizes, ~is_moved))[:_MOST_BODIES]
-        alone = alone[sizes[alone] >= least]
-        alone = alone[np.argsort(-sizes[alone], kind="stable")]
-        number = np.full(len(sizes), len(alone))
-        number[alone] = np.arange(len(alone))
-        if sizes[number == len(alone)].sum() < least:
-            number[number == len(alone)] = 0
-        return np.asarray(number[self._outer])
-
-    def constraints(self, numbers: IntArray) -> tuple[VolumeConstraint, ...]:
-        """Return the constraints for the `numbers` of components; they add up to the whole."""
-        if not numbers.any():
-            return (self.whole,) if self.whole.has_volume else ()
-        body, found = numbers[self._component], []
-        for k in range(int(body.max()) + 1):
-            free = replace(self.whole, faces=self.whole.faces[body == k], target=0.0)
-            found.append(replace(free, target=free.violation(self.mesh.vertices)))
-        return tuple(found)
-
-    @cached_property
-    def _component(self) -> IntArray:
-        """The component of each face of the whole, (m,) int."""
-        each = np.concatenate([self.mesh.components, self.lids.component])
-        return each[self.whole.faces[:, 0]]
-
-    @cached_property
-    def _volumes(self) -> FloatArray:
-        """Six times the signed volume of each component, (c,)."""
-        points, faces = self.whole.extended(self.mesh.vertices), self.whole.faces
-        determinants = np.empty(len(faces))
-
-        def work(start: int, stop: int) -> None:
-            a, e, f = corner_and_edges(points, faces[start:stop])
-            determinants[start:stop] = np.einsum("ij,ij->i", a - points[0], np.cross(e, f))
-
-        in_parallel(work, len(faces), _PIECE)
-        sums = np.bincount(self._component, determinants, len(self.lids.encloses))
-        return np.asarray(sums, dtype=np.float64)
-
-    @cached_property
-    def _outer(self) -> IntArray:
-        """The component around each cavity, and of other components their own number, (c,) int."""
-        return outer_components(self.mesh.vertices, self.mesh.components, self._volumes)
-
-
 def region_volumes(
     mesh: Mesh, labels: IntArray, lids: Lids | None = None
 ) -> tuple[VolumeConstraint, ...]:
@@ -253,22 +213,30 @@ def region_volumes(
     lid to the region of the face at its border edge.  A region that owns no face around an enclosed
     volume has no constraint.
     """
+    return tuple(volumes_by_label(mesh, labels, lids).values())
+
+
+def volumes_by_label(
+    mesh: Mesh, labels: IntArray, lids: Lids | None = None
+) -> dict[int, VolumeConstraint]:
+    """Return the constraint of each of *labels*, as `region_volumes`."""
     lids = lids_of(mesh) if lids is None else lids
-    faces, face_labels = lids.closed(mesh), _labels_of_faces(mesh, labels, lids)
+    faces = lids.closed(mesh)
     if not len(faces):
-        return ()
+        return {}
+    face_labels = _labels_of_faces(mesh, labels, faces)
     n = mesh.n_vertices + len(lids.component)
     halves, owner = _borders(faces, face_labels, n)
     extension, centre = _with_centres(halves, n)
-    if lids.used.any():
+    if len(lids.component):
         extension = sparse.csr_array(extension @ lids.extension)
-    constraints = []
-    for label in np.unique(face_labels):
+    constraints = {}
+    for label in np.unique(face_labels).tolist():
         u, v = halves[owner == label].T
         own = np.concatenate([faces[face_labels == label], np.stack([v, u, centre[u]], 1)])
         free = VolumeConstraint(own, 0.0, extension)
-        constraints.append(replace(free, target=free.violation(mesh.vertices)))
-    return tuple(constraints)
+        constraints[label] = replace(free, target=free.violation(mesh.vertices))
+    return constraints
 
 
 def _in_order(faces: IntArray) -> IntArray:
@@ -282,19 +250,21 @@ def _in_order(faces: IntArray) -> IntArray:
     return np.take(short, key & 0xFFFFFFFF, axis=0)
 
 
-def _labels_of_faces(mesh: Mesh, labels: IntArray, lids: Lids) -> IntArray:
-    """Return the label of each face of ``lids.closed(mesh)``."""
-    b, c = labels[mesh.faces[:, 1]], labels[mesh.faces[:, 2]]
-    of_mesh = np.where(b == c, b, labels[mesh.faces[:, 0]])
-    if not len(lids.component) and lids.encloses.all():
-        return of_mesh
+def _labels_of_faces(mesh: Mesh, labels: IntArray, faces: IntArray) -> IntArray:
+    """Return the label of each of *faces* (m', 3), which may be lids."""
     n = mesh.n_vertices
-    head, tail, _ = lids.faces[lids.used[lids.loop]].T
-    keys = (mesh.faces * n + np.roll(mesh.faces, -1, axis=1)).ravel()
-    order = np.argsort(keys)
-    beside = order[np.searchsorted(keys, tail * n + head, sorter=order)] // 3
-    around = lids.encloses[mesh.components[mesh.faces[:, 0]]]
-    return np.concatenate([of_mesh[around], of_mesh[beside]])
+    of_lids = faces.max(axis=1) >= n
+    own = faces[~of_lids]
+    b, c = labels[own[:, 1]], labels[own[:, 2]]
+    found = np.empty(len(faces), dtype=labels.dtype)
+    found[~of_lids] = np.where(b == c, b, labels[own[:, 0]])
+    if of_lids.any():
+        keys = edge_keys(own.ravel(), np.roll(own, -1, axis=1).ravel(), n)
+        order = np.argsort(keys)
+        one, two, _ = np.sort(faces[of_lids], axis=1).T  # the centre is last
+        beside = order[np.searchsorted(keys, edge_keys(one, two, n), sorter=order)] // 3
+        found[of_lids] = found[~of_lids][beside]
+    return found
 
 
 def _borders(faces: IntArray, face_labels: IntArray, n: int) -> tuple[IntArray, IntArray]:

@@ -1,0 +1,177 @@
+"""Goals for volumes, as texts or numbers: ``{"whole": "keep", "cavity": "-40%", "body 1": 2.5}``.
+
+    keep                   the volume at rest
+    free                   any volume
+    2.5                    in the mesh's unit, cubed
+    40%, +10%, -40%        of the volume at rest; more, or less, than it
+    at least 2.5, >= 2.5   a bound, with any of the above after it; at most 110%, <= 110%
+
+What is given takes precedence over what is preserved by default: a body is not preserved if all its
+faces are around a volume that is given, as all bodies are in the whole.  Volumes may depend on each
+other, as the whole on its bodies: then they must agree.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import FloatArray, is_number
+from ..checks import shown
+from ..errors import ConstraintError
+from ..solver import VolumeConstraint, gradients
+
+_GOAL = re.compile(
+    r"(?P<bound>at least|at most|>=|<=)?\s*"
+    r"(?:(?P<word>keep|free)|(?P<sign>[+-]?)(?P<number>(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(?P<percent>%?))"
+)
+_DIRECTIONS = 8  # more random directions than volumes, along which their derivatives are compared
+_DEPENDENT = 1e-9  # relative residual of a volume that is a sum of others
+_AGREE = 1e-9  # relative
+
+Goals = Mapping[str, str | float]
+
+
+@dataclass(frozen=True)
+class VolumeGoal:
+    """A parsed goal.
+
+    Parameters
+    ----------
+    share : float or None
+        Of the volume at rest; None: *value* is a volume.
+    value : float
+        In the unit of the mesh, cubed.
+    bound : int
+        0: the volume is equal to it; 1: at least; -1: at most.
+    """
+
+    share: float | None = 1.0
+    value: float = 0.0
+    bound: int = 0
+
+    def target(self, rest: float) -> float:
+        """Return the volume, for that at *rest*."""
+        return self.value if self.share is None else self.share * rest
+
+
+def checked_goals(volumes: object) -> Mapping[str, VolumeGoal | None]:
+    """Return the goals by the names of volumes; None: free.
+
+    Raises
+    ------
+    ConstraintError
+        If *volumes* is no mapping from names to goals.
+
+    Examples
+    --------
+    >>> checked_goals({"whole": "-40%", "cavity": "at most 2.5", "body 1": "free"})
+    ... # doctest: +NORMALIZE_WHITESPACE
+    {'whole': VolumeGoal(share=0.6, value=0.0, bound=0),
+     'cavity': VolumeGoal(share=None, value=2.5, bound=-1), 'body 1': None}
+    """
+    if volumes is None:
+        return {}
+    if not isinstance(volumes, Mapping) or not all(isinstance(name, str) for name in volumes):
+        raise ConstraintError(
+            'volumes must be goals by the names of volumes, such as {"whole": "keep"}; '
+            f"got {shown(volumes)}"
+        )
+    return {name: _parsed(name, goal) for name, goal in volumes.items()}
+
+
+def _parsed(name: str, goal: object) -> VolumeGoal | None:
+    if isinstance(goal, bool) or not (isinstance(goal, str) or is_number(goal)):
+        raise _not_a_goal(name, goal)
+    text = f"{goal}".strip().lower().replace("\N{MINUS SIGN}", "-")
+    match = _GOAL.fullmatch(text)
+    if match is None:
+        raise _not_a_goal(name, goal)
+    bound = {"at least": 1, ">=": 1, "at most": -1, "<=": -1}.get(match["bound"] or "", 0)
+    if match["word"] == "free":
+        if bound:
+            raise _not_a_goal(name, goal)
+        return None
+    if match["word"] == "keep":
+        return VolumeGoal(bound=bound)
+    number = float(match["number"]) * (-1.0 if match["sign"] == "-" else 1.0)
+    if match["percent"]:
+        found = VolumeGoal((1.0 if match["sign"] else 0.0) + number / 100.0, bound=bound)
+    else:
+        found = VolumeGoal(None, number, bound)
+    if not 0.0 < found.target(1.0) < np.inf:
+        raise ConstraintError(f"the volume of {name!r} must be positive; got {shown(goal)}")
+    return found
+
+
+def _not_a_goal(name: str, goal: object) -> ConstraintError:
+    return ConstraintError(
+        f"the goal of the volume {name!r} must be keep, free, a volume, or a percentage such as "
+        f"-40%, also after 'at least' or 'at most'; got {shown(goal)}"
+    )
+
+
+def consistent(
+    given: Sequence[VolumeConstraint], kept: Sequence[VolumeConstraint], x: FloatArray
+) -> tuple[VolumeConstraint, ...]:
+    """Return those of *given* and *kept* constraints that do not follow from the others.
+
+    All share their points.  Those of *given* that follow from others must agree with them, those of
+    *kept* need not.  *x* (n, 3) is the mesh at rest.
+
+    Raises
+    ------
+    ConstraintError
+        If they do not agree; it names them, and what would.
+    """
+    rows = _derivatives([*given, *kept], x)
+    equalities = [k for k, each in enumerate(given) if not each.bound]
+    bounds = [k for k, each in enumerate(given) if each.bound]
+    chosen: list[int] = []
+    every = [*given, *kept]
+    for k in [*equalities, *bounds, *range(len(given), len(every))]:
+        base = [j for j in chosen if not every[j].bound]
+        shares = np.linalg.lstsq(rows[base].T, rows[k], rcond=None)[0] if base else np.zeros(0)
+        residual = np.linalg.norm(rows[k] - shares @ rows[base])
+        if residual > _DEPENDENT * np.linalg.norm(rows[k]):
+            chosen.append(k)
+        elif k < len(given):
+            _require_agreement(every[k], [every[j] for j in base], shares)
+    return tuple(every[k] for k in chosen)
+
+
+def _derivatives(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
+    """Return the derivatives (c, d) of volumes along random directions."""
+    rng = np.random.default_rng(0)
+    slopes = gradients(constraints, x)
+    count = len(constraints) + _DIRECTIONS
+    rows = np.empty((len(constraints), count))
+    for d in range(count):
+        direction = rng.standard_normal(x.shape)
+        rows[:, d] = [np.vdot(slope, direction) for slope in slopes]
+    return rows
+
+
+def _require_agreement(
+    one: VolumeConstraint, others: Sequence[VolumeConstraint], shares: FloatArray
+) -> None:
+    implied = sum(share * each.target for share, each in zip(shares, others, strict=True))
+    off = implied - one.target
+    if abs(off) <= _AGREE * abs(one.target) or off * one.bound > 0.0:
+        return
+    used = [each.name for share, each in zip(shares, others, strict=True) if abs(share) > _AGREE]
+    names = " and ".join(f"{name!r}" for name in used)
+    how = {0: "", 1: "at least ", -1: "at most "}[one.bound]
+    raise ConstraintError(
+        f"the volume of {one.name!r} follows from that of {names}: it is then {implied:.6g}, so it "
+        f"cannot be {how}{one.target:.6g}; leave one of them out, or set it free"
+    )
+
+
+def with_goal(constraint: VolumeConstraint, name: str, goal: VolumeGoal) -> VolumeConstraint:
+    """Return the *constraint*, whose target is its volume at rest, with a *goal* instead."""
+    rest, target = constraint.target, goal.target(constraint.target)
+    return replace(constraint, name=name, target=target, share=target / rest, bound=goal.bound)

@@ -1,0 +1,184 @@
+"""Chambers: the parts of space that a surface with inner walls encloses.
+
+The surfaces of a label map share the walls between neighbouring labels, and along the border of a
+wall three or more faces meet.  Such a surface is not closed in the sense of `Mesh.boundary`: a wall
+belongs to both of its sides, with opposite orientation.
+
+Faces that are connected across edges of two faces form a *patch*, with a front and a back.  Around
+an edge of three or more faces, ordered by angle, the side of each that looks at the next one lies
+in the same part of space as the side of that which looks back; so are both sides of a patch with a
+free border.  Sides that are connected in this way bound a chamber.  One of them, whose volume is
+negative with its faces turned outward, is the outside of the surface.
+
+Source
+------
+Q. Zhou, E. Grinspun, D. Zorin, A. Jacobson, "Mesh arrangements for solid geometry", ACM Trans.
+Graph. 35(4), 39, 2016, section 3.2 (cells of patches, ordered around edges).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..mesh import HalfEdges, connected
+from .volume import signed_volume
+
+_FRONT, _BACK = 0, 1
+
+
+class Chambers(NamedTuple):
+    """The chambers of a surface, or none if at most two faces meet at every edge."""
+
+    inside: tuple[IntArray, ...]
+    """(k, 3) each: the faces around each chamber, turned outward, in the order of first faces."""
+    hulls: tuple[IntArray, ...]
+    """(k, 3) each: the faces that the outside touches, turned towards it, one array for each
+    connected part of the surface."""
+
+
+NO_CHAMBERS = Chambers((), ())
+
+
+def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
+    """Return the chambers of the parts of a surface that have inner walls.
+
+    Parameters
+    ----------
+    vertices : (n, 3) float
+        In any length unit.
+    faces : (m, 3) int
+        Neighbours across an edge of two faces have the same orientation.
+
+    Examples
+    --------
+    Two tetrahedra with a common wall.
+
+    >>> vertices = np.array([[0, 0, 1], [0, 0, -1], [1, 0, 0], [0, 1, 0], [0, 0, 0.0]])
+    >>> upper, lower = [[0, 2, 3], [0, 3, 4], [0, 4, 2]], [[1, 3, 2], [1, 4, 3], [1, 2, 4]]
+    >>> found = chambers_of(vertices, np.array([*upper, *lower, [2, 3, 4]]))
+    >>> [len(each) for each in found.inside], [len(each) for each in found.hulls]
+    ([4, 4], [6])
+    """
+    half_edges = HalfEdges(faces, len(vertices))
+    if not len(half_edges.crowded):
+        return NO_CHAMBERS
+    patch = connected(len(faces), *(half_edges.pairs // 3).T)
+    sides = 2 * (int(patch.max()) + 1)
+    free = np.unique(patch[half_edges.boundary // 3])
+    borders = np.stack([2 * free + _FRONT, 2 * free + _BACK])
+    around = _around_edges(vertices, half_edges, patch)
+    crowded = np.zeros(int(half_edges.shells.max()) + 1, dtype=bool)
+    crowded[half_edges.shells[half_edges.crowded // 3]] = True
+    own = np.flatnonzero(crowded[half_edges.shells])
+    for part in _apart(around, borders, sides), _joined(around, borders, sides):
+        every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
+        if all(_is_closed(each, len(vertices)) for each in every):
+            break
+    volumes = [signed_volume(vertices - vertices[each[0, 0]], each) for each in every]
+    inside = [each for each, volume in zip(every, volumes, strict=True) if volume > 0.0]
+    outside = [each for each, volume in zip(every, volumes, strict=True) if volume < 0.0]
+    return Chambers(tuple(inside), tuple(each[:, [0, 2, 1]] for each in outside))
+
+
+def _joined(around: IntArray, borders: IntArray, sides: int) -> IntArray:
+    """Return the part of space of each side, (sides,)."""
+    return connected(sides, *np.concatenate([around, borders], axis=1))
+
+
+def _apart(around: IntArray, borders: IntArray, sides: int) -> IntArray:
+    """Return the part of space of each side, (sides,), with different ones on both sides of a wall.
+
+    Where faces fold over each other, as along slivers of a smoothed label map, they are not in the
+    order of their sides.  So pairs are joined in the order of *around* (2, k), which is that of
+    their reliability, unless this would join the sides of a wall.
+    """
+    parent, members = list(range(sides)), [[side] for side in range(sides)]
+    for one, other in np.concatenate([borders, around], axis=1).T.tolist():
+        a, b = parent[one], parent[other]
+        if len(members[a]) < len(members[b]):
+            a, b = b, a
+        is_wall = one // 2 != other // 2  # not the sides of a sheet
+        if a == b or (is_wall and any(parent[side ^ 1] == a for side in members[b])):
+            continue
+        members[a] += members[b]
+        for side in members[b]:
+            parent[side] = a
+    return np.array(parent)
+
+
+def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[IntArray]:
+    """Return the faces around each part of space, turned outward, in the order of first faces.
+
+    *part* (k, 2) is that of the front and of the back of the faces *own* (k,).
+    """
+    is_wall = part[:, 0] != part[:, 1]
+    own, (front, back) = own[is_wall], part[is_wall].T
+    turned = np.concatenate([faces[own], faces[own][:, [0, 2, 1]]])
+    number, face = np.concatenate([back, front]), np.concatenate([own, own])
+    order = np.lexsort((face, number))
+    pieces = np.split(order, np.flatnonzero(np.diff(number[order])) + 1) if len(order) else []
+    return [turned[piece] for piece in sorted(pieces, key=lambda piece: int(face[piece[0]]))]
+
+
+def _is_closed(faces: IntArray, n: int) -> bool:
+    return not len(HalfEdges(faces, n).net_boundary)
+
+
+def _around_edges(vertices: FloatArray, half_edges: HalfEdges, patch: IntArray) -> IntArray:
+    """Return pairs of sides (2, k) in the same part of space, at edges of three or more faces.
+
+    A side is twice the number of its patch, plus 1 on the back.  Of edges between the same patches
+    only the one whose faces are farthest apart is used; the pairs are in the order of that.
+    """
+    half = half_edges.crowded
+    tail, head = half_edges.tail[half], half_edges.head[half]
+    last = half_edges.faces[half // 3, (half + 2) % 3]
+    is_forward = tail < head
+    start = np.flatnonzero(np.diff(half_edges.keys[half], prepend=-1))
+    sizes = np.diff(start, append=len(half))
+    edge = np.repeat(np.arange(len(start)), sizes)
+    origin = vertices[np.minimum(tail, head)]
+    axis = vertices[np.maximum(tail, head)] - origin
+    length = np.linalg.norm(axis, axis=1)
+    axis /= np.maximum(length, np.finfo(float).tiny)[:, None]
+    away = vertices[last] - origin
+    away -= np.einsum("ij,ij->i", away, axis)[:, None] * axis
+    x = away[start][edge]
+    y = np.cross(axis, x)
+    angle = np.arctan2(np.einsum("ij,ij->i", away, y), np.einsum("ij,ij->i", away, x))
+    angle %= 2.0 * np.pi
+
+    order = np.lexsort((angle, edge))
+    after = np.arange(1, len(order) + 1)
+    after[start + sizes - 1] = start  # the last face at an edge is followed by the first one
+    gap = (angle[order][after] - angle[order]) % (2.0 * np.pi)
+    apart = np.minimum.reduceat(gap, start) * length[start]
+    # The sides of each face: before it and after it, with the angle.  The normal of a face whose
+    # half-edge is forward points on, to larger angles.
+    before = 2 * patch[half // 3] + np.where(is_forward, _BACK, _FRONT)
+    behind = 2 * patch[half // 3] + np.where(is_forward, _FRONT, _BACK)
+    rows = np.sort(_padded(before, edge, sizes), axis=1)
+    rank = np.full(len(start), -1)
+    best = _best_of_equal(rows, apart)
+    rank[best] = np.arange(len(best))
+    pairs = np.stack([behind[order], before[order][after]])
+    ranks = rank[edge]
+    return pairs[:, np.argsort(ranks, kind="stable")[np.count_nonzero(ranks < 0) :]]
+
+
+def _padded(values: IntArray, row: IntArray, sizes: IntArray) -> IntArray:
+    """Return *values* in rows of *sizes*, padded with -1."""
+    table = np.full((len(sizes), int(sizes.max())), -1)
+    table[row, np.arange(len(row)) - np.repeat(np.cumsum(sizes) - sizes, sizes)] = values
+    return table
+
+
+def _best_of_equal(rows: IntArray, value: FloatArray) -> IntArray:
+    """Return the row of largest *value* (k,) among each set of equal *rows* (k, w), by value."""
+    _, same = np.unique(rows, axis=0, return_inverse=True)
+    order = np.lexsort((-value, same.ravel()))
+    best = order[np.diff(same.ravel()[order], prepend=-1) != 0]
+    return np.asarray(best[np.argsort(-value[best], kind="stable")])
