@@ -7,6 +7,7 @@ narrow screen shows them below each other.
 
 from __future__ import annotations
 
+import runpy
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,6 +17,7 @@ import pyvista as pv
 from matplotlib.colors import LinearSegmentedColormap
 
 import vtk_segdeform as sd
+from making.made import EXAMPLES
 from making.made import FIGURES as FOLDER
 from making.plots import convergence, volume_along_a_step
 from making.scene import (
@@ -180,6 +182,17 @@ def pipeline() -> None:
     write("pipeline", [body(parts["mesh"], pose) for pose in poses], np.concatenate(poses))
 
 
+def followers() -> None:
+    """Draw a sleeve and a bead that follow an arm, at rest, bent, and free."""
+    sys.argv[1:] = []  # or the example would write its own pictures
+    names = runpy.run_path(str(EXAMPLES / "an_arm_in_a_sleeve.py"))
+    mesh, bent = names["mesh"], [each.vertices for each in names["solutions"].values()]
+    owner = mesh.components[mesh.faces[:, 0]]
+    colours = np.array([rgb("#f0d9b5"), rgb("#3d6b8f"), rgb("#d55e00")])[owner]
+    poses = [mesh.vertices, *bent]
+    write("followers", [body(mesh, x, colours) for x in poses], np.concatenate(poses))
+
+
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -190,6 +203,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "several": (several, 3),
     "local_volume": (local_volume, 0),
     "pipeline": (pipeline, 3),
+    "followers": (followers, 3),
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import io
 from ..arrays import FloatArray, IntArray
@@ -64,7 +65,8 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
         fixed = _selected(options.fixed, surface, "fixed")
     has_goals = bool(options.volume)
     handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
-    found = _regions(options, surface, part(progress, 0.0, 0.18))
+    held = np.union1d(fixed, handle)
+    found = _regions(options, surface, part(progress, 0.0, 0.18), held)
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[fixed] = True
@@ -162,8 +164,12 @@ def opened(path: Path) -> Session:
     return load_session(path) if path.suffix == SESSION else Session(Surface.read(path))
 
 
-def _regions(options: Namespace, surface: Surface, progress: Progress | None) -> Regions:
+def _regions(
+    options: Namespace, surface: Surface, progress: Progress | None, held: ArrayLike = ()
+) -> Regions:
     wanted, arrays = options.regions, surface.given.point_data
+    if options.attach and (wanted in arrays or wanted == "1"):
+        raise ConstraintError("--attach is for automatic regions only; leave it or --regions out")
     if wanted in arrays:
         labels = surface.at_vertices(np.asarray(arrays[wanted]))
         rings = {} if options.overlap is None else {"overlap": options.overlap}
@@ -178,7 +184,8 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
             f"({', '.join(arrays.keys()) or 'it has none'}); got {wanted!r}"
         )
     number = None if wanted == "auto" else int(wanted)
-    return segment(surface.mesh, n_regions=number, progress=progress)
+    attach = dict(options.attach)
+    return segment(surface.mesh, number, attach=attach, held=held, progress=progress)
 
 
 def _size(options: Namespace, found: Regions) -> int:

@@ -367,6 +367,7 @@ def _output_folder(parser: argparse.ArgumentParser, name: str) -> None:
 def _regions(parser: argparse.ArgumentParser) -> None:
     text = "number of regions, 'auto', or a point array of region numbers (default: auto)"
     parser.add_argument("--regions", default="auto", metavar="N", help=text)
+    _attach(parser)
     text = "overlap of regions from a point array, in edge rings (default: 4)"
     parser.add_argument("--overlap", type=_count, metavar="RINGS", help=text)
 
@@ -395,6 +396,7 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--regions", type=_count, default=None, metavar="N", help=text)
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
+    _attach(parser)
     _constraints(parser)
     _contact_and_lids(parser)
     _refine(parser, "with --avoid-contact")
@@ -468,6 +470,23 @@ def _refine(parser: argparse.ArgumentParser, default: str) -> None:
     text = f"finish the pose on the mesh itself: less distorted, handles exact (default: {default})"
     action = argparse.BooleanOptionalAction
     parser.add_argument("--refine", action=action, default=None, help=text)
+
+
+def _attach(parser: argparse.ArgumentParser) -> None:
+    text = (
+        "let component A follow component B, numbered from 0; A=free: none; may be repeated "
+        "(default: a component without fixed or handle points follows one that it lies against)"
+    )
+    parser.add_argument(
+        "--attach", type=_attachment, action="append", default=[], metavar="A=B", help=text
+    )
+
+
+def _attachment(text: str) -> tuple[int, int | str]:
+    one, is_given, other = text.partition("=")
+    if not (one.isdecimal() and is_given and (other.isdecimal() or other == "free")):
+        raise argparse.ArgumentTypeError(f"must be A=B or A=free; got {text!r}")
+    return int(one), other if other == "free" else int(other)
 
 
 def _count(text: str) -> int:

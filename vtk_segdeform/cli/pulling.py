@@ -57,6 +57,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         lids=lids,
         **constraints_of(options, surface),
         avoid_contact=options.avoid_contact,
+        attach=dict(options.attach),
         refine=options.refine,
         progress=progress,
     )

@@ -45,6 +45,7 @@ from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
+from .finishing import on_volumes
 from .problem import Problem
 from .pull import pull
 from .slides import Slide, checked_slides
@@ -76,6 +77,7 @@ __all__ = [
     "deform",
     "fault_of_grab",
     "finished",
+    "on_volumes",
     "place_text",
     "pull",
     "reach_and_follows",

@@ -105,6 +105,7 @@ class BindingInputs:
         seen = hashlib.blake2b(digest_size=20)
         seen.update(repr((_FORMAT, self.stretch, self.n_clusters, regions.smoothness)).encode())
         arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership]
+        arrays += [] if regions.carrier is None else [regions.carrier]
         if self.stiffness is not None:
             arrays += [self.stiffness.factors, *self.stiffness.rigid]
         for array in [*arrays, *(a for cage in self.cages for a in (cage.vertices, cage.faces))]:

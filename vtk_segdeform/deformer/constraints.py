@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..freezing import read_only
+from ..geometry import Carrying
 from ..mesh import SurfacePoint
 from ..solver import (
     Anchors,
@@ -223,6 +225,16 @@ class Constraints:
         places[pulled.targets] += x[own] + frame.size * pulled.levers - pulled.at(x)
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How a finish moves components without anything that is held; see `finishing`."""
+        stiff = self.problem.inputs.stiffness
+        rigid = () if stiff is None else stiff.rigid
+        guided = (each.vertices for each in self.guides)
+        return self.problem.carrying_from(
+            np.concatenate([self.handle, self.fixed, *guided, *rigid])
+        )
 
     def held_volumes(self, x: FloatArray) -> HeldVolumes:
         """Return the volumes of *x* (n, 3) that have goals."""

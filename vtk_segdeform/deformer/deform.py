@@ -15,6 +15,7 @@ from ..arrays import FloatArray, is_whole
 from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag, require_sequence, shown
 from ..errors import ArgumentError, Cancelled, ConstraintError, SegDeformError
+from ..geometry import Attach
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -51,6 +52,7 @@ def deform(
     preserve_volume: bool = True,
     lids: bool | None = None,
     avoid_contact: bool = False,
+    attach: Attach | None = None,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -93,6 +95,10 @@ def deform(
         each connected part, as `Deformer` does.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
+    attach : mapping of int to int or "free", optional
+        For components, numbered as in `Mesh.components`, the one that each follows; ``"free"`` if
+        it follows none.  By default a component without fixed or handle vertices follows one that
+        it lies against, is around or inside of, such as a sleeve its arm.
     refine : bool or None
         Whether to finish the pose on the mesh itself (`Deformer.finish`), which distorts it less.
         None does so for meshes of at most 100,000 vertices, where it takes less time than all the
@@ -110,6 +116,8 @@ def deform(
     ConstraintError
         If *fixed*, *handle*, *targets* or *volumes* are invalid, or there is neither a handle nor a
         goal for a volume.
+    ArgumentError
+        If *attach* is for other components, or they follow each other.
     Cancelled
         If *progress* raised it.
     """
@@ -132,7 +140,8 @@ def deform(
     path = [checked_targets(each, len(moves), "through") for each in through]
     path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, progress=next(stages))
+    held = np.union1d(stays, moves)
+    regions = segment(mesh, n_regions, attach=attach, held=held, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)

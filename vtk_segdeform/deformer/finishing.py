@@ -1,16 +1,22 @@
-"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`."""
+"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`.
+
+Components without fixed or handle vertices that follow others are not finished: they move by what
+the finish has moved their carriers, and along their normals onto their own volumes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from ..arrays import BoolArray, FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..finish import Finish, Finisher
+from ..geometry import Carrying
 from ..progress import Progress
-from ..solver import moved_along, steps_to_volume
+from ..solver import VolumeConstraint, moved_along, steps_to_volume
 from .constraints import Constraints
 from .path import Path
 from .stiffness import rigid_places
@@ -56,13 +62,17 @@ def finish_of(
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
+    is_carried = constraints.carrying.is_carried
+    held |= is_carried
+    places[is_carried] = pose[is_carried]
     active = set(path.active_volumes)
     while True:
+        volumes = [preserved[k] for k in sorted(active)]
         finisher = Finisher(
             problem.rest_pose,
             problem.cell_energy,
             held,
-            [preserved[k] for k in sorted(active)],
+            volumes,
             problem.cage_weights,
             progress,
             avoid_contact=constraints.contact is not None,
@@ -70,6 +80,9 @@ def finish_of(
         found = finisher.run(pose, places[held], progress, start=start)
         if mirror is not None:
             found = finisher.made(found, partial(_mean_with_image, path, mirror))
+        if is_carried.any() and found.vertices is not start:
+            followed = _followed(constraints.carrying, volumes, pose, found.vertices)
+            found = replace(found, vertices=followed)
         off = [each.missed(found.vertices) for each in preserved]
         missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
         if not missed:
@@ -108,6 +121,32 @@ def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: Fl
         moved = rigid_places(problem.rest_pose.vertices[ids], near, weights)
         places[ids[~own]] = moved[~own]
         held[ids] = True
+
+
+def _followed(
+    carrying: Carrying, volumes: Sequence[VolumeConstraint], pose: FloatArray, x: FloatArray
+) -> FloatArray:
+    """Return the finished mesh *x* (n, 3) with the followers moved along from the *pose*."""
+    moved, stays = pose + carrying.carried(x - pose), ~carrying.is_carried
+    own = [each for each in volumes if not stays[each.faces[each.faces < len(x)]].all()]
+    landed = on_volumes(moved, own, np.flatnonzero(stays)) if own else moved
+    return np.where(stays[:, None], x, landed)
+
+
+def on_volumes(
+    x: FloatArray, constraints: Sequence[VolumeConstraint], stays: IntArray
+) -> FloatArray:
+    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*."""
+    centre = x.mean(axis=0)
+    moved, directions = x - centre, []
+    for constraint in constraints:
+        normals = constraint.gradient(moved)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.where(lengths > 0.0, lengths, 1.0)
+        normals[stays] = 0.0
+        directions.append(normals)
+    paths = np.hstack([moved, *directions])
+    return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

@@ -17,6 +17,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy
 from ..finish import CellEnergy
+from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
 from ..regions import Regions
@@ -136,6 +137,19 @@ class Problem:
         part = connected(count + n_regions, component, count + region)
         return part[:count], part[count:]
 
+    def carrying_from(self, ids: IntArray) -> Carrying:
+        """Return how motions are carried from the components of vertices *ids* to the others.
+
+        Regions without carriers may have several components as well: then each of these follows one
+        with which it shares regions.
+        """
+        roots, carrier = self.mesh.components[ids], self.regions.carrier
+        if carrier is None:
+            part, _ = self.linked_parts
+            found = carriers(self.mesh, roots=roots)
+            carrier = np.where(part[found] == part, found, np.arange(len(part)))
+        return Carrying(self.mesh, towards(carrier, roots))
+
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
 
@@ -174,7 +188,7 @@ class Problem:
         """Weights w (n,) of `finish.finisher`: 1 / 4 of a cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
-        areas = own.sum(axis=1)
+        areas = np.where(self.regions.is_carried, 0.0, own).sum(axis=1)  # cages are no coarser
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
         weights = np.asarray(density @ own) / _SPACINGS**2
         stiff = self.inputs.stiffness

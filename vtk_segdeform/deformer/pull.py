@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag
 from ..errors import ConstraintError
+from ..geometry import Attach
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress
 from ..regions import segment
@@ -50,6 +51,7 @@ def pull(
     symmetry: Symmetry = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
+    attach: Attach | None = None,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -90,6 +92,9 @@ def pull(
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
+    attach : mapping of int to int or "free", optional
+        The components that others follow, as of `deform`.  Those with pins are no exception: a pull
+        moves all that lies together.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
         None does so only with *avoid_contact*, and to place rigid and sliding vertices exactly:
@@ -135,7 +140,7 @@ def pull(
     if locality is None:
         locality = automatic_locality(len(fixed))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, progress=next(stages))
+    regions = segment(mesh, n_regions, attach=attach, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, progress=next(stages))

@@ -47,7 +47,7 @@ from ..deformer import (
     checked_radius,
 )
 from ..errors import CageError, SessionError
-from ..geometry import Lids
+from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
@@ -60,6 +60,7 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
+from .separating import separated
 from .state import (
     Cages,
     Options,
@@ -310,7 +311,10 @@ class Session(Described):
         progress: Progress | None = None,
     ) -> None:
         """Segment the mesh automatically; see `vtk_segdeform.segment`."""
-        regions = segment(self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress)
+        follows = preparing.following(self.state)
+        regions = segment(
+            self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
+        )
         self.history.step("segment", painting.with_regions(self.state, regions))
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
@@ -436,7 +440,7 @@ class Session(Described):
         fixed, _ = checked_constraints(self.mesh, vertices, self.state.handle)
         if not np.array_equal(fixed, self.fixed):
             after = handles.with_fixed(self.mesh, self.state, fixed, self.vertices)
-            self.history.step("set fixed vertices", after)
+            self.history.step("set fixed vertices", separated(self.poses, after))
 
     # The pose.
 
@@ -770,7 +774,7 @@ class Session(Described):
         """Reset the pose to rest; an ongoing drag is committed first."""
         self.history.step("reset pose", self.state.at_rest())
 
-    def change_options(self, **changes: float | bool | None) -> None:
+    def change_options(self, **changes: float | bool | Attach | None) -> None:
         """Change some of the `Options` by name; call `refine` to apply them to the pose."""
         unknown = sorted(changes.keys() - vars(self.options).keys())
         if unknown:

@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import (
@@ -30,13 +30,16 @@ from ..deformer import (
     checked_place,
     checked_slides,
 )
-from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..errors import ArgumentError, CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
+from ..geometry import FREE, checked_attach
 from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
 
+Attachments: TypeAlias = tuple[tuple[int, int | str], ...]
+"""Components and their carriers; see `Options`."""
 Cages: TypeAlias = tuple[FloatArray, ...]
 """One (m_r, 3) float per region: the vertices of the cages in a pose."""
 
@@ -55,6 +58,7 @@ _WORDS = {
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
     "avoid_contact": "contact avoidance",
+    "attach": "attached components",
 }
 
 
@@ -85,6 +89,9 @@ class Options:
         Number of rotation clusters.
     avoid_contact : bool
         Keep parts of the surface from crossing each other, as `Deformer` does.
+    attach : mapping of int to int or "free"
+        The components that others follow, as of `segment`, used at the next segmentation; kept as
+        sorted pairs.
 
     Raises
     ------
@@ -100,6 +107,7 @@ class Options:
     stretch: float = 1.0
     rotation_groups: int = 300
     avoid_contact: bool = False
+    attach: Attachments = ()
     volumes: tuple[tuple[str, str | float], ...] = ()
     symmetry: str | None = None
 
@@ -110,6 +118,7 @@ class Options:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")
+        object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
         if self.symmetry not in (None, "x", "y", "z", "auto"):
@@ -121,6 +130,21 @@ class Options:
         if self.offset is not None:
             _require_number("offset", self.offset, _TINY)
         _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+def _checked_attach(attach: Any) -> Attachments:
+    """Return *attach*, a mapping or pairs, as sorted pairs; SessionError if it is neither."""
+    try:
+        pairs = dict(attach)
+        return tuple(sorted(checked_attach(pairs, 1 + max(_numbers(pairs), default=0)).items()))
+    except (ArgumentError, TypeError, ValueError):
+        raise SessionError(
+            f"attach must map components to others or {FREE!r}; got {shown(attach)}"
+        ) from None
+
+
+def _numbers(pairs: Mapping[Any, Any]) -> list[int]:
+    return [each for pair in pairs.items() for each in pair if is_whole(each, 0)]
 
 
 def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
@@ -354,7 +378,7 @@ def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
             raise RegionError("these regions belong to another mesh; create them on this mesh")
-    return Regions(mesh, regions.membership, regions.smoothness)
+    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier)
 
 
 def fitting_cages(

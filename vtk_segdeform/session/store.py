@@ -5,6 +5,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     header.json           format, version, counts, names, options
     mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
     membership.npy        (r, n) bool      region by vertex                        if any
+    carrier.npy           (c,) int         `Regions.carrier`                       if any
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
@@ -71,7 +72,8 @@ if TYPE_CHECKING:
 FORMAT = "vtk_segdeform session"
 VERSION = 3
 
-_LATER = {
+_LATER: dict[str, Any] = {
+    "attach": (),
     "lids": None,
     "avoid_contact": False,
     "volumes": (),
@@ -196,6 +198,9 @@ def _write(
     arrays |= {"fixed": state.fixed, "handle": state.handle}
     if regions is not None:
         arrays["membership"] = regions.membership
+        if regions.carrier is not None:  # optional: earlier versions have the same membership
+            header["n_components"] = len(regions.carrier)
+            arrays["carrier"] = regions.carrier
     if state.cages:
         arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
         arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
@@ -255,7 +260,11 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     regions = None
     if r:
         membership = archive.array("membership", "b", (r, n))
-        regions = Regions(mesh, membership, field(header, "smoothness", number))
+        carrier = None
+        if "n_components" in header:
+            count = field(header, "n_components", whole)
+            carrier = archive.array("carrier", "i", (count,))
+        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier)
     counts = field(header, "cages", list_of(row_of(whole, whole)))
     n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
     total = sum(n_vertices)
