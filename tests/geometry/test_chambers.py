@@ -102,6 +102,10 @@ def test_folded_slivers_do_not_open_the_chambers_around_them(seed, size):
     surface = surface_of(labels := with_slivers(seed, size), 16)
     mesh = mesh_from(surface)
     assert_allclose(volumes_of(mesh).sum(), by_label(surface, labels).sum(), rtol=1e-4)
+    require_closed(mesh)
+
+
+def require_closed(mesh: Mesh) -> None:
     found = lids_of(mesh).chambers
     for faces in (*found.inside, *found.hulls):
         assert not len(HalfEdges(faces, mesh.n_vertices).net_boundary)
@@ -191,4 +195,6 @@ def test_sides_that_are_left_over_are_joined_to_the_chambers_that_they_close(mon
         return part
 
     monkeypatch.setattr(chambers, "_apart", apart)
-    assert_allclose(volumes_of(compartments((0.1, 0.3), (), ())), [0.1, 0.2, 0.7])
+    mesh = compartments((0.1, 0.3), (), ())
+    require_closed(mesh)
+    assert_allclose(volumes_of(mesh), [0.1, 0.2, 0.7])
