@@ -126,7 +126,7 @@ class Path:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
         volumes = self.constraints.preserved.volumes.among(self.active_volumes)
-        self.solver.volumes = volumes.preserved_at(p)
+        self.solver.preserve(volumes.preserved_at(p))
 
     @property
     def active_volumes(self) -> tuple[int, ...]:
@@ -171,7 +171,7 @@ class Path:
     def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> None:
         """Let the active volumes have the targets of *constraints*, and move the cages there."""
         volumes = self.constraints.preserved.volumes.among(self.active)
-        self.solver.volumes = replace(volumes, constraints=tuple(constraints))
+        self.solver.preserve(replace(volumes, constraints=tuple(constraints)))
         self.p = self.end = self.solver.landed(self.end)
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
