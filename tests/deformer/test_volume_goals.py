@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import combined
+from organs import under_a_lid
 from solids import icosphere, rotation
 
 import vtk_segdeform as sd
 from vtk_segdeform.deformer.volume_goals import VolumeGoal, checked_goals
 from vtk_segdeform.errors import ConstraintError
-from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.solver import Status
 
 EXACT = 1e-12
@@ -261,23 +261,12 @@ def test_parts_have_volumes_under_lids():
     solution = deformer.solve(pulled(deformer))
     assert solution.volume_error < EXACT
     for name, mask, share in [("tip", half, 1.15), ("end", end, 0.95)]:
-        own = mesh.faces[mask[mesh.faces].sum(axis=1) >= 2]
-        volumes = [_under_a_lid(own, x) for x in (mesh.vertices, solution.vertices)]
+        volumes = [under_a_lid(mesh, mask, x) for x in (mesh.vertices, solution.vertices)]
         assert_allclose(volumes[1] / volumes[0], share, rtol=EXACT)
         assert_allclose(deformer.volumes()[name], volumes[0], rtol=EXACT)
     for ids in ([mesh.n_vertices], np.ones(3, dtype=bool), "tip"):
         with pytest.raises(ConstraintError, match="parts\\['tip'\\]"):
             sd.Deformer(mesh, regions, cages, parts={"tip": ids})
-
-
-def _under_a_lid(faces: np.ndarray, x: np.ndarray) -> float:
-    """Return the volume of an open surface with one border under a fan to its centre."""
-    halves = np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
-    both = {tuple(half) for half in halves.tolist()}
-    border = np.array([half for half in halves.tolist() if tuple(half[::-1]) not in both])
-    centre = x[np.unique(border)].mean(axis=0)
-    lid = np.column_stack([border[:, ::-1], np.full(len(border), len(x))])
-    return signed_volume(np.vstack([x, centre]), np.concatenate([faces, lid]))
 
 
 def test_the_whole_of_several_bodies_leaves_each_of_them_free():

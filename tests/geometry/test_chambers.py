@@ -8,6 +8,7 @@ import pyvista as pv
 from campaign import every
 from numpy.testing import assert_allclose
 from open_meshes import combined, part_of
+from organs import mesh_from, nearest_labels, surface_of
 from scipy import ndimage
 from solids import icosphere, rotation
 
@@ -15,27 +16,8 @@ from vtk_segdeform.geometry import chambers, lids_of, signed_volume
 from vtk_segdeform.mesh import HalfEdges, Mesh, mesh_of
 
 
-def surface_of(labels: np.ndarray, smoothing: int = 0) -> pv.PolyData:
-    """Return the surfaces between *labels*, also between two labels, of voxels of volume 1."""
-    grid = pv.ImageData(dimensions=labels.shape)
-    grid.point_data["labels"] = labels.ravel(order="F").astype(np.int32)
-    return grid.contour_labels(
-        boundary_style="all", scalars="labels", smoothing=smoothing > 0,
-        smoothing_iterations=smoothing, output_mesh_type="triangles",
-    )  # fmt: skip
-
-
-def mesh_from(surface: pv.PolyData) -> Mesh:
-    return mesh_of(surface.points.astype(float), surface.regular_faces).mesh
-
-
-def nearest_labels(seed: int, size: int) -> np.ndarray:
-    """Return a ball, divided among 2 to 8 labels by the nearest of as many points; 0 around it."""
-    rng = np.random.default_rng(seed)
-    places = np.moveaxis(np.indices((size,) * 3), 0, -1) / (size - 1) - 0.5
-    points = rng.uniform(-0.35, 0.35, (rng.integers(2, 9), 3))
-    labels = np.linalg.norm(places[..., None, :] - points, axis=-1).argmin(axis=-1) + 1
-    return in_pieces(np.where(np.linalg.norm(places, axis=-1) < 0.42, labels, 0))
+def pieces(seed: int, size: int) -> np.ndarray:
+    return in_pieces(nearest_labels(seed, size))
 
 
 def in_pieces(labels: np.ndarray) -> np.ndarray:
@@ -68,14 +50,14 @@ def by_label(surface: pv.PolyData, labels: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("seed", every(6, range(18)))
 def test_chambers_of_a_label_map_have_the_volumes_of_its_voxels(seed):
-    labels = nearest_labels(seed, 16)
+    labels = pieces(seed, 16)
     counts = np.sort(np.bincount(labels.ravel())[1:])
     assert_allclose(volumes_of(mesh_from(surface_of(labels))), counts[counts > 0], rtol=1e-9)
 
 
 @pytest.mark.parametrize(("seed", "size"), every(4, [(k, n) for k in range(8) for n in (10, 20)]))
 def test_chambers_of_a_smoothed_label_map_are_its_labels(seed, size):
-    surface = surface_of(labels := nearest_labels(seed, size), 16)
+    surface = surface_of(labels := pieces(seed, size), 16)
     expected, found = by_label(surface, labels), volumes_of(mesh_from(surface))
     # Single voxels may be smoothed to nothing and become part of a neighbour.
     found, expected = (each[each > 1e-3 * expected.sum()] for each in (found, expected))
@@ -151,7 +133,7 @@ def test_compartments_of_a_box_have_their_volumes(cuts):
 
 @pytest.mark.parametrize("far", [0.0, 1e5])
 def test_motion_order_of_faces_and_turned_walls_change_nothing(far):
-    surface = surface_of(labels := nearest_labels(3, 12), 16)
+    surface = surface_of(labels := pieces(3, 12), 16)
     expected = by_label(surface, labels)
     rng = np.random.default_rng(1)
     faces = rng.permutation(surface.regular_faces)

@@ -7,8 +7,8 @@
     at least 2.5, >= 2.5   a bound, with any of the above after it; at most 110%, <= 110%
 
 What is given takes precedence over what is preserved by default: a body is not preserved if all its
-faces are around a volume that is given, as all bodies are in the whole.  Volumes may depend on each
-other, as the whole on its bodies: then they must agree.
+faces are around a volume that is given, and no body and no region if the whole is.  Volumes may
+depend on each other, as the whole on its bodies: then they must agree.
 """
 
 from __future__ import annotations

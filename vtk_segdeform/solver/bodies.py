@@ -94,9 +94,9 @@ class Bodies:
         own, count = self._numbered
         points = self.whole.extended(self.mesh.vertices)
         inside = [signed_volume(points, each) for each in self.lids.chambers.inside]
-        volumes = np.bincount(own[own >= 0], self._component_volumes[own >= 0], count + len(inside))
-        volumes[count:] += inside
-        return volumes
+        every = np.concatenate([self._component_volumes[own >= 0], inside])
+        numbers = np.concatenate([own[own >= 0], count + np.arange(len(inside))])
+        return np.bincount(numbers, every)
 
     @cached_property
     def _numbered(self) -> tuple[IntArray, int]:
