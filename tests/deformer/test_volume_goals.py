@@ -306,3 +306,14 @@ def test_far_from_the_origin_volumes_are_as_exact_as_rounding_allows(offset):
     deformer = held(deformer, volumes={"cavity": "-30%", "wall": "keep"})
     solution = deformer.solve(pulled(deformer))
     assert solution.volume_error < (1e-11 if offset else EXACT)
+
+
+@pytest.mark.parametrize("goals", [{"cavity": "-20%", "wall": "keep"}, {"whole": "+30%"}])
+def test_a_pull_reaches_its_target_while_volumes_change(goals):
+    mesh = hollow().mesh
+    tip = int(mesh.vertices[:, 0].argmax())
+    to = mesh.vertices[tip] + [0.1, 0.3, 0.0]
+    solution = sd.pull(mesh, tip, to, volumes=goals, n_regions=1, n_cage_vertices=60)
+    assert solution.handle_error < 1e-4
+    assert solution.volume_error < EXACT
+    assert solution.status is Status.CONVERGED

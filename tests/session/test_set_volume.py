@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
+
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
@@ -165,3 +168,13 @@ def test_options_with_goals_are_hashable_and_a_copy():
     goals["whole"] = "50%"
     assert options == Options(volumes=(("whole", "90%"),))
     assert len({options, Options(volumes={"whole": "90%"})}) == 1
+
+
+def test_a_pull_after_goals_were_given_as_options_starts_from_these_volumes():
+    session = SCENE.session()
+    session.change_options(volumes={"whole": "+20%"})
+    top = int(session.mesh.vertices[:, 1].argmax())
+    solution = session.pull(top, session.mesh.vertices[top] + [0.0, 0.3, 0.0])
+    session.commit()
+    assert solution.handle_error < 1e-3
+    assert_allclose(share(session), 1.2, rtol=EXACT)

@@ -81,6 +81,12 @@ class Path:
     def _problem(self) -> Problem:
         return self.constraints.problem
 
+    @property
+    def is_solved(self) -> bool:
+        """Whether the handles and volumes are in their places, unlike those of a grown shape."""
+        is_rest = self.p is self.constraints.rest_cages
+        return self.is_on_volumes and not (is_rest and self.constraints.has_goals)
+
     def copy(self) -> Path:
         """Return a path that continues from here independently."""
         return replace(self, solver=self.solver.copy())
