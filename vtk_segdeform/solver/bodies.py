@@ -96,7 +96,7 @@ class Bodies:
         inside = [signed_volume(points, each) for each in self.lids.chambers.inside]
         every = np.concatenate([self._component_volumes[own >= 0], inside])
         numbers = np.concatenate([own[own >= 0], count + np.arange(len(inside))])
-        return np.bincount(numbers, every)
+        return np.asarray(np.bincount(numbers, every), dtype=np.float64)
 
     @cached_property
     def _numbered(self) -> tuple[IntArray, int]:
