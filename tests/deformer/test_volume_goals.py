@@ -133,6 +133,10 @@ def test_a_name_that_is_unknown_is_refused_with_those_that_there_are():
         ({"component 0": "keep", "cavity": "-20%", "whole": "keep"}, "follows from that of"),
         ({"wall": "keep", "whole": "at least 101%"}, "cannot be at least"),
         ({"wall": "keep", "whole": "at most 99%"}, "cannot be at most"),
+        (
+            {"component 0": "keep", "cavity": "at most 90%", "wall": "at most 102%"},
+            r"that of 'component 0' and 'cavity': it is then at least .*, so it cannot be at most",
+        ),
     ],
 )
 def test_goals_that_contradict_each_other_are_named(goals, says):
@@ -162,6 +166,10 @@ def test_the_feasible_volume_that_is_named_is_accepted():
         {"wall": "keep", "whole": "at most 100%", "cavity": "-5%"},
         {"region 0": "keep", "cavity": "-10%"},
         {"cavity": 2.0},
+        {"component 0": "keep", "cavity": "at most 90%"},
+        {"component 0": "+19%", "cavity": "at most 118%"},
+        {"component 0": "keep", "cavity": "at most 90%", "wall": "at least 105%"},
+        {"component 0": "keep", "cavity": "at most 90%", "wall": "at most 140%"},
     ],
 )
 def test_volumes_are_those_of_their_goals(goals):
