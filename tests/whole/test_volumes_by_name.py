@@ -139,12 +139,12 @@ def test_random_pulls_meet_every_goal(name, count):
     for number in range(count):
         fixed, handle = _ends(mesh, rng)
         goals = goals_of(deformer, rng) if number % 3 else {}
-        held = deformer.hold(fixed=fixed, handle=handle, volumes=goals)
-        x, places = mesh.vertices, mesh.vertices[handle]
-        if last is not None and number % 2:  # go on from the last pose, whatever its volumes are
-            x = last.vertices
+        goes_on = last is not None and number % 2  # whatever the volumes of that pose are
+        x = last.vertices if goes_on else mesh.vertices
+        held = deformer.hold(fixed=fixed, handle=handle, fixed_at=x[fixed], volumes=goals)
+        if goes_on:
             held.resume(last.cage_vertices, x[handle])
-            places = x[handle]
+        places = x[handle]
         turn = rotation(rng.normal(size=3), rng.uniform(0.0, 1.0))
         move = 0.2 * mesh.diagonal * rng.normal(size=3) / 3.0
         targets = (places - places.mean(axis=0)) @ turn.T + places.mean(axis=0) + move

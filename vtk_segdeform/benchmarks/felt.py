@@ -70,8 +70,8 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
     for k, size in enumerate(scale.drag_sizes):
         tell(progress, k / len(scale.drag_sizes), f"drags with volumes, {size} vertices")
         volumes += [(size, *row) for row in in_own_process(with_volumes, size, scale)]
-    columns = "vertices", "volumes", "median, ms", "median / whole", "95 % / whole", "error"
-    section.tables.append(Table(columns, volumes, "frames of a bar in seven parts"))
+    names = "vertices", "volumes", "median, ms", "median / whole", "95 % / whole", "error"
+    section.tables.append(Table(names, volumes, "frames of a bar in seven parts"))
     return section
 
 
