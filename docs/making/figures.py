@@ -27,12 +27,15 @@ from making.scene import (
     bar,
     body,
     cactus,
+    cut_open,
     deformer_of,
+    label_map,
     region_colours,
     rotated,
     write,
 )
 from vtk_segdeform.filters import SegmentedCageDeformFilter
+from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io import polydata_of, to_polydata
 from vtk_segdeform.pictures import (
     BODY,
@@ -45,6 +48,7 @@ from vtk_segdeform.pictures import (
 )
 
 RISING = LinearSegmentedColormap.from_list("rising", ["#DFE7EE", "#E69F00", "#A63A00"])
+MUSCLE = rgb("#D0705F")
 
 
 def front() -> None:
@@ -193,6 +197,35 @@ def followers() -> None:
     write("followers", [body(mesh, x, colours) for x in poses], np.concatenate(poses))
 
 
+def ventricle() -> None:
+    """Draw the ventricle of the example at rest and contracted, cut open."""
+    sys.argv[1:] = []  # an example writes its pictures to the folder that is named there
+    names = runpy.run_path(str(EXAMPLES / "beat_a_ventricle.py"))
+    mesh, solution = names["mesh"], names["solution"]
+    poses = [mesh.vertices, solution.vertices]
+    drawings = [cut_open([(mesh.faces, x, MUSCLE)], "x") for x in poses]
+    write("ventricle", drawings, mesh.vertices)
+
+
+def organs() -> None:
+    """Draw the parts of a label map at rest and bent, cut open."""
+    mesh = label_map()
+    x, z = mesh.vertices, mesh.vertices[:, 2]
+    regions = sd.segment(mesh, 1)
+    cages = sd.fit_cages(mesh, regions, 155)
+    ends = {"fixed": z < z.min() + 0.1 * np.ptp(z), "handle": z > z.max() - 0.1 * np.ptp(z)}
+    deformer = sd.Deformer(mesh, regions, cages, **ends)
+    targets = rotated(mesh, deformer.handle, 50, pivot=x.mean(axis=0) * [1.0, 1.0, 0.9])
+    bent = deformer.solve(targets).vertices
+    chambers = lids_of(mesh).chambers.inside
+
+    def cut(points: Any) -> Drawing:
+        parts = [(faces, points, of_region(r)) for r, faces in enumerate(chambers)]
+        return cut_open(parts, "y")
+
+    write("organs", [cut(x), cut(bent)], np.concatenate([x, bent]))
+
+
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -204,6 +237,8 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "local_volume": (local_volume, 0),
     "pipeline": (pipeline, 3),
     "followers": (followers, 3),
+    "ventricle": (ventricle, 2),
+    "organs": (organs, 2),
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }

@@ -57,6 +57,43 @@ def rotated(mesh: sd.Mesh, handle: Any, degrees: float, pivot: Any = PIVOT) -> A
     return turn.apply(mesh.vertices[handle] - pivot) + pivot
 
 
+def label_map() -> sd.Mesh:
+    """Return the smoothed surfaces between the labels of a label map: seven organs in an egg."""
+    shape = np.array([18, 18, 56])
+    places = np.moveaxis(np.indices(shape), 0, -1) / (shape - 1) - 0.5
+    points = np.random.default_rng(5).uniform(-0.33, 0.33, (7, 3))
+    labels = np.linalg.norm(places[..., None, :] - points, axis=-1).argmin(axis=-1) + 1
+    labels[np.linalg.norm(places, axis=-1) > 0.44] = 0
+    grid = pv.ImageData(dimensions=shape)
+    grid.point_data["labels"] = labels.ravel(order="F").astype(np.int32)
+    surface = grid.contour_labels(
+        boundary_style="all", scalars="labels", smoothing_iterations=20,
+        output_mesh_type="triangles",
+    )  # fmt: skip
+    return sd.Surface(surface).mesh
+
+
+def cut_open(parts: Sequence[tuple[Any, Any, Any]], normal: str) -> Drawing:
+    """Return a function that draws the half of bodies behind a plane through their middle.
+
+    Each has its faces, vertices and colour; the plane is perpendicular to the axis *normal*.
+    """
+    low, high = (
+        end([end(x[faces.ravel()], axis=0) for faces, x, _ in parts], axis=0)
+        for end in (np.min, np.max)
+    )
+    middle = (low + high) / 2.0
+
+    def draw(plotter: pv.Plotter) -> None:
+        for faces, x, colour in parts:
+            surface = polydata_of(x, np.full(len(faces), 3), faces.ravel())
+            cut = surface.clip_closed_surface(normal, origin=middle)
+            look = {"smooth_shading": True, "split_sharp_edges": True, "ambient": 0.3}
+            plotter.add_mesh(cut, color=tuple(colour / 255), **look)
+
+    return draw
+
+
 def region_colours(mesh: sd.Mesh, shares: Any) -> Any:
     """Return (m, 3) face colours: those of the regions, mixed by *shares* (r, n)."""
     palette = np.array([of_region(r) for r in range(len(shares))], dtype=float)

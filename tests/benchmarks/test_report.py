@@ -138,7 +138,7 @@ def test_the_measures_of_a_pose_find_its_faults(body):
 @pytest.mark.campaign
 def test_the_report_of_drags_has_all_numbers_and_names_arap_when_it_is_absent():
     section = felt.run(TINY)
-    set_up, frames = section.tables
+    set_up, frames, volumes = section.tables
     assert set_up.column("vertices") == [600, 600]
     assert min(set_up.column("total")) > 0.0
     assert frames.column("drag") == 2 * ["handle", "handle, avoiding contact", "pull"]
@@ -147,6 +147,10 @@ def test_the_report_of_drags_has_all_numbers_and_names_arap_when_it_is_absent():
     assert all(math.isnan(each) for each in frames.column("median / ARAP"))
     assert max(frames.column("volume change")) < 1e-12
     assert len(section.skipped) == 2
+    assert volumes.column("volumes") == ["whole", "3", "7"]
+    assert volumes.column("median / whole")[0] == 1.0
+    assert min(volumes.column("median / whole")) > 0.0
+    assert max(volumes.column("error")) < 1e-12
 
 
 @pytest.mark.campaign

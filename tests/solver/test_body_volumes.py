@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from open_meshes import combined, with_walls
 from scenes import joined
 
 from vtk_segdeform import models
@@ -53,3 +54,17 @@ def test_splinters_share_the_constraint_of_the_largest_body():
     mesh = joined((BALL, 0.0, 1.0, 1), (BALL, 4.0, 0.01, 1), (BALL, 8.0, 0.02, 1))
     (only,) = constraints_of(mesh)
     assert_allclose(only.target, total_volume(mesh).target, rtol=1e-14)
+
+
+@pytest.mark.parametrize(("height", "around"), [(0.25, 1), (0.75, 2)])
+def test_a_cavity_in_a_chamber_belongs_to_it(height, around):
+    hole = BALL.with_vertices(0.05 * BALL.vertices + [0.0, 0.0, height])
+    mesh = combined(with_walls(BAR, 0.5), hole, BALL.with_vertices(BALL.vertices + 5.0))
+    lids = lids_of(mesh)
+    bodies = Bodies(mesh, total_volume(mesh, lids), lids)
+    ball = signed_volume(BALL.vertices, BALL.faces)
+    assert_allclose(np.sort(bodies.volumes), [0.02 - 0.05**3 * ball, 0.02, ball], rtol=1e-12)
+    assert bodies.of_component.tolist() == [-1, around, 0]
+    assert_allclose(bodies.body(around).target, bodies.volumes[around], rtol=1e-12)
+    every = [bodies.body(k).target for k in range(3)]
+    assert_allclose(sum(every), bodies.whole.target, rtol=1e-12)

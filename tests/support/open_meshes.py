@@ -8,6 +8,7 @@ import numpy as np
 
 from vtk_segdeform import models
 from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh.soup import mesh_of
 
 
 def sheet(f: Callable, n: int = 40, m: int = 40) -> Mesh:
@@ -74,6 +75,13 @@ def together(*meshes: Mesh) -> Mesh:
     starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+
+
+def combined(*meshes: Mesh) -> Mesh:
+    """Return all meshes as one, with those in others turned inward, as cavities."""
+    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return mesh_of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)).mesh
 
 
 def open_box(n: int = 6) -> Mesh:

@@ -29,6 +29,11 @@ RIGHT = {
         and (names["bent"]["temperature"] == names["scan"]["temperature"]).all()
     ),
     "bend_the_cactus": lambda names: abs(names["solution"].volume_change) < 1e-12,
+    "beat_a_ventricle": lambda names: (
+        max(names["errors"]) < 1e-12
+        and names["after"] > 1.2 * names["before"]
+        and not len(names["solution"].crossings())
+    ),
     "with_and_without_volume": lambda names: (
         abs(names["changes"][True]) < 1e-12 and abs(names["changes"][False]) > 1e-3
     ),

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +65,7 @@ class Drag:
     seconds: list[float] = field(default_factory=list)  # of the processor
     steps: list[int] = field(default_factory=list)
     jumps: list[float] = field(default_factory=list)  # motion of the farthest vertex / of the hand
-    volumes: list[float] = field(default_factory=list)  # relative change
+    volumes: list[float] = field(default_factory=list)  # largest relative error
     shapes: list[Shape] = field(default_factory=list)
 
     @property
@@ -108,7 +109,7 @@ def hand(*, is_short: bool = False) -> list[tuple[float, FloatArray]]:
     return list(zip(turns.tolist(), aside, strict=True))
 
 
-def ready(preparation: Preparation, own: Hand, *, handle: bool, **options: bool) -> Session:
+def ready(preparation: Preparation, own: Hand, *, handle: bool, **options: Any) -> Session:
     """Return a bound session; with *handle* it has the fixed vertices and the handle of *own*."""
     session = Session(own.mesh)
     session.change_options(**options)
@@ -160,7 +161,7 @@ def frames(
         jump = float(np.linalg.norm(x - last, axis=1).max()) / max(moved, 1e-300)
         drag.jumps.append(jump if moved > _LEAST_MOTION * diagonal else np.nan)
         drag.steps.append(solution.steps)
-        drag.volumes.append(abs(session.volume_change))
+        drag.volumes.append(max(abs(session.volume_change), solution.volume_error))
         last = x
         yield drag
 

@@ -22,7 +22,7 @@ from ..cages import fit_cages
 from ..deformer import Deformer
 from ..io import read_mesh
 from ..mesh import Mesh, SurfacePoint
-from ..models import cactus, sphere
+from ..models import bar, cactus, sphere
 from ..regions import Regions, segment
 
 _HANDLE, _ROOT, _FIXED = 0.1, 0.45, 0.65  # distances from the tip, as shares of the largest
@@ -101,6 +101,21 @@ def with_loose_parts(body: Mesh, seed: int, count: int = 4) -> Mesh:
         centre = x[body.faces[face]].mean(axis=0) + 0.025 * body.diagonal * normal
         faces.append(ball.faces + sum(map(len, vertices)))
         vertices.append(0.02 * body.diagonal * ball.vertices + centre)
+    return Mesh(np.concatenate(vertices), np.concatenate(faces))
+
+
+def divided_bar(n_vertices: int, count: int = 7) -> Mesh:
+    """Return a bar of about *n_vertices* with inner walls, which divide it into *count* parts."""
+    across = max(2, round((n_vertices / (16.0 * count)) ** 0.5))
+    along = count * 4 * across
+    body = bar((1.0, 1.0, float(count)), (across, across, along))
+    vertices, faces = [body.vertices], [body.faces]
+    for k in range(1, count):
+        ring = np.flatnonzero(np.abs(body.vertices[:, 2] - k) < 1e-9)
+        ring = ring[np.argsort(np.arctan2(*body.vertices[ring, :2].T))]
+        middle = np.full(len(ring), sum(map(len, vertices)))
+        faces.append(np.stack([ring, np.roll(ring, -1), middle], axis=1))
+        vertices.append(np.array([[0.0, 0.0, float(k)]]))
     return Mesh(np.concatenate(vertices), np.concatenate(faces))
 
 

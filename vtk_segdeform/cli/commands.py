@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, Slide, clamped, finished, solved_along
+from ..deformer import Deformer, Slide, checked_goals, clamped, finished, solved_along
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -63,6 +63,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     fixed = np.zeros(0, dtype=np.int64)
     if options.fixed is not None:
         fixed = _selected(options.fixed, surface, "fixed")
+    constraints = constraints_of(options, surface)
     has_goals = bool(options.volume)
     handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
     held = np.union1d(fixed, handle)
@@ -78,7 +79,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options), **constraints_of(options, surface),
+        **_settings(options), **constraints,
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
@@ -222,8 +223,8 @@ def _settings(options: Namespace) -> dict[str, Any]:
 
 def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
     """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
-    goals = dict(_named("--volume", text) for text in options.volume)
-    parts = dict(_named("--part", text) for text in options.part)
+    goals, parts = _named("--volume", options.volume), _named("--part", options.part)
+    checked_goals(goals)
     return {
         "volumes": goals or None,
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
@@ -262,13 +263,20 @@ def _slide(text: str, surface: Surface) -> Slide:
     return Slide(_selected(selection, surface, "handle"), along)
 
 
-def _named(option: str, text: str) -> tuple[str, str]:
-    """Return the name and the value of an *option* "name=value"."""
-    name, equals, value = (word.strip() for word in text.partition("="))
-    if not (name and equals and value):
-        example = "whole=+10%" if option == "--volume" else "tip=z>90%"
-        raise ConstraintError(f"{option} must be a name and a value, as {example}; got {text!r}")
-    return name, value
+def _named(option: str, texts: list[str]) -> dict[str, str]:
+    """Return the values by name of an *option* "name=value" that may be repeated."""
+    found: dict[str, str] = {}
+    for text in texts:
+        name, _, value = (word.strip() for word in text.partition("="))
+        if not (name and value):
+            example = "whole=+10%" if option == "--volume" else "tip=z>90%"
+            raise ConstraintError(
+                f"{option} must be a name and a value, as {example}; got {text!r}"
+            )
+        if name in found:
+            raise ConstraintError(f"{option} is given twice for {name!r}; leave one of them out")
+        found[name] = value
+    return found
 
 
 def _handles(

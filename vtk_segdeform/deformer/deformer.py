@@ -319,11 +319,15 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
+        path = self._path
+        if not path.is_solved:
+            path = path.copy()
+            path.solve(path.targets, self._limits)
         near = near_point(
-            self._path, point, reach=float(reach), spread=float(spread), follows=float(follows)
+            path, point, reach=float(reach), spread=float(spread), follows=float(follows)
         )
         other = self._shared()
-        other._path = Path.begin(near, self._path.p, self._path.targets)
+        other._path = Path.begin(near, path.p, path.targets)
         return other
 
     def copy(self) -> Deformer:

@@ -126,6 +126,7 @@ class EnclosedVolume:
         parts: Mapping[str, BoolArray],
     ) -> tuple[VolumeConstraint, ...]:
         """Return the constraints of *goals*, and those *kept* that go with them."""
+        kept = () if "whole" in goals else kept
         given = [self.named(name, parts) for name in goals]
         every = with_same_points([*given, *kept])
         around, kept = every[: len(given)], every[len(given) :]

@@ -44,6 +44,6 @@ def grown_cages(problem: Problem, volumes: Volumes) -> FloatArray:
             replace(each, target=each.target / share * (1.0 + leg / legs * (share - 1.0)))
             for each, share in zip(volumes.constraints, shares, strict=True)
         )
-        solver.volumes = replace(volumes, constraints=tuple(now))
+        solver.preserve(replace(volumes, constraints=tuple(now)))
         p = solver.landed(p)
     return p

@@ -81,6 +81,12 @@ class Path:
     def _problem(self) -> Problem:
         return self.constraints.problem
 
+    @property
+    def is_solved(self) -> bool:
+        """Whether the handles and volumes are in their places, unlike those of a grown shape."""
+        is_rest = self.p is self.constraints.rest_cages
+        return self.is_on_volumes and not (is_rest and self.constraints.has_goals)
+
     def copy(self) -> Path:
         """Return a path that continues from here independently."""
         return replace(self, solver=self.solver.copy())
@@ -126,7 +132,7 @@ class Path:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
         volumes = self.constraints.preserved.volumes.among(self.active_volumes)
-        self.solver.volumes = volumes.preserved_at(p)
+        self.solver.preserve(volumes.preserved_at(p))
 
     @property
     def active_volumes(self) -> tuple[int, ...]:
@@ -171,7 +177,7 @@ class Path:
     def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> None:
         """Let the active volumes have the targets of *constraints*, and move the cages there."""
         volumes = self.constraints.preserved.volumes.among(self.active)
-        self.solver.volumes = replace(volumes, constraints=tuple(constraints))
+        self.solver.preserve(replace(volumes, constraints=tuple(constraints)))
         self.p = self.end = self.solver.landed(self.end)
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:

@@ -7,8 +7,8 @@
     at least 2.5, >= 2.5   a bound, with any of the above after it; at most 110%, <= 110%
 
 What is given takes precedence over what is preserved by default: a body is not preserved if all its
-faces are around a volume that is given, as all bodies are in the whole.  Volumes may depend on each
-other, as the whole on its bodies: then they must agree.
+faces are around a volume that is given, and no body and no region if the whole is.  Volumes may
+depend on each other, as the whole on its bodies: then they must agree.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def consistent(
     """Return those of *given* and *kept* constraints that do not follow from the others.
 
     All share their points.  Those of *given* that follow from others must agree with them, those of
-    *kept* need not.  *x* (n, 3) is the mesh at rest.
+    *kept* that do not agree are left out.  *x* (n, 3) is the mesh at rest.
 
     Raises
     ------
@@ -130,17 +130,38 @@ def consistent(
     rows = _derivatives([*given, *kept], x)
     equalities = [k for k, each in enumerate(given) if not each.bound]
     bounds = [k for k, each in enumerate(given) if each.bound]
-    chosen: list[int] = []
+    chosen: list[int] = []  # that do not follow from each other
+    opposite: list[int] = []  # bounds of the same volumes as other bounds, from the other side
     every = [*given, *kept]
     for k in [*equalities, *bounds, *range(len(given), len(every))]:
-        base = [j for j in chosen if not every[j].bound]
-        shares = np.linalg.lstsq(rows[base].T, rows[k], rcond=None)[0] if base else np.zeros(0)
-        residual = np.linalg.norm(rows[k] - shares @ rows[base])
-        if residual > _DEPENDENT * np.linalg.norm(rows[k]):
+        base, shares = _followed([j for j in chosen if not every[j].bound], rows, k)
+        if base is None:  # not from equalities alone
+            base, shares = _followed(chosen, rows, k)
+        if base is None:
             chosen.append(k)
-        elif k < len(given):
-            _require_agreement(every[k], [every[j] for j in base], shares)
-    return tuple(every[k] for k in chosen)
+            continue
+        others = [every[j] for j in base]
+        if not _agree(every[k], others, shares):
+            if k < len(given):
+                raise _contradiction(every[k], others, shares)
+            continue
+        limits = [j for j in base if every[j].bound]
+        if len(limits) == 1 and _is_tighter(every[k], others, shares):
+            chosen[chosen.index(limits[0])] = k
+        elif limits and every[k].bound:
+            opposite.append(k)
+    return tuple(every[k] for k in [*chosen, *opposite])
+
+
+def _followed(base: list[int], rows: FloatArray, k: int) -> tuple[list[int] | None, FloatArray]:
+    """Return those of *base* of which row *k* is a sum, and their shares; None if it is not."""
+    if not base:
+        return None, np.zeros(0)
+    shares = np.linalg.lstsq(rows[base].T, rows[k], rcond=None)[0]
+    if np.linalg.norm(rows[k] - shares @ rows[base]) > _DEPENDENT * np.linalg.norm(rows[k]):
+        return None, shares
+    used = np.abs(shares) > _AGREE
+    return [j for j, is_used in zip(base, used, strict=True) if is_used], shares[used]
 
 
 def _derivatives(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
@@ -155,19 +176,47 @@ def _derivatives(constraints: Sequence[VolumeConstraint], x: FloatArray) -> Floa
     return rows
 
 
-def _require_agreement(
-    one: VolumeConstraint, others: Sequence[VolumeConstraint], shares: FloatArray
-) -> None:
-    implied = sum(share * each.target for share, each in zip(shares, others, strict=True))
-    off = implied - one.target
+def _sides(others: Sequence[VolumeConstraint], shares: FloatArray) -> set[int]:
+    """Return whether the sum of *shares* of *others* may be above (1) that of their targets.
+
+    Or below (-1), by each bound.
+    """
+    pairs = zip(shares, others, strict=True)
+    return {int(np.sign(share)) * each.bound for share, each in pairs if each.bound}
+
+
+def _implied(others: Sequence[VolumeConstraint], shares: FloatArray) -> float:
+    return float(sum(share * each.target for share, each in zip(shares, others, strict=True)))
+
+
+def _agree(one: VolumeConstraint, others: Sequence[VolumeConstraint], shares: FloatArray) -> bool:
+    """Return whether *one*, the sum of *shares* of *others*, can be met together with them."""
+    off = _implied(others, shares) - one.target
     if abs(off) <= _AGREE * abs(one.target) or off * one.bound > 0.0:
-        return
-    used = [each.name for share, each in zip(shares, others, strict=True) if abs(share) > _AGREE]
-    names = " and ".join(f"{name!r}" for name in used)
-    how = {0: "", 1: "at least ", -1: "at most "}[one.bound]
-    raise ConstraintError(
-        f"the volume of {one.name!r} follows from that of {names}: it is then {implied:.6g}, so it "
-        f"cannot be {how}{one.target:.6g}; leave one of them out, or set it free"
+        return True
+    sides = _sides(others, shares)
+    return len(sides) > 1 or (len(sides) == 1 and (one.bound in sides or off * min(sides) < 0.0))
+
+
+def _is_tighter(
+    one: VolumeConstraint, others: Sequence[VolumeConstraint], shares: FloatArray
+) -> bool:
+    """Return whether *one* met implies the only bound of *others*."""
+    (side,) = _sides(others, shares)
+    off = _implied(others, shares) - one.target
+    return one.bound in (0, side) and off * side <= 0.0
+
+
+def _contradiction(
+    one: VolumeConstraint, others: Sequence[VolumeConstraint], shares: FloatArray
+) -> ConstraintError:
+    names = " and ".join(f"{each.name!r}" for each in others)
+    words = {0: "", 1: "at least ", -1: "at most "}
+    side = max(_sides(others, shares), default=0)
+    return ConstraintError(
+        f"the volume of {one.name!r} follows from that of {names}: it is then {words[side]}"
+        f"{_implied(others, shares):.6g}, so it cannot be {words[one.bound]}{one.target:.6g}; "
+        "leave one of them out, or set it free"
     )
 
 

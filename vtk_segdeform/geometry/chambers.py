@@ -18,15 +18,18 @@ Graph. 35(4), 39, 2016, section 3.2 (cells of patches, ordered around edges).
 
 from __future__ import annotations
 
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..mesh import HalfEdges, connected
-from .volume import signed_volume
+from .volume import corner_and_edges, signed_volume
 
 _FRONT, _BACK = 0, 1
+_PASSES = 5  # until all edges have an order; two are enough for most
+_FEW_FACES = 5  # at an edge, of which all orders are tried
 
 
 class Chambers(NamedTuple):
@@ -73,40 +76,65 @@ def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
     crowded = np.zeros(int(half_edges.shells.max()) + 1, dtype=bool)
     crowded[half_edges.shells[half_edges.crowded // 3]] = True
     own = np.flatnonzero(crowded[half_edges.shells])
-    for part in _apart(around, borders, sides), _joined(around, borders, sides):
-        every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
-        if all(_is_closed(each, len(vertices)) for each in every):
-            break
+    part = _closed(_apart(around, borders, sides), half_edges, patch)
+    every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
     volumes = [signed_volume(vertices - vertices[each[0, 0]], each) for each in every]
     inside = [each for each, volume in zip(every, volumes, strict=True) if volume > 0.0]
     outside = [each for each, volume in zip(every, volumes, strict=True) if volume < 0.0]
     return Chambers(tuple(inside), tuple(each[:, [0, 2, 1]] for each in outside))
 
 
-def _joined(around: IntArray, borders: IntArray, sides: int) -> IntArray:
-    """Return the part of space of each side, (sides,)."""
-    return connected(sides, *np.concatenate([around, borders], axis=1))
-
-
-def _apart(around: IntArray, borders: IntArray, sides: int) -> IntArray:
+def _apart(around: list[IntArray], borders: IntArray, sides: int) -> IntArray:
     """Return the part of space of each side, (sides,), with different ones on both sides of a wall.
 
     Where faces fold over each other, as along slivers of a smoothed label map, they are not in the
-    order of their sides.  So pairs are joined in the order of *around* (2, k), which is that of
-    their reliability, unless this would join the sides of a wall.
+    order of their sides.  So edges are joined in the order of *around*, which is that of their
+    reliability, and if the sides of a wall would be joined, in another order of their faces.  Edges
+    for which there is none come first in another pass.
     """
+    for _ in range(_PASSES):
+        part, failed = _joined(around, borders, sides)
+        if not failed:
+            break
+        others = np.setdiff1d(np.arange(len(around)), failed)
+        around = [around[k] for k in (*failed, *others)]
+    return part
+
+
+def _joined(around: list[IntArray], borders: IntArray, sides: int) -> tuple[IntArray, list[int]]:
+    """Return the part of space of each side, (sides,), and the edges whose sides are not joined."""
     parent, members = list(range(sides)), [[side] for side in range(sides)]
-    for one, other in np.concatenate([borders, around], axis=1).T.tolist():
-        a, b = parent[one], parent[other]
-        if len(members[a]) < len(members[b]):
-            a, b = b, a
-        is_wall = one // 2 != other // 2  # not the sides of a sheet
-        if a == b or (is_wall and any(parent[side ^ 1] == a for side in members[b])):
-            continue
-        members[a] += members[b]
-        for side in members[b]:
-            parent[side] = a
-    return np.array(parent)
+
+    def joins(pairs: IntArray) -> bool:
+        """Join *pairs* (2, k), unless this would join the sides of a wall: return whether."""
+        done: list[tuple[int, int]] = []
+        for one, other in pairs.T.tolist():
+            a, b = parent[one], parent[other]
+            if a == b:
+                continue
+            if len(members[a]) < len(members[b]):
+                a, b = b, a
+            is_wall = one // 2 != other // 2  # not the sides of a sheet
+            if is_wall and any(parent[side ^ 1] == a for side in members[b]):
+                for kept, moved in reversed(done):
+                    del members[kept][-len(members[moved]) :]
+                    for side in members[moved]:
+                        parent[side] = moved
+                return False
+            done.append((a, b))
+            members[a] += members[b]
+            for side in members[b]:
+                parent[side] = a
+        return True
+
+    joins(borders)
+    failed = []
+    for k, (before, behind) in enumerate(around):
+        rest = range(1, len(before))
+        orders = permutations(rest) if len(before) <= _FEW_FACES else [rest]
+        if not any(joins(np.stack([behind[[0, *o]], before[[*o, 0]]])) for o in orders):
+            failed.append(k)
+    return np.array(parent), failed
 
 
 def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[IntArray]:
@@ -123,15 +151,29 @@ def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[IntArr
     return [turned[piece] for piece in sorted(pieces, key=lambda piece: int(face[piece[0]]))]
 
 
-def _is_closed(faces: IntArray, n: int) -> bool:
-    return not len(HalfEdges(faces, n).net_boundary)
+def _closed(part: IntArray, half_edges: HalfEdges, patch: IntArray) -> IntArray:
+    """Return the *part* of each side, with parts joined that are closed together only.
+
+    Those that have the same edge in their boundaries are.
+    """
+    half = half_edges.crowded
+    sides = 2 * patch[half // 3] + np.array([[_BACK], [_FRONT]])
+    sign = np.where(half_edges.tail[half] < half_edges.head[half], 1, -1) * [[1], [-1]]
+    count = int(part.max()) + 1
+    edge = np.cumsum(np.diff(half_edges.keys[half], prepend=-1) != 0)
+    found, own = np.unique(edge * count + part[sides], return_inverse=True)
+    found = found[np.bincount(own.ravel(), sign.ravel()) != 0.0]
+    edge, number = np.divmod(found, count)
+    same = edge[1:] == edge[:-1]
+    return np.asarray(connected(count, number[1:][same], number[:-1][same])[part])
 
 
-def _around_edges(vertices: FloatArray, half_edges: HalfEdges, patch: IntArray) -> IntArray:
-    """Return pairs of sides (2, k) in the same part of space, at edges of three or more faces.
+def _around_edges(vertices: FloatArray, half_edges: HalfEdges, patch: IntArray) -> list[IntArray]:
+    """Return the sides (2, k) before and behind each of k faces around edges of three or more.
 
-    A side is twice the number of its patch, plus 1 on the back.  Of edges between the same patches
-    only the one whose faces are farthest apart is used; the pairs are in the order of that.
+    The faces are in the order of their angles.  A side is twice the number of its patch, plus 1 on
+    the back.  Of edges between the same patches only the one whose faces are farthest apart is
+    used; these are in the order of that.
     """
     half = half_edges.crowded
     tail, head = half_edges.tail[half], half_edges.head[half]
@@ -156,17 +198,16 @@ def _around_edges(vertices: FloatArray, half_edges: HalfEdges, patch: IntArray) 
     after[start + sizes - 1] = start  # the last face at an edge is followed by the first one
     gap = (angle[order][after] - angle[order]) % (2.0 * np.pi)
     apart = np.minimum.reduceat(gap, start) * length[start]
+    _, e, f = corner_and_edges(vertices, half_edges.faces)
+    areas = np.bincount(patch, np.linalg.norm(np.cross(e, f), axis=1))
+    apart *= np.minimum.reduceat(areas[patch[half // 3]], start) ** 0.5  # tiny patches last
     # The sides of each face: before it and after it, with the angle.  The normal of a face whose
     # half-edge is forward points on, to larger angles.
     before = 2 * patch[half // 3] + np.where(is_forward, _BACK, _FRONT)
     behind = 2 * patch[half // 3] + np.where(is_forward, _FRONT, _BACK)
     rows = np.sort(_padded(before, edge, sizes), axis=1)
-    rank = np.full(len(start), -1)
-    best = _best_of_equal(rows, apart)
-    rank[best] = np.arange(len(best))
-    pairs = np.stack([behind[order], before[order][after]])
-    ranks = rank[edge]
-    return pairs[:, np.argsort(ranks, kind="stable")[np.count_nonzero(ranks < 0) :]]
+    both = np.stack([before, behind])[:, order]
+    return [both[:, start[e] : start[e] + sizes[e]] for e in _best_of_equal(rows, apart)]
 
 
 def _padded(values: IntArray, row: IntArray, sizes: IntArray) -> IntArray:

@@ -774,7 +774,9 @@ class Session(Described):
         """Reset the pose to rest; an ongoing drag is committed first."""
         self.history.step("reset pose", self.state.at_rest())
 
-    def change_options(self, **changes: float | bool | Attach | None) -> None:
+    def change_options(
+        self, **changes: float | bool | Attach | Mapping[str, str | float] | None
+    ) -> None:
         """Change some of the `Options` by name; call `refine` to apply them to the pose."""
         unknown = sorted(changes.keys() - vars(self.options).keys())
         if unknown:

@@ -1,8 +1,8 @@
 """The bodies of a mesh, each with a volume of its own.
 
-A *body* is a connected component with the cavities in it, or, if it has inner walls, each of its
-chambers (`geometry.chambers`).  The paper has one constraint for the whole mesh; with several
-bodies one could then grow while the others shrink.
+A *body* is a connected component, or, if it has inner walls, each of its chambers
+(`geometry.chambers`), with the cavities in it.  The paper has one constraint for the whole mesh;
+with several bodies one could then grow while the others shrink.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import Lids, corner_and_edges, outer_components, signed_volume
 from ..kernels import in_parallel
-from ..mesh import Mesh
+from ..mesh import Mesh, inside_points
 from .volume_constraints import VolumeConstraint
 
 _MOST_BODIES = 6  # with a constraint of their own, the largest ones: each takes a few solves a step
@@ -27,8 +27,6 @@ _PIECE = 1 << 15  # faces processed together
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """The b bodies of a mesh, and the constraints that preserve the volume of each.
-
-    A body is a component with the cavities in it, or a chamber; see `geometry.chambers`.
 
     Parameters
     ----------
@@ -85,24 +83,42 @@ class Bodies:
         """Return that of the shell of component *k*; the volume of a cavity is negative."""
         return self._enclosed_by(self.whole.faces[self._component == k])
 
-    @cached_property
+    @property
     def of_component(self) -> IntArray:
         """(c,) int: the body of each component; -1 if it has chambers: they are the last bodies."""
-        with_chambers = self.lids.with_chambers(self.mesh)
-        in_chamber = np.isin(self._outer, with_chambers)
-        bodies = np.where(in_chamber, np.arange(len(self._outer)), self._outer)
-        bodies[with_chambers] = -1
-        plain = np.unique(bodies[bodies >= 0])
-        return np.where(bodies >= 0, np.searchsorted(plain, bodies), -1)
+        return self._numbered[0]
 
     @cached_property
     def volumes(self) -> FloatArray:
         """(b,) float: the signed volumes of the bodies."""
-        own = self.of_component
-        plain = np.bincount(own[own >= 0], self._component_volumes[own >= 0])
+        own, count = self._numbered
         points = self.whole.extended(self.mesh.vertices)
         inside = [signed_volume(points, each) for each in self.lids.chambers.inside]
-        return np.concatenate([plain, inside])
+        every = np.concatenate([self._component_volumes[own >= 0], inside])
+        numbers = np.concatenate([own[own >= 0], count + np.arange(len(inside))])
+        return np.asarray(np.bincount(numbers, every), dtype=np.float64)
+
+    @cached_property
+    def _numbered(self) -> tuple[IntArray, int]:
+        """`of_component`, and the number of bodies that are no chambers."""
+        with_chambers, bodies = self.lids.with_chambers(self.mesh), self._outer.copy()
+        bodies[with_chambers] = -1
+        cavities = np.setdiff1d(np.flatnonzero(np.isin(self._outer, with_chambers)), with_chambers)
+        around = {int(k): self._chamber_around(k) for k in cavities}
+        for k, chamber in around.items():
+            bodies[k] = k if chamber is None else -1
+        plain = np.unique(bodies[bodies >= 0])
+        own = np.where(bodies >= 0, np.searchsorted(plain, bodies), -1)
+        for k, chamber in around.items():
+            own[k] = own[k] if chamber is None else len(plain) + chamber
+        return own, len(plain)
+
+    def _chamber_around(self, component: int) -> int | None:
+        """Return the number of the chamber around a *component*; None if it is in none."""
+        points = self.whole.extended(self.mesh.vertices)
+        one = points[np.flatnonzero(self.mesh.components == component)[:1]]
+        chambers = enumerate(self.lids.chambers.inside)
+        return next((k for k, each in chambers if inside_points(one, points, each).all()), None)
 
     @property
     def cavities(self) -> IntArray:

@@ -219,6 +219,10 @@ class GaussNewton:
         other._state, other._last, other._way = _State(self._factor), None, Way()
         return other
 
+    def preserve(self, volumes: Volumes) -> None:
+        """Preserve other *volumes* from now on."""
+        self.volumes, self._last = volumes, None  # the rows of the last iterate are of the old ones
+
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
 

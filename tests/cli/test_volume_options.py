@@ -1,0 +1,96 @@
+"""--volume and --part: goals on the command line, what they print, and errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from open_meshes import combined
+
+from vtk_segdeform import models
+from vtk_segdeform.cli.main import main
+from vtk_segdeform.geometry import signed_volume
+from vtk_segdeform.io import Surface, write_mesh
+from vtk_segdeform.mesh import Mesh
+
+QUICK = ["--regions", "1", "--cage-vertices", "50"]
+
+
+@pytest.fixture(scope="module")
+def hollow() -> Mesh:
+    """Return a bar with a cavity."""
+    outer = models.bar(size=(0.4, 0.4, 1.0), divisions=(4, 4, 10))
+    inner = models.bar(size=(0.2, 0.2, 0.7), divisions=(3, 3, 7))
+    return combined(outer, inner.with_vertices(inner.vertices + [0.0, 0.0, 0.15]))
+
+
+@pytest.fixture(scope="module")
+def given(hollow, tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("hollow") / "hollow.vtp"
+    write_mesh(path, hollow)
+    return str(path)
+
+
+def volumes(mesh: Mesh, x: np.ndarray) -> tuple[float, float]:
+    """Return the volumes of the cavity and of the wall around it."""
+    is_inner = mesh.components[mesh.faces[:, 0]] == 1
+    whole = signed_volume(x, mesh.faces)
+    return abs(signed_volume(x, mesh.faces[is_inner])), whole
+
+
+def test_deform_sets_volumes_without_a_handle(hollow, given, tmp_path, capsys):
+    out = tmp_path / "out.vtp"
+    words = ["deform", given, "-o", str(out), "--volume", "cavity=-40%", "--volume", "wall = keep"]
+    assert main([*words, *QUICK]) == 0
+    x = Surface.read(out).mesh.vertices
+    before, after = volumes(hollow, hollow.vertices), volumes(hollow, x)
+    assert_allclose(np.divide(after, before), [0.6, 1.0], rtol=1e-12)
+    printed = capsys.readouterr().out
+    assert f"volume          cavity: {after[0]:.6g}, -40 % of the original" in printed
+    wall = next(line for line in printed.splitlines() if " wall: " in line)
+    assert f"wall: {after[1]:.6g}, " in wall
+    assert abs(float(wall.split(",")[1].split("%")[0])) < 1e-10
+
+
+def test_deform_sets_the_volume_of_a_part_while_a_handle_moves(hollow, given, tmp_path):
+    out = tmp_path / "out.vtp"
+    words = ["deform", given, "-o", str(out), "--fixed", "z<5%", "--handle", "z>95%"]
+    words += ["--rotate", "y,20", "--part", "tip=z>55%", "--volume", "tip=at least 10%"]
+    assert main([*words, "--volume", "whole=+5%", *QUICK]) == 0
+    x = Surface.read(out).mesh.vertices
+    assert_allclose(volumes(hollow, x)[1], 1.05 * volumes(hollow, hollow.vertices)[1], rtol=1e-12)
+    assert np.abs(x - hollow.vertices).max() > 0.05
+
+
+def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
+    out = tmp_path / "out.vtp"
+    words = ["pull", given, "-o", str(out), "--at", "0,0,1", "--to", "0.1,0,1.1"]
+    assert main([*words, "--volume", "cavity=keep", "--volume", "wall=+3%", *QUICK]) == 0
+    after = volumes(hollow, Surface.read(out).mesh.vertices)
+    before = volumes(hollow, hollow.vertices)
+    assert_allclose(np.divide(after, before), [1.0, 1.03], rtol=1e-12)
+    assert "wall: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        ([], "nothing would move: add --handle SEL with a motion, or --volume"),
+        (["--volume", "cavity"], "--volume must be a name and a value, as whole=+10%; got"),
+        (["--volume", "=keep"], "--volume must be a name and a value"),
+        (["--volume", "belly=keep"], "there is no volume 'belly'; there are whole, cavity, wall"),
+        (["--volume", "wall=much"], "the goal of the volume 'wall' must be keep"),
+        (["--volume", "wall=-100%"], "the volume of 'wall' must be positive"),
+        (["--volume", "wall=keep", "--volume", "whole=+1%"], "follows from that of 'wall'"),
+        (["--volume", "tip=keep", "--part", "tip"], "--part must be a name and a value, as tip=z"),
+        (["--volume", "tip=keep", "--part", "tip=z>200%"], "selects none of the 298 points"),
+        (["--volume", "wall=keep", "--volume", "wall=+1%"], "--volume is given twice for 'wall'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_line_and_nothing_is_written(given, tmp_path, capsys, more, says):
+    out = tmp_path / "out.vtp"
+    assert main(["deform", given, "-o", str(out), *more, *QUICK]) == 2
+    printed = capsys.readouterr()
+    assert says in printed.err
+    assert printed.err.count("\n") == 1
+    assert not out.exists()

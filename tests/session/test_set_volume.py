@@ -1,0 +1,180 @@
+"""Volumes that are set in a session: undo, files, reset, drags and finished poses."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scenes import sausage
+
+from vtk_segdeform.errors import ConstraintError, SessionError
+from vtk_segdeform.session import Session, load_session, save_session
+from vtk_segdeform.session.state import Options
+from vtk_segdeform.session.store import _LATER
+
+EXACT = 1e-12
+SCENE = sausage(2, is_coarse=True)
+pytestmark = pytest.mark.usefixtures("bound_once")
+
+
+def share(session: Session, name: str = "whole") -> float:
+    return session.volumes()[name] / session.deformer.volumes()[name]
+
+
+def turned(session: Session, degrees: float = 30.0) -> None:
+    (name,) = session.handles
+    session.drag({name: SCENE.turned(degrees)})
+    session.commit()
+
+
+def test_a_slider_is_one_undo_step_and_exact_in_every_move():
+    session = SCENE.session()
+    steps = len(session.history.labels)
+    for percent in range(99, 79, -2):
+        session.set_volume("whole", f"{percent}%", max_steps=3)
+        assert_allclose(share(session), percent / 100.0, rtol=EXACT)
+    session.commit()
+    assert len(session.history.labels) == steps + 1
+    assert "the volume of whole" in session.history.labels[-1]
+    small, rest = session.vertices.copy(), session.mesh.vertices
+    session.history.undo()
+    assert_array_equal(session.vertices, rest)
+    assert session.options.volumes == ()
+    session.history.redo()
+    assert_array_equal(session.vertices, small)
+    assert session.options.volumes == (("whole", "81%"),)
+
+
+def test_a_slider_that_is_cancelled_changes_nothing():
+    session = SCENE.session()
+    turned(session)
+    before = session.vertices.copy()
+    session.set_volume("whole", "70%")
+    session.revert()
+    assert_array_equal(session.vertices, before)
+    assert session.options.volumes == ()
+
+
+def test_a_handle_that_is_dragged_later_keeps_the_volume_that_was_set():
+    session = SCENE.session()
+    session.set_volume("whole", "+20%")
+    session.commit()
+    turned(session)
+    assert_allclose(share(session), 1.2, rtol=EXACT)
+    session.refine()
+    assert_allclose(share(session), 1.2, rtol=EXACT)
+    turned(session, 50.0)
+    assert_allclose(share(session), 1.2, rtol=EXACT)
+    session.pull(int(session.mesh.vertices[:, 1].argmax()), [0.0, 1.4, 0.1])
+    session.commit()
+    assert_allclose(share(session), 1.2, rtol=EXACT)
+    session.set_volume("whole", "keep")
+    session.commit()
+    assert_allclose(share(session), 1.0, rtol=EXACT)
+
+
+@pytest.mark.parametrize("goal", ["85%", "at most 85%", "free"])
+def test_a_volume_is_set_in_a_finished_pose(goal):
+    session = SCENE.session()
+    turned(session)
+    session.refine()
+    finished = session.vertices.copy()
+    session.set_volume("whole", goal, max_steps=5)
+    session.commit()
+    if goal != "free":
+        assert_allclose(share(session), 0.85, rtol=EXACT)
+    session.history.undo()
+    assert_array_equal(session.vertices, finished)
+    session.history.redo()
+    session.refine()
+    if goal != "free":
+        assert_allclose(share(session), 0.85, rtol=EXACT)
+
+
+def test_resetting_the_pose_forgets_the_goals_and_undo_brings_them_back():
+    session = SCENE.session()
+    session.set_volume("whole", "-15%")
+    session.commit()
+    small = session.vertices.copy()
+    session.reset_pose()
+    assert_array_equal(session.vertices, session.mesh.vertices)
+    assert session.options.volumes == ()
+    session.history.undo()
+    assert_array_equal(session.vertices, small)
+    assert session.options.volumes == (("whole", "-15%"),)
+
+
+def test_a_session_is_saved_with_its_goals_and_continues_alike(tmp_path):
+    session = SCENE.session()
+    session.set_volume("whole", "-15%")
+    session.set_volume("region 0", "at least 0.1")
+    session.commit()
+    turned(session)
+    save_session(tmp_path / "a.segdeform", session)
+    again = load_session(tmp_path / "a.segdeform")
+    assert again.options == session.options
+    assert again.options.volumes == (("whole", "-15%"), ("region 0", "at least 0.1"))
+    assert_array_equal(again.vertices, session.vertices)
+    for each in (session, again):
+        turned(each, 50.0)
+    assert_allclose(again.vertices, session.vertices, atol=1e-5)  # one has an accelerated start
+    assert_allclose(share(again), 0.85, rtol=EXACT)
+
+
+def test_a_file_of_an_earlier_version_has_no_goals(tmp_path):
+    """Options at their defaults are not in a file, so that earlier programs read it."""
+    session = SCENE.session()
+    turned(session)
+    path = tmp_path / "a.segdeform"
+    save_session(path, session)
+    with zipfile.ZipFile(path) as archive:
+        name = next(each for each in archive.namelist() if each.endswith("header.json"))
+        header = json.loads(archive.read(name))
+    assert not {*_LATER} & {*header["options"]}
+    assert header["version"] == 1
+    assert load_session(path).options.volumes == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "goal", "says"),
+    [
+        ("belly", "keep", "there is no volume 'belly'"), ("whole", "much", "must be keep"),
+        ("whole", -1.0, "must be positive"), ("whole", None, "must be keep"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_refused_and_changes_nothing(name, goal, says):
+    session = SCENE.session()
+    turned(session)
+    before, steps = session.vertices.copy(), session.history.labels
+    with pytest.raises((SessionError, ConstraintError), match=says):
+        session.set_volume(name, goal)
+    assert_array_equal(session.vertices, before)
+    assert session.history.labels == steps
+    assert session.options.volumes == ()
+    assert not session.is_dragging
+
+
+@pytest.mark.parametrize("volumes", ["whole", {"whole": "much"}, {1: "keep"}, [("whole",)], 3])
+def test_options_take_goals_only(volumes):
+    with pytest.raises(SessionError, match="volumes must be goals by name"):
+        Options(volumes=volumes)
+
+
+def test_options_with_goals_are_hashable_and_a_copy():
+    goals = {"whole": "90%"}
+    options = Options(volumes=goals)
+    goals["whole"] = "50%"
+    assert options == Options(volumes=(("whole", "90%"),))
+    assert len({options, Options(volumes={"whole": "90%"})}) == 1
+
+
+def test_a_pull_after_goals_were_given_as_options_starts_from_these_volumes():
+    session = SCENE.session()
+    session.change_options(volumes={"whole": "+20%"})
+    top = int(session.mesh.vertices[:, 1].argmax())
+    solution = session.pull(top, session.mesh.vertices[top] + [0.0, 0.3, 0.0])
+    session.commit()
+    assert solution.handle_error < 1e-3
+    assert_allclose(share(session), 1.2, rtol=EXACT)
