@@ -239,7 +239,7 @@ def test_a_bound_holds_in_the_finish_that_would_pass_it():
     bound = f"at {'most' if after > before else 'least'} {between}"
     deformer = held(hollow(), volumes={"wall": bound})
     solution = deformer.solve(pulled(deformer, 60.0))
-    assert_allclose(solution.vertices, poses[0], atol=1e-5)
+    assert_allclose(solution.vertices, poses[0], atol=1e-4)  # both have converged
     finished = deformer.finish(solution)
     assert finished.is_finished
     assert finished.volume_error < EXACT

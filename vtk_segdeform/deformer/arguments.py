@@ -95,7 +95,10 @@ def checked_constraints(
 def checked_parts(mesh: Mesh, parts: Mapping[str, ArrayLike] | None) -> Mapping[str, BoolArray]:
     """Return the masks (n,) of *parts*, by name; ConstraintError if one is no set of vertices."""
     found = {}
-    for name, vertices in ({} if parts is None else parts).items():
+    given = {} if parts is None else parts
+    if not isinstance(given, Mapping) or not all(isinstance(name, str) for name in given):
+        raise ConstraintError(f"parts must be vertices by name; got {shown(parts)}")
+    for name, vertices in given.items():
         try:
             ids = as_ids(vertices, mesh.n_vertices, f"parts[{name!r}]")
         except ValueError as fault:

@@ -38,7 +38,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, is_number, largest_length
 from ..cages import Cage
-from ..checks import all_of, as_callable, as_flag, as_path, require, shown
+from ..checks import all_of, as_callable, as_flag, as_path, as_text, require, shown
 from ..errors import ArgumentError, ConstraintError
 from ..geometry import turned_over
 from ..kernels import compiled_kernels, load_for, one_blas_thread
@@ -405,7 +405,9 @@ class Deformer:
         ConstraintError
             If there is no volume called *name*.
         """
-        rest = self.mesh.vertices
+        rest, known = self.mesh.vertices, self.volume_names
+        if as_text(name, "name") not in known:
+            raise ConstraintError(f"name must be one of {', '.join(known)}; got {shown(name)}")
         x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
         x = self._problem.frame.about_origin(x)
         return self._enclosed.volume(name, x, self._options.parts)

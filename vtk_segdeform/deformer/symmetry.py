@@ -146,9 +146,9 @@ def _given(symmetry: object) -> tuple[FloatArray, FloatArray]:
     """Return the point and the normal of a plane that is given as both."""
     try:
         point, normal = (np.array(each, dtype=np.float64) for each in symmetry)  # type: ignore[attr-defined]
+        length = float(np.linalg.norm(normal))
     except (TypeError, ValueError):
-        point = normal = np.zeros(0)
-    length = float(np.linalg.norm(normal))
+        point, normal, length = np.zeros(0), np.zeros(0), 0.0
     if point.shape != (3,) or normal.shape != (3,) or not (0.0 < length < np.inf):
         raise ConstraintError(
             f"symmetry must be 'x', 'y', 'z', 'auto', or a point and a normal of the plane; "

@@ -18,6 +18,7 @@ import numpy as np
 import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
+from ..checks import all_of
 from ..errors import ArgumentError
 from ..geometry import closest_rotations
 from .polygons import cells_of, polygons_of
@@ -38,7 +39,8 @@ def follow(
     ArgumentError
         If there is no such array.
     """
-    names = {**dict.fromkeys(turn, True), **dict.fromkeys(push, False)}
+    turned, pushed = all_of(turn, str, "turn"), all_of(push, str, "push")
+    names = {**dict.fromkeys(turned, True), **dict.fromkeys(pushed, False)}
     if not names:
         return
     change = _Change.of(rest, np.asarray(moved.points, dtype=np.float64))
@@ -49,7 +51,8 @@ def follow(
             if name in data and data[name].shape[1:] in ((3,), (6,), (9,))
         ]
         if not places:
-            raise ArgumentError(f"there is no array {name!r} of vectors or tensors")
+            option = "turn" if turns else "push"
+            raise ArgumentError(f"{option}: there is no array {name!r} of vectors or tensors")
         for of_points, data in places:
             by = change.at_points if of_points else change.at_cells
             gradients = closest_rotations(np.swapaxes(by, 1, 2)) if turns else by

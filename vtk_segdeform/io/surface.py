@@ -20,7 +20,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, plain
-from ..checks import Described, require
+from ..checks import Described, as_text, require
 from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
 from .convert import as_polydata, read_polydata, write_mesh
@@ -215,7 +215,9 @@ class Surface(Described):
         moved = self._moving.at(self._soup.moved(x))
         follow(moved, self._given, turn=turn, push=push)
         if displacement is not None:
-            moved.point_data[displacement] = moved.points - np.asarray(self._given.points)
+            moved.point_data[as_text(displacement, "displacement")] = moved.points - np.asarray(
+                self._given.points
+            )
         return moved
 
     def write(self, path: str | Path, vertices: ArrayLike, **fields: Any) -> None:

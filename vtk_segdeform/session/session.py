@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, is_whole, plain
 from ..cages import Cage
-from ..checks import Described, require, require_sequence, shown
+from ..checks import Described, as_text, require, require_sequence, shown
 from ..deformer import (
     Deformer,
     Slide,
@@ -645,6 +645,7 @@ class Session(Described):
 
     def forget_volume(self, name: str) -> None:
         """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
+        as_text(name, "name")
         goals = {own: goal for own, goal in self.options.volumes if own != name}
         options = replace(self.options, volumes=tuple(goals.items()))
         self.history.step(f"forget the volume of {name}", replace(self.state, options=options))
@@ -666,6 +667,7 @@ class Session(Described):
         SessionError, ConstraintError
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
+        as_text(name, "name")
         state = self._released(self.state)
         goals = {**dict(state.options.volumes), name: goal}
         options = replace(state.options, volumes=tuple(goals.items()))

@@ -121,7 +121,8 @@ class Options:
         object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
-        if self.symmetry not in (None, "x", "y", "z", "auto"):
+        is_axis = isinstance(self.symmetry, str) and self.symmetry in ("x", "y", "z", "auto")
+        if not (self.symmetry is None or is_axis):
             raise SessionError(
                 f"symmetry must be x, y, z, auto or None; got {shown(self.symmetry)}"
             )
