@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import importlib
 import os
 import sys
 from collections.abc import Iterator
@@ -98,7 +99,9 @@ def _compiled_kernels() -> Iterator[None]:
 
     wait_until_compiled()
     yield
-    if made := sys.modules.get("vtk_segdeform.kernels.compiled.kernels"):
+    name = "vtk_segdeform.kernels.compiled.kernels"
+    if name in sys.modules:
+        made = importlib.import_module(name)  # waits for a thread that is loading it
         for kernel, combinations in made.KERNELS:
             others = set(kernel.signatures) - set(combinations)
             assert not others, f"{kernel.__name__} is not compiled in advance for {others}"

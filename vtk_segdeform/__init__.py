@@ -52,7 +52,7 @@ if _TYPE_CHECKING:
         widgets,
     )
     from .cages import Cage, fit_cages, mean_value_coordinates
-    from .deformer import Deformer, deform, pull
+    from .deformer import Deformer, Slide, deform, pull
     from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
@@ -72,6 +72,7 @@ _MODULE_OF = {
     "Mesh": "mesh",
     "Options": "session",
     "Regions": "regions",
+    "Slide": "deformer",
     "Session": "session",
     "Solution": "solver",
     "Status": "solver",
@@ -105,6 +106,7 @@ __all__ = [
     "Options",
     "Regions",
     "Session",
+    "Slide",
     "Solution",
     "Status",
     "Surface",

@@ -17,7 +17,7 @@ from __future__ import annotations
 import logging
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, overload
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 import numpy as np
 import pyvista as pv
@@ -51,6 +51,7 @@ class Removable(Protocol):
 
 
 _Path = str | os.PathLike[str] | None
+_SameType = TypeVar("_SameType", Mesh, Session)
 _log = logging.getLogger(__name__)
 
 _HANDLE_MET = 1e-3  # of the diagonal
@@ -58,22 +59,13 @@ _HANDLE_MET = 1e-3  # of the diagonal
 
 @overload
 def edit(
-    mesh: Mesh,
+    mesh: _SameType,
     *,
     path: _Path = None,
     title: str = ...,
     keys: KeyChoice = ...,
     progress: Progress | None = ...,
-) -> Mesh: ...
-@overload
-def edit(
-    mesh: Session,
-    *,
-    path: _Path = None,
-    title: str = ...,
-    keys: KeyChoice = ...,
-    progress: Progress | None = ...,
-) -> Session: ...
+) -> _SameType: ...
 @overload
 def edit(
     mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface,

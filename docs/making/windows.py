@@ -22,7 +22,7 @@ from making.made import DOCS, EXAMPLES
 from making.scene import PIVOT
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.app import Window
-from vtk_segdeform.widgets.editor import toggle_cages, toggle_overlay
+from vtk_segdeform.widgets.editor import actions
 
 PAUSE = 1500  # milliseconds, for layout and drawing
 
@@ -72,8 +72,8 @@ def story(window: Any, editor_of: Callable[[], DeformEditor | None], name: str) 
     editor.mode = Mode.DEFORM
     yield editor.is_busy
     if name == "app.png":
-        editor.do(toggle_cages)
-    editor.do(toggle_overlay)
+        editor.do(actions.toggle_cages)
+    editor.do(actions.toggle_overlay)
     while editor.is_busy:
         yield True
     yield False

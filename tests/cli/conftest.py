@@ -21,7 +21,8 @@ def computed_once(fitted_once: Any, bound_once: None) -> Iterator[None]:
         return fitted(patch, n, offset, None)
 
     def segment_once(mesh: Any, n_regions: Any = None, **options: Any) -> Any:
-        key = mesh.vertices.tobytes(), mesh.faces.tobytes(), n_regions
+        follows = {name: each for name, each in options.items() if name != "progress"}
+        key = mesh.vertices.tobytes(), mesh.faces.tobytes(), n_regions, repr(follows)
         if key not in known:
             known[key] = segment(mesh, n_regions, **options)
         return known[key]

@@ -87,7 +87,7 @@ def test_at_the_press_the_objective_of_a_local_deformer_is_at_rest():
     ("follows", "free"), [(0.0, range(6, 11)), (0.1, range(6, 11)), (0.5, range(6, 12))]
 )
 def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows, free):
-    weights = np.diag(chain().quadratic(SurfacePoint.at_vertex(8), 2.0, follows)) * 12
+    weights = np.diag(chain().quadratic([SurfacePoint.at_vertex(8)], 2.0, follows)) * 12
     assert set(np.flatnonzero(weights == 0.0)) == set(free)
     assert weights[:6] == pytest.approx((np.arange(8, 2, -1) ** 2 / 4.0 - 1.0) ** 2)
 
@@ -97,9 +97,9 @@ def test_another_body_stays():
     edges = samples.edges.tolil()
     edges[3, 4] = edges[4, 3] = 0.0
     apart = replace(samples, edges=edges.tocsr())
-    weights = np.diag(apart.quadratic(SurfacePoint.at_vertex(8), 3.0, 1.0)) * 12
+    weights = np.diag(apart.quadratic([SurfacePoint.at_vertex(8)], 3.0, 1.0)) * 12
     assert (weights[:4] > 1e3).all()
-    assert not np.diag(apart.quadratic(SurfacePoint.at_vertex(8), np.inf, 0.0)).any()
+    assert not np.diag(apart.quadratic([SurfacePoint.at_vertex(8)], np.inf, 0.0)).any()
 
 
 def test_what_shares_a_region_with_the_pulled_part_comes_along_and_other_bodies_stay():
@@ -430,10 +430,10 @@ def bends(x, faces):
 def test_weights_grow_with_the_distance_to_the_largest_one():
     samples, away = chain(25), np.arange(25.0)
     for reach in (1.0, 2.5):
-        weights = samples.weights(SurfacePoint.at_vertex(0), reach, 0.0)
+        weights = samples.weights([SurfacePoint.at_vertex(0)], reach, 0.0)
         expected = np.minimum(np.maximum((away / reach) ** 2 - 1.0, 0.0) ** 2, 1e4)
         assert_allclose(weights, expected)
-    assert samples.weights(SurfacePoint.at_vertex(0), np.inf, 0.0).tolist() == [0.0] * 25
+    assert samples.weights([SurfacePoint.at_vertex(0)], np.inf, 0.0).tolist() == [0.0] * 25
 
 
 def test_a_point_of_an_edge_is_as_far_as_its_nearer_corner():
@@ -569,11 +569,11 @@ def test_parts_beyond_the_reach_follow_by_their_area():
     samples = chain(12)
     point = SurfacePoint.at_vertex(8)
     for follows, count in ((0.28, 0), (0.29, 2)):
-        weights = samples.weights(point, 1.0, follows)
+        weights = samples.weights([point], 1.0, follows)
         assert np.count_nonzero(weights[:7]) == 7
         assert np.count_nonzero(weights[10:]) == 2 - count
     large = replace(samples, areas=np.where(np.arange(12) > 9, 10.0, 1.0) / 30.0)
-    weights = large.weights(point, 1.0, 0.9)
+    weights = large.weights([point], 1.0, 0.9)
     assert not weights[:7].any()
     assert weights[10:].all()
 

@@ -324,13 +324,23 @@ def test_the_lines_of_a_coarse_surface_are_edges_and_straight_ways_over_two_tria
     np.testing.assert_allclose(surface.contact.toarray(), np.pi / 4 * borders_of, atol=1e-12)
 
 
-def test_a_tenth_of_the_area_of_the_largest_component_is_a_region():
+def test_a_component_has_a_region_of_its_own_unless_it_follows_another():
     ball, faces = icosphere(3)
     n = len(ball)
-    for radius, expected in ((0.7, 2), (0.02, 1)):
-        both = np.concatenate([ball, radius * ball + [1.02 + radius, 0, 0]])
+    for radius, gap, given, expected in (
+        (0.7, 0.3, {}, 2),
+        (0.7, 0.02, {}, 1),
+        (0.7, 0.02, {"held": [0, n]}, 2),
+        (0.7, 0.02, {"held": [0]}, 1),
+        (0.7, 0.02, {"attach": {1: "free"}}, 2),
+        (0.7, 0.3, {"attach": {1: 0}, "held": [n]}, 1),
+        (0.02, 0.02, {}, 1),
+    ):
+        both = np.concatenate([ball, radius * ball + [1.0 + gap + radius, 0, 0]])
         mesh = Mesh(both, np.concatenate([faces, faces + n]))
-        assert segment(mesh).n_regions == expected
+        regions = segment(mesh, **given)
+        assert regions.n_regions == expected
+        assert (regions.carrier is None) == (expected == 2)
 
 
 def test_pieces_of_a_part_join_the_part_of_the_nearest_vertex():

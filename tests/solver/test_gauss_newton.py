@@ -73,6 +73,8 @@ class Limit:
     def __init__(self, longest):
         self.longest = longest
 
+    is_always_active = False
+
     def value_and_slope(self, p, x=None):
         return 0.0, np.zeros_like(p)
 

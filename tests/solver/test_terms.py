@@ -24,6 +24,8 @@ class Wall:
     reach: float
     weight: float = 1e-3
 
+    is_always_active = False
+
     def value_and_slope(self, p, x=None):
         gap = self.row @ p[:, 2] - self.height
         if gap >= self.reach:

@@ -115,7 +115,7 @@ class AppHand:
             until(lambda: not self.window.editor.is_busy, "the job")
             dragger = self.window.editor.widgets.dragger
             until(lambda: not dragger.is_refining, "refinement")
-        until(lambda: self.window.autosaver.is_idle, "the autosave")
+            until(lambda: self.window.autosaver.is_idle, "the autosave")
 
     def click(self, button):
         assert button.isVisible()

@@ -24,7 +24,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
 from hands import Hand, OneTimerHost, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
 from soaking import session_of, slender
@@ -428,10 +427,10 @@ class SeldomDrawn(View):
 
 
 class HandStand(Stand):
-    """In a host with a single timer fired by hand: `plain_view`, or an off-screen plotter."""
+    """In a host with a single timer fired by hand."""
 
-    def __init__(self, view: View, folder: Path, close=lambda: None):
-        self._host, self._close = OneTimerHost(view.interactor), close
+    def __init__(self, view: View, folder: Path):
+        self._host = OneTimerHost(view.interactor)
         session, view = ready(), SeldomDrawn(view.renderer, view.interactor)
         editor = DeformEditor(view, session)
         aim(view)
@@ -452,7 +451,6 @@ class HandStand(Stand):
     def close(self):
         self.editor.remove()
         assert not self._host.is_running
-        self._close()
 
 
 def ready() -> Session:
@@ -476,10 +474,3 @@ def aim(view: View) -> None:
 def plain_stand(folder: Path) -> HandStand:
     """Return an editor in a window of VTK alone."""
     return HandStand(plain_view(SIZE), folder)
-
-
-def pyvista_stand(folder: Path) -> HandStand:
-    """Return an editor in a plotter."""
-    plotter = pv.Plotter(off_screen=True, window_size=SIZE)
-    plotter.show(auto_close=False, interactive=False)
-    return HandStand(View.of(plotter), folder, plotter.close)

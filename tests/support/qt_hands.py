@@ -42,7 +42,16 @@ _SPECIAL = {"bracketleft": Qt.Key_BracketLeft, "bracketright": Qt.Key_BracketRig
 
 @functools.cache
 def application():
-    """Return the Qt application of the process, on a private screen."""
+    """Return the Qt application of the process, on a private screen.
+
+    Closing the last window of a test does not end it: that would close the windows of later tests.
+    """
+    app = _application()
+    app.setQuitOnLastWindowClosed(False)
+    return app
+
+
+def _application():
     if ONE_SCREEN in os.environ:
         os.environ.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
         os.environ.update(DISPLAY=new_screen(), QT_QPA_PLATFORM="xcb")

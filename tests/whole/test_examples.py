@@ -16,6 +16,10 @@ from vtk_segdeform.pictures.canvas import require_offscreen
 pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RIGHT = {
+    "an_arm_in_a_sleeve": lambda names: (
+        not len(names["solutions"]["follow"].crossings())
+        and len(names["solutions"]["free"].crossings()) > 100
+    ),
     "a_pull": lambda names: (
         abs(names["solution"].volume_change) < 1e-12 and names["solution"].handle_error < 1e-3
     ),

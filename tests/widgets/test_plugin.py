@@ -7,7 +7,6 @@ import functools
 import importlib
 import logging
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -187,18 +186,6 @@ def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, b
     editor.session.segment(2)  # no longer shown
 
 
-@pytest.mark.campaign  # as in the window of `edit`, below
-def test_a_handle_is_dragged_in_a_plotter_by_hand(plotter, session):
-    editor = plotter.segdeform.edit(session)
-    plotter.show(auto_close=False, interactive=False)
-    hand = Hand(editor.view)
-    pull(hand, editor)
-    assert editor.session is session
-    assert not hand.failures
-    assert abs(session.volume_change) < 1e-12
-    assert session.history.undo_label == "drag handle 1"
-
-
 # Registration.
 
 
@@ -209,37 +196,6 @@ def test_pyvista_finds_the_plugin_by_its_entry_points():
         name, module = parser["options.entry_points"][group].strip().split(" = ")
         assert name == "segdeform"
         assert importlib.import_module(module) is plugin
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize(
-    ("imports", "there"),
-    [
-        pytest.param("import pyvista, vtk_segdeform", [True, True], marks=pytest.mark.campaign),
-        (
-            "import sys, vtk_segdeform; assert 'pyvista' not in sys.modules;"
-            "import vtk_segdeform.cli.commands, vtk_segdeform.widgets.editor;"
-            "assert 'pyvista.plotting' not in sys.modules;"
-            "import pyvista, vtk_segdeform.widgets.plugin",
-            [True, True],
-        ),
-        pytest.param(
-            "import vtk_segdeform; vtk_segdeform.edit; import pyvista",
-            [True, True],
-            marks=pytest.mark.campaign,
-        ),
-    ],
-)
-def test_it_is_registered_in_any_order_and_nothing_else_loads_pyvistas_plotters(imports, there):
-    """The package alone does not load pyvista, commands and the editor only its meshes."""
-    code = (
-        f"{imports}; import pyvista.plotting as p; "
-        "print([hasattr(c, 'segdeform') for c in (pyvista.BasePlotter, pyvista.PolyData)])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=ROOT, capture_output=True, text=True
-    )
-    assert (done.stdout.strip(), done.stderr) == (str(there), "")
 
 
 # The window of `edit`.
@@ -427,13 +383,6 @@ def test_off_screen_the_command_says_that_nothing_can_be_edited(tmp_path, bar, c
     convert.write_mesh(path, bar)
     assert main(["edit", str(path)]) == 1
     assert "pyvista renders off-screen" in capsys.readouterr().err
-
-
-def test_the_command_explains_itself(capsys):
-    assert main(["edit", "--help"]) == 0
-    text = capsys.readouterr().out
-    assert "in a window" in text
-    assert "-o OUT" in text
 
 
 def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, checked_goals, clamped, finished, solved_along
+from ..deformer import Deformer, Slide, checked_goals, clamped, finished, solved_along
 from ..errors import ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -29,6 +30,7 @@ from ..session import Session, load_session
 from . import motion
 from .outputs import (
     HANDLE_TOLERANCE,
+    LIDS,
     Say,
     coloured_cages,
     coloured_regions,
@@ -45,7 +47,6 @@ from .selection import Role, parse_selection
 from .turns import turns_off
 
 SESSION = ".segdeform"  # suffix of session files
-LIDS = {"auto": None, "on": True, "off": False}  # values of --lids
 
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -62,10 +63,11 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     fixed = np.zeros(0, dtype=np.int64)
     if options.fixed is not None:
         fixed = _selected(options.fixed, surface, "fixed")
-    volumes = volume_settings(options, surface)
+    constraints = constraints_of(options, surface)
     has_goals = bool(options.volume)
     handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
-    found = _regions(options, surface, part(progress, 0.0, 0.18))
+    held = np.union1d(fixed, handle)
+    found = _regions(options, surface, part(progress, 0.0, 0.18), held)
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[fixed] = True
@@ -77,14 +79,14 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options), **volumes,
+        **_settings(options), **constraints,
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options.output, LIDS[options.lids])
+    stored = written(surface, solution, options)
     report_solution(stored, seconds, say)
     report_goals(stored, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
@@ -163,8 +165,12 @@ def opened(path: Path) -> Session:
     return load_session(path) if path.suffix == SESSION else Session(Surface.read(path))
 
 
-def _regions(options: Namespace, surface: Surface, progress: Progress | None) -> Regions:
+def _regions(
+    options: Namespace, surface: Surface, progress: Progress | None, held: ArrayLike = ()
+) -> Regions:
     wanted, arrays = options.regions, surface.given.point_data
+    if options.attach and (wanted in arrays or wanted == "1"):
+        raise ConstraintError("--attach is for automatic regions only; leave it or --regions out")
     if wanted in arrays:
         labels = surface.at_vertices(np.asarray(arrays[wanted]))
         rings = {} if options.overlap is None else {"overlap": options.overlap}
@@ -179,7 +185,8 @@ def _regions(options: Namespace, surface: Surface, progress: Progress | None) ->
             f"({', '.join(arrays.keys()) or 'it has none'}); got {wanted!r}"
         )
     number = None if wanted == "auto" else int(wanted)
-    return segment(surface.mesh, n_regions=number, progress=progress)
+    attach = dict(options.attach)
+    return segment(surface.mesh, number, attach=attach, held=held, progress=progress)
 
 
 def _size(options: Namespace, found: Regions) -> int:
@@ -214,14 +221,46 @@ def _settings(options: Namespace) -> dict[str, Any]:
     return settings
 
 
-def volume_settings(options: Namespace, surface: Surface) -> dict[str, Any]:
-    """Return the goals of ``--volume`` and the parts of ``--part``, as `Deformer` takes them."""
+def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
+    """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
     return {
         "volumes": goals or None,
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
+        "stiffness": _stiffness(options, surface),
+        "slides": [_slide(text, surface) for text in options.slide],
+        "symmetry": options.symmetry,
     }
+
+
+def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:
+    """Return the stiffness (n,) of the vertices; None if it is the same everywhere."""
+    if not (options.stiffness or options.rigid):
+        return None
+    stiffness = np.ones(surface.mesh.n_vertices)
+    for text in options.stiffness:
+        selection, _, times = text.rpartition("=")
+        try:
+            value = float(times)
+        except ValueError:
+            value = math.nan
+        if not (selection and value > 0.0):
+            raise ConstraintError(
+                f"--stiffness must be a selection and how many times stiffer it is, as z>80%=5; "
+                f"got {text!r}"
+            )
+        stiffness[_selected(selection, surface, "handle")] = value
+    for text in options.rigid:
+        stiffness[_selected(text, surface, "handle")] = math.inf
+    return stiffness
+
+
+def _slide(text: str, surface: Surface) -> Slide:
+    selection, colon, along = text.rpartition(":")
+    if not colon or along not in ("plane", "line", "surface"):
+        selection, along = text, "plane"
+    return Slide(_selected(selection, surface, "handle"), along)
 
 
 def _named(option: str, texts: list[str]) -> dict[str, str]:

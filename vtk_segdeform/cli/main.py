@@ -367,6 +367,7 @@ def _output_folder(parser: argparse.ArgumentParser, name: str) -> None:
 def _regions(parser: argparse.ArgumentParser) -> None:
     text = "number of regions, 'auto', or a point array of region numbers (default: auto)"
     parser.add_argument("--regions", default="auto", metavar="N", help=text)
+    _attach(parser)
     text = "overlap of regions from a point array, in edge rings (default: 4)"
     parser.add_argument("--overlap", type=_count, metavar="RINGS", help=text)
 
@@ -395,7 +396,8 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     add("--regions", type=_count, default=None, metavar="N", help=text)
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
-    _volumes(parser)
+    _attach(parser)
+    _constraints(parser)
     _contact_and_lids(parser)
     _refine(parser, "with --avoid-contact")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
@@ -418,7 +420,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
         handle.add_argument(f"--{name}", action=_HandleOption, metavar=metavar, help=text)
     parser.set_defaults(handles=[])
     add("--no-volume", action="store_true", help="do not preserve the volume")
-    _volumes(parser)
+    _constraints(parser)
     _contact_and_lids(parser)
     text = "stretch resistance relative to detail preservation (default: 1)"
     add("--stretch", type=float, default=None, metavar="S", help=text)
@@ -428,7 +430,7 @@ def _handles(parser: argparse.ArgumentParser) -> None:
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
 
 
-def _volumes(parser: argparse.ArgumentParser) -> None:
+def _constraints(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     text = (
         "a volume: keep, free, 2.5 (in the mesh's unit, cubed), 40%%, +10%% or -40%%, also after "
@@ -438,6 +440,23 @@ def _volumes(parser: argparse.ArgumentParser) -> None:
     add("--volume", action="append", default=[], metavar="NAME=GOAL", help=text)
     text = "a part of the surface, whose volume is that under a lid; may be repeated"
     add("--part", action="append", default=[], metavar="NAME=SEL", help=text)
+    text = "points that move as one body, as bones and buttons; may be repeated"
+    add("--rigid", action="append", default=[], metavar="SEL", help=text)
+    text = "points that are so many times stiffer than others; may be repeated"
+    add("--stiffness", action="append", default=[], metavar="SEL=TIMES", help=text)
+    text = (
+        "points that move along a plane only, the nearest to them; with :line or :surface after "
+        "SEL along a line, or along the surface; may be repeated"
+    )
+    add("--slide", action="append", default=[], metavar="SEL", help=text)
+    text = "mirror motions about a plane with this normal, whose place is found, or auto"
+    add("--symmetry", choices=("x", "y", "z", "auto"), default=None, help=text)
+    text = "an array of vectors or tensors that turns with the surface; may be repeated"
+    add("--turn", action="append", default=[], metavar="ARRAY", help=text)
+    text = "the same, pushed forward with the surface: lengths change; may be repeated"
+    add("--push", action="append", default=[], metavar="ARRAY", help=text)
+    text = "add a point array of this name: how far each point has moved"
+    add("--displacement", default=None, metavar="NAME", help=text)
 
 
 def _contact_and_lids(parser: argparse.ArgumentParser) -> None:
@@ -451,6 +470,23 @@ def _refine(parser: argparse.ArgumentParser, default: str) -> None:
     text = f"finish the pose on the mesh itself: less distorted, handles exact (default: {default})"
     action = argparse.BooleanOptionalAction
     parser.add_argument("--refine", action=action, default=None, help=text)
+
+
+def _attach(parser: argparse.ArgumentParser) -> None:
+    text = (
+        "let component A follow component B, numbered from 0; A=free: none; may be repeated "
+        "(default: a component without fixed or handle points follows one that it lies against)"
+    )
+    parser.add_argument(
+        "--attach", type=_attachment, action="append", default=[], metavar="A=B", help=text
+    )
+
+
+def _attachment(text: str) -> tuple[int, int | str]:
+    one, is_given, other = text.partition("=")
+    if not (one.isdecimal() and is_given and (other.isdecimal() or other == "free")):
+        raise argparse.ArgumentTypeError(f"must be A=B or A=free; got {text!r}")
+    return int(one), other if other == "free" else int(other)
 
 
 def _count(text: str) -> int:

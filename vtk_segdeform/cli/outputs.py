@@ -7,6 +7,7 @@ some of them to single precision.
 from __future__ import annotations
 
 import logging
+from argparse import Namespace
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -90,15 +91,22 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
         say(f"parts           {solution.unmoved_summary(mesh)}")
 
 
-def written(surface: Surface, solution: Solution, path: Path, lids: bool | None) -> Solution:
-    """Write *surface* in a pose, and return the pose as it is in the file.
+def written(surface: Surface, solution: Solution, options: Namespace) -> Solution:
+    """Write *surface* in a pose, and return the pose as it is in the file of *options*.
 
     Raises
     ------
     MeshError
         If the file cannot be written, or not be read again.
     """
-    surface.write(path, solution.vertices)
+    path, lids = options.output, LIDS[options.lids]
+    surface.write(
+        path,
+        solution.vertices,
+        turn=options.turn,
+        push=options.push,
+        displacement=options.displacement,
+    )
     with _without_warnings():
         x = stored_vertices(surface, solution.vertices, path)
     if np.array_equal(x, solution.vertices):
@@ -117,6 +125,10 @@ def _without_warnings() -> Iterator[None]:
         yield
     finally:
         logger.setLevel(level)
+
+
+LIDS = {"auto": None, "on": True, "off": False}
+"""The values of ``--lids``."""
 
 
 def report_volume(change: float, say: Say) -> None:

@@ -15,10 +15,11 @@ from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
-from .commands import LIDS, volume_settings
+from .commands import constraints_of
 from .motion import parse_vector
 from .outputs import (
     HANDLE_TOLERANCE,
+    LIDS,
     Say,
     report_goals,
     report_pose,
@@ -54,13 +55,14 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         lids=lids,
-        **volume_settings(options, surface),
+        **constraints_of(options, surface),
         avoid_contact=options.avoid_contact,
+        attach=dict(options.attach),
         refine=options.refine,
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options.output, lids)
+    stored = written(surface, solution, options)
     report_volume(stored.volume_change, say)
     report_goals(stored, say)
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")

@@ -5,6 +5,9 @@ The files, in reading order:
     deformer         `Deformer`: targets in, `Solution` out
     problem          the mesh, its cages and its energy, made once
     enclosed_volume  the volume under its lids, and what of it is preserved
+    slides           vertices that slide along a plane, a line or a surface
+    stiffness        stiff and rigid parts
+    symmetry         motions that are mirrored about a plane
     volume_goals     goals for volumes, as texts
     growth           the shape that has the volumes that are set
     constraints      fixed vertices, handles and volumes, made once for a set of them
@@ -42,8 +45,11 @@ from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
+from .finishing import on_volumes
 from .problem import Problem
 from .pull import pull
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
 from .volume_goals import Goals, checked_goals
 
 __all__ = [
@@ -55,6 +61,8 @@ __all__ = [
     "PaperDeformer",
     "PaperSolution",
     "Problem",
+    "Slide",
+    "Stiffness",
     "automatic_locality",
     "checked_constraints",
     "checked_goals",
@@ -62,12 +70,14 @@ __all__ = [
     "checked_place",
     "checked_point",
     "checked_radius",
+    "checked_slides",
     "checked_targets",
     "checked_vertex",
     "clamped",
     "deform",
     "fault_of_grab",
     "finished",
+    "on_volumes",
     "place_text",
     "pull",
     "reach_and_follows",

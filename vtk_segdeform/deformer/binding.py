@@ -34,7 +34,8 @@ from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
 from ..solver import CoarseVolume
-from ..subspace import cage_subspace
+from ..subspace import Subspace, cage_subspace
+from .stiffness import Stiffness
 
 _FORMAT = 15  # increment whenever the content of a binding changes
 
@@ -57,6 +58,8 @@ class BindingInputs:
         See `energy.shape_energy`.
     n_clusters : int
         Number of rotation clusters.
+    stiffness : Stiffness, optional
+        Where the surface is stiffer than elsewhere.
     """
 
     rest: Mesh
@@ -65,6 +68,7 @@ class BindingInputs:
     rest_cages: FloatArray
     stretch: float
     n_clusters: int
+    stiffness: Stiffness | None = None
 
     @property
     def parts(self) -> IntArray:
@@ -101,6 +105,9 @@ class BindingInputs:
         seen = hashlib.blake2b(digest_size=20)
         seen.update(repr((_FORMAT, self.stretch, self.n_clusters, regions.smoothness)).encode())
         arrays = [regions.mesh.vertices, regions.mesh.faces, regions.membership]
+        arrays += [] if regions.carrier is None else [regions.carrier]
+        if self.stiffness is not None:
+            arrays += [self.stiffness.factors, *self.stiffness.rigid]
         for array in [*arrays, *(a for cage in self.cages for a in (cage.vertices, cage.faces))]:
             seen.update(repr((array.shape, array.dtype.str)).encode())
             seen.update(np.ascontiguousarray(array).view(np.uint8).data)
@@ -112,40 +119,65 @@ class Binding:
     """The subspace, energy and volumes with which a `Deformer` solves."""
 
     energy: Energy
-    coarse_volume: CoarseVolume
     interior: FloatArray  # (k,): the weights of the points inside the body
+    coarse_volume: CoarseVolume
 
     @classmethod
     def compute(cls, inputs: BindingInputs, progress: Progress | None = None) -> Binding:
         """Return the binding of *inputs*."""
         tell(progress, 0.0, "checking cages")
-        rest, regions, cages = inputs.rest, inputs.regions, inputs.cages
+        regions, cages = inputs.regions, inputs.cages
         share = part(progress, 0.0, 0.38)  # shares of the time for 5,000 to 300,000 vertices
         subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
-        clusters = inputs.clusters
-        share = part(progress, 0.4, 0.9)
-        energy = shape_energy(rest, subspace, inputs.stretch, clusters, progress=share)
-        faces = [cage.faces for cage in cages]
-        energy = with_cage_stiffness(energy, inputs.rest_cages, faces, clusters)
-        gradients, volumes = _interior(inputs, energy)
-        weights = interior_weights(energy, gradients, volumes)
-        energy = with_interior(energy, gradients, weights)
+        _ = inputs.clusters
+        energy, weights = _energy(inputs, subspace, part(progress, 0.4, 0.9))
         coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
-        return cls(energy, coarse, weights)
+        return cls(energy, weights, coarse)
+
+    def stiffened(self, inputs: BindingInputs) -> Binding:
+        """Return the binding of *inputs* that differ in their stiffness only."""
+        return Binding(*_energy(inputs, self.energy.subspace), self.coarse_volume)
 
     def grown(self, inputs: BindingInputs, p: FloatArray) -> Binding:
         """Return this binding of *inputs* with another shape to keep: that with cages *p* (m, 3).
 
         The mesh depends on its cages as before, and its volumes are computed as before.
         """
-        rest, subspace, clusters = inputs.rest, self.energy.subspace, inputs.clusters
+        rest, subspace = inputs.rest, self.energy.subspace
         shape = rest.with_vertices(subspace.map(p - inputs.rest_cages, rest.vertices))
-        energy = shape_energy(shape, subspace, inputs.stretch, clusters)
-        faces = [cage.faces for cage in inputs.cages]
-        energy = with_cage_stiffness(energy, p, faces, clusters)
+        energy = _surface_energy(inputs, shape, p, subspace)
         gradients = grown_gradients(self.energy, self.interior, p)
         return replace(self, energy=with_interior(energy, gradients, self.interior))
+
+
+def _energy(
+    inputs: BindingInputs, subspace: Subspace, progress: Progress | None = None
+) -> tuple[Energy, FloatArray]:
+    """Return the energy at rest, and the weights of the points inside the body."""
+    energy = _surface_energy(inputs, inputs.rest, inputs.rest_cages, subspace, progress=progress)
+    gradients, volumes = _interior(inputs, energy)
+    weights = interior_weights(energy, gradients, volumes)
+    return with_interior(energy, gradients, weights), weights
+
+
+def _surface_energy(
+    inputs: BindingInputs,
+    shape: Mesh,
+    p: FloatArray,
+    subspace: Subspace,
+    *,
+    progress: Progress | None = None,
+) -> Energy:
+    """Return the energy of the surface that keeps *shape*, with cages *p* (m, 3), and of these."""
+    stiff, clusters = inputs.stiffness, inputs.clusters
+    factors = None if stiff is None else stiff.factors
+    energy = shape_energy(
+        shape, subspace, inputs.stretch, clusters, stiffness=factors, progress=progress
+    )
+    faces = [cage.faces for cage in inputs.cages]
+    soft = 1.0 if stiff is None else stiff.softness(shape)
+    return with_cage_stiffness(energy, p, faces, clusters, share=soft)
 
 
 def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatArray]:
@@ -154,5 +186,6 @@ def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatA
     ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
     p = np.split(inputs.rest_cages, ends)
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
-    interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses)
+    factors = None if inputs.stiffness is None else inputs.stiffness.factors
+    interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses, factors)
     return interior.gradients(cages, energy.subspace), interior.volumes

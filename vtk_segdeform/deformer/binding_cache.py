@@ -69,7 +69,7 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
         if "cells" in arrays:
             surface = _subspace(arrays, "c", int(arrays["n_cells"]))
             coarse = CoarseVolume(surface, arrays["cells"], arrays["shares"])
-        binding = Binding(energy, coarse, arrays["interior"])
+        binding = Binding(energy, arrays["interior"], coarse)
         os.utime(path)  # recently used files are deleted last
     except FileNotFoundError:
         return None

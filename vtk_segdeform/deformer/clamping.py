@@ -73,13 +73,13 @@ def clamped(
         if _is_affine(mesh, part, moved):
             added.append(_grown(mesh, part, _HANDLE_MARGIN * size))
             held, rigid = held | part, rigid | part
-    left = [members & ~held for members in regions.membership]
+    left = [members & ~held & ~regions.is_carried for members in regions.membership]
     for k in range(len(left) - 1, -1, -1):  # without regions that others cover
         if not (left[k] & ~np.any(left[:k] + left[k + 1 :], axis=0)).any():
             del left[k]
     if not added or not left or _EACH * (len(left) + len(added)) > n_cage_vertices:
         return regions, rigid
-    return Regions(mesh, np.array(left + added), regions.smoothness), rigid
+    return regions.with_membership(np.array(left + added)), rigid
 
 
 def _large_parts(mesh: Mesh, members: BoolArray, size: float) -> list[BoolArray]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..freezing import read_only
+from ..geometry import Carrying
 from ..mesh import SurfacePoint
 from ..solver import (
     Anchors,
@@ -21,6 +23,7 @@ from ..solver import (
     GaussNewton,
     HeldVolumes,
     ScaledSurface,
+    Sliding,
     Term,
     connected_sets,
     errors_at,
@@ -29,9 +32,12 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
+from .slides import Guide, Slide, guides
+from .symmetry import Mirror
 from .volume_goals import VolumeGoal
 
 _POSITION_WEIGHT = 15_000.0  # of a handle or fixed patch, times the scale of the shape energy
+_MIRROR_SHARE = 0.1  # weight of the symmetry of the cages, as a share of that of a handle
 _NONE, _NO_POINTS = np.zeros(0, dtype=np.int64), np.empty((0, 3))
 
 
@@ -43,6 +49,8 @@ class HoldOptions:
     preserve_region_volumes: bool
     avoid_contact: bool
     lids: bool | None
+    slides: tuple[Slide, ...] = ()
+    mirror: Mirror | None = None
     goals: Mapping[str, VolumeGoal | None] = field(default_factory=dict)
     parts: Mapping[str, BoolArray] = field(default_factory=dict)
 
@@ -86,6 +94,10 @@ class Constraints:
     preserved: Preserved
     solver: GaussNewton  # as it begins
     contact: Contact | None  # one of its terms
+    guides: tuple[Guide, ...] = ()  # of sliding vertices, in the coordinates of poses
+    mirror: Mirror | None = None
+    mates: IntArray = field(default_factory=lambda: _NONE)
+    """(e,): the handle vertices whose mates are the last e ones of `handle`."""
     pulled: PulledPoints = field(default_factory=PulledPoints)
     keeps: FloatArray | None = None  # (s,): how firmly the finish of a pull keeps samples in place
 
@@ -104,18 +116,27 @@ class Constraints:
         By default at rest.  Raises a ConstraintError if they are no sets of vertices.
         """
         mesh = enclosed.problem.mesh
-        fixed, handle = map(read_only, checked_constraints(mesh, fixed, handle))
+        fixed, handle = checked_constraints(mesh, fixed, handle)
+        mirror, mates, fixed_mates = options.mirror, _NONE, _NONE
+        if mirror is not None:
+            fixed, fixed_mates = mirror.with_mates(fixed, handle)
+            handle, mates = mirror.with_mates(handle, fixed)
+        fixed, handle = read_only(fixed), read_only(handle)
         preserved = enclosed.preserved(
             handle,
             whole=options.preserve_volume,
             by_region=options.preserve_region_volumes,
             goals=options.goals,
             parts=options.parts,
+            mirror=options.mirror,
         )
         problem, energy = preserved.problem, preserved.problem.energy
         fixed_in_scene, inside = mesh.vertices[fixed], problem.rest.vertices[fixed]
         if places is not None:
-            fixed_in_scene = checked_targets(places, len(fixed), "fixed_at", "fixed")
+            count = len(fixed) - len(fixed_mates)
+            fixed_in_scene = checked_targets(places, count, "fixed_at", "fixed")
+            if mirror is not None:
+                fixed_in_scene = mirror.moved(mesh, fixed, fixed_mates, fixed_in_scene)
             inside = problem.frame.inward(fixed_in_scene)
             check_distance(inside)
         handles, patches = connected_sets(mesh, handle), connected_sets(mesh, fixed)
@@ -131,7 +152,13 @@ class Constraints:
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         contact = _contact(problem, ids) if options.avoid_contact else None
-        terms: tuple[Term, ...] = () if contact is None else (contact,)
+        sliding = [
+            Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
+            for each in guides(options.slides, problem.rest, few=True)
+        ]
+        terms: list[Term] = [*sliding, *(() if contact is None else (contact,))]
+        if mirror is not None:
+            terms.append(mirror.term(problem.subspace, problem.rest_cages, _MIRROR_SHARE * weight))
         fixed_box = np.stack([inside.min(axis=0), inside.max(axis=0)]) if len(fixed) else _NO_POINTS
         return cls(
             problem=problem,
@@ -140,12 +167,15 @@ class Constraints:
             fixed_at=fixed_in_scene,
             handles=handles,
             places_of_targets=gathered[:, : len(handle)].tocsr(),
-            places_of_fixed=gathered[:, len(handle) :] @ inside,
+            places_of_fixed=np.asarray(gathered[:, len(handle) :] @ inside),
             fixed_box=fixed_box,
             anchors=_centres(problem, preserved.scaled, fixed, inside),
             preserved=preserved,
-            solver=GaussNewton(energy, positions, preserved.volumes, terms=terms),
+            solver=GaussNewton(energy, positions, preserved.volumes, terms=tuple(terms)),
             contact=contact,
+            guides=guides(options.slides, problem.rest_pose),
+            mirror=mirror,
+            mates=mates,
         )
 
     def __setstate__(self, state: dict[str, object]) -> None:
@@ -168,6 +198,20 @@ class Constraints:
         """Number of volumes that are bounded only."""
         return sum(each.bound != 0 for each in self.preserved.constraints)
 
+    @property
+    def n_given(self) -> int:
+        """Number of handle vertices that targets are given for; the others are their mates."""
+        return len(self.handle) - len(self.mates)
+
+    def goal(self, targets: FloatArray) -> FloatArray:
+        """Return the targets (k, 3) of all handle vertices, in solver coordinates.
+
+        *targets* (n_given, 3) are in scene coordinates.
+        """
+        if self.mirror is not None:
+            targets = self.mirror.moved(self.problem.mesh, self.handle, self.mates, targets)
+        return self.problem.frame.inward(targets)
+
     def places(self, targets: FloatArray) -> FloatArray:
         """Return the places (s, 3) of all sets, for *targets* (k, 3) of the handles."""
         places = np.asarray(self.places_of_targets @ targets + self.places_of_fixed)
@@ -181,6 +225,16 @@ class Constraints:
         places[pulled.targets] += x[own] + frame.size * pulled.levers - pulled.at(x)
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
+
+    @cached_property
+    def carrying(self) -> Carrying:
+        """How a finish moves components without anything that is held; see `finishing`."""
+        stiff = self.problem.inputs.stiffness
+        rigid = () if stiff is None else stiff.rigid
+        guided = (each.vertices for each in self.guides)
+        return self.problem.carrying_from(
+            np.concatenate([self.handle, self.fixed, *guided, *rigid])
+        )
 
     def held_volumes(self, x: FloatArray) -> HeldVolumes:
         """Return the volumes of *x* (n, 3) that have goals."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ from ..arrays import FloatArray, is_whole
 from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag, require_sequence, shown
 from ..errors import ArgumentError, Cancelled, ConstraintError, SegDeformError
+from ..geometry import Attach
 from ..mesh import Mesh, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import segment
@@ -22,6 +23,8 @@ from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
 from .clamping import clamped
 from .deformer import Deformer
+from .slides import Slide
+from .symmetry import Symmetry
 from .volume_goals import Goals, checked_goals
 
 _log = logging.getLogger(__name__)
@@ -40,12 +43,16 @@ def deform(
     *,
     volumes: Goals | None = None,
     parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
+    slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     through: Sequence[ArrayLike] = (),
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     preserve_volume: bool = True,
     lids: bool | None = None,
     avoid_contact: bool = False,
+    attach: Attach | None = None,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -67,6 +74,12 @@ def deform(
         With some, there need be no handle.
     parts : mapping of str to (k,) int or (n,) bool, optional
         Vertices by the names of parts of the surface, for *volumes*.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     through : sequence of (len(handle), 3) float
         Targets on the way, such as those of a quarter and of half a turn before those of
         three quarters; each less than half a turn from the last ones.
@@ -82,6 +95,10 @@ def deform(
         each connected part, as `Deformer` does.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
+    attach : mapping of int to int or "free", optional
+        For components, numbered as in `Mesh.components`, the one that each follows; ``"free"`` if
+        it follows none.  By default a component without fixed or handle vertices follows one that
+        it lies against, is around or inside of, such as a sleeve its arm.
     refine : bool or None
         Whether to finish the pose on the mesh itself (`Deformer.finish`), which distorts it less.
         None does so for meshes of at most 100,000 vertices, where it takes less time than all the
@@ -99,6 +116,8 @@ def deform(
     ConstraintError
         If *fixed*, *handle*, *targets* or *volumes* are invalid, or there is neither a handle nor a
         goal for a volume.
+    ArgumentError
+        If *attach* is for other components, or they follow each other.
     Cancelled
         If *progress* raised it.
     """
@@ -121,7 +140,8 @@ def deform(
     path = [checked_targets(each, len(moves), "through") for each in through]
     path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, progress=next(stages))
+    held = np.union1d(stays, moves)
+    regions = segment(mesh, n_regions, attach=attach, held=held, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
@@ -140,6 +160,9 @@ def deform(
         lids=lids,
         volumes=volumes,
         parts=parts,
+        stiffness=stiffness,
+        slides=slides,
+        symmetry=symmetry,
         avoid_contact=avoid_contact,
         progress=next(stages),
     )

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
@@ -64,6 +64,9 @@ from .finishing import VOLUME_MET, finish_of
 from .local import near_point
 from .path import Path, Pose
 from .problem import Problem
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
+from .symmetry import Mirror, Symmetry
 from .volume_goals import Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
@@ -106,6 +109,15 @@ class Deformer:
     parts : mapping of str to (k,) int or (n,) bool, optional
         Vertices by the names of parts of the surface, whose volumes are those under a lid over
         their borders; for *volumes*.
+    stiffness : (n,) float, optional
+        How stiff the surface is at each vertex, relative to elsewhere; infinite where it is rigid.
+        See `stiffness`.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only; see `slides`.
+    symmetry : str or pair of (3,) float, optional
+        Mirror all motions on one side of a plane on the other side: "x", "y" or "z", the normal of
+        the plane, whose place is found; "auto", which finds the plane; or a point of it and its
+        normal.  See `symmetry`.
     stretch : float
         Strength of the stretch term relative to the detail term; 0 is the paper's energy.  A
         larger value distorts triangles slightly less, but changes the angles between them more.
@@ -153,6 +165,9 @@ class Deformer:
         lids: bool | None = None,
         volumes: Goals | None = None,
         parts: Mapping[str, ArrayLike] | None = None,
+        stiffness: ArrayLike | None = None,
+        slides: Iterable[Slide] = (),
+        symmetry: Symmetry = None,
         stretch: float = 1.0,
         rotation_groups: int = 300,
         tolerance: float = 1e-7,
@@ -167,6 +182,7 @@ class Deformer:
         check_options(stretch, rotation_groups)
         load_for(mesh.n_vertices)
         self._limits = SolverOptions(tolerance, max_steps)
+        mirror = Mirror.of(mesh, symmetry)
         self._options = HoldOptions(
             preserve_volume=as_flag(preserve_volume, "preserve_volume"),
             preserve_region_volumes=as_flag(preserve_region_volumes, "preserve_region_volumes"),
@@ -174,6 +190,8 @@ class Deformer:
             lids=as_lids(lids),
             goals=checked_goals(volumes),
             parts=checked_parts(mesh, parts),
+            slides=checked_slides(mesh, slides),
+            mirror=mirror,
         )
         self.mesh, self.regions, self.cages = mesh, regions, cages
         self._problem = Problem.of(
@@ -182,6 +200,7 @@ class Deformer:
             cages,
             stretch=stretch,
             rotation_groups=rotation_groups,
+            stiffness=Stiffness.of(mesh, stiffness, mirror),
             cache=None if cache is None else as_path(cache, "cache"),
             progress=part(progress, 0.0, _BOUND),
         )
@@ -215,13 +234,14 @@ class Deformer:
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
         volumes: Goals | None = None,
+        slides: Iterable[Slide] | None = None,
+        symmetry: Symmetry | EllipsisType = ...,
         avoid_contact: bool | None = None,
     ) -> Deformer:
         """Return a deformer at rest with other constraints, which shares the binding of this one.
 
-        ``preserve_volume=None``, ``preserve_region_volumes=None``, ``lids=...``, ``volumes=None``
-        and ``avoid_contact=None`` are the values of this deformer.  The fixed vertices stay at
-        *fixed_at* (f, 3), in the order of the attribute `fixed`, by default at rest.
+        None, or for *lids* and *symmetry* ``...``, are the values of this deformer.  The fixed
+        vertices stay at *fixed_at* (f, 3), in the order that they are given in, by default at rest.
         """
         flags = {
             "preserve_volume": preserve_volume,
@@ -233,6 +253,10 @@ class Deformer:
         }
         if volumes is not None:
             given["goals"] = checked_goals(volumes)
+        if symmetry is not ...:
+            given["mirror"] = Mirror.of(self.mesh, symmetry)
+        if slides is not None:
+            given["slides"] = checked_slides(self.mesh, slides)
         options = replace(self._options, **given)
         other = self._shared()
         if lids is not ... and as_lids(lids) is not options.lids:
@@ -242,6 +266,20 @@ class Deformer:
         other._hold(
             Constraints.of(other._enclosed, options, fixed=fixed, handle=handle, places=fixed_at)
         )
+        return other
+
+    @one_blas_thread()
+    def stiffened(self, stiffness: ArrayLike | None) -> Deformer:
+        """Return a deformer at rest without constraints, with another *stiffness* (n,).
+
+        It has the options of this one and shares its subspace, which takes most of the time.
+        """
+        other = self._shared()
+        other._problem = self._problem.stiffened(
+            Stiffness.of(self.mesh, stiffness, self._options.mirror)
+        )
+        other._enclosed = EnclosedVolume.under(other._problem, self._options.lids)
+        other._hold(Constraints.of(other._enclosed, self._options, fixed=(), handle=()))
         return other
 
     @one_blas_thread()
@@ -327,8 +365,8 @@ class Deformer:
 
     @property
     def handle(self) -> IntArray:
-        """Vertices that follow targets, (k,)."""
-        return self._constraints.handle
+        """Vertices that follow targets, (k,); without the mates of a symmetric deformer."""
+        return self._constraints.handle[: self._constraints.n_given]
 
     @property
     def subspace(self) -> Subspace:
@@ -357,6 +395,25 @@ class Deformer:
         x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
         x = self._problem.frame.about_origin(x)
         return self._enclosed.volumes(x, self._options.parts)
+
+    @one_blas_thread()
+    def volume(self, name: str, vertices: ArrayLike | None = None) -> tuple[float, float]:
+        """Return one of `volumes`, and (V - V0) / V0, at *vertices* (n, 3) or at rest.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no volume called *name*.
+        """
+        rest = self.mesh.vertices
+        x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
+        x = self._problem.frame.about_origin(x)
+        return self._enclosed.volume(name, x, self._options.parts)
+
+    @property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry, with its error and the mates of the vertices."""
+        return self._constraints.mirror
 
     @property
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
@@ -401,7 +458,7 @@ class Deformer:
 
     def resume(self, cage_vertices: Sequence[ArrayLike], targets: ArrayLike) -> None:
         """Continue from an earlier pose: its `Solution.cage_vertices` and its targets."""
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         self._path = Path.begin(self._constraints, self._inward(cage_vertices), goal)
 
     @one_blas_thread()
@@ -434,7 +491,7 @@ class Deformer:
             If *targets* has the wrong shape, holds NaN or infinite coordinates, or is so far away,
             from the mesh or from the fixed vertices, that it must be in another unit.
         """
-        goal = self._problem.frame.inward(checked_targets(targets, len(self.handle)))
+        goal = self._constraints.goal(checked_targets(targets, len(self.handle)))
         check_distance(goal)
         require_together(self._problem.rest, goal, self._constraints.fixed_box)
         before = self._path.copy()
@@ -580,7 +637,7 @@ class Deformer:
         """
         problem, some = self._problem, slice(None, None, 1 + len(x) // _SEEN)
         rest = self.mesh.vertices[some]
-        moved = largest_length(goal - problem.rest.vertices[self.handle])
+        moved = largest_length(goal - problem.rest.vertices[self._constraints.handle])
         limit = problem.frame.size * (_SIZES + _MOTIONS * moved)
         if largest_length(x[some] - rest) <= limit:
             return True

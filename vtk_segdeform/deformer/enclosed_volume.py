@@ -27,9 +27,11 @@ from ..solver import (
 )
 from .growth import grown_cages
 from .problem import Problem
+from .symmetry import Mirror
 from .volume_goals import VolumeGoal, consistent, with_goal
 
 _NONE = np.zeros(0, dtype=np.int64)
+_OVERLAP = 0.5  # share of a part that is its own mirror image, from which it is one part
 _MIXING = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 _NO_GOALS: Mapping[str, VolumeGoal | None] = MappingProxyType({})
 _NO_PARTS: Mapping[str, BoolArray] = MappingProxyType({})
@@ -57,6 +59,7 @@ class EnclosedVolume:
     problem: Problem
     lids: Lids
     total: VolumeConstraint
+    _named: dict[str, VolumeConstraint] = field(default_factory=dict, repr=False)
     _known: dict[tuple[object, ...], Preserved] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -73,12 +76,16 @@ class EnclosedVolume:
         by_region: bool,
         goals: Mapping[str, VolumeGoal | None] = _NO_GOALS,
         parts: Mapping[str, BoolArray] = _NO_PARTS,
+        mirror: Mirror | None = None,
     ) -> Preserved:
         """Return the volumes to preserve: of the *whole*, body by body, or *by_region*.
 
         Small bodies have one of their own if vertices of the *handle* (k,) move them.  *goals*
-        take precedence; those of *parts* are of the faces around these vertices.
+        take precedence; those of *parts* are of the faces around these vertices.  With a *mirror*,
+        the mirror images of parts and regions have the same goals.
         """
+        if mirror is not None:
+            goals, parts = self._mirrored(goals, parts, mirror)
         by_region = self.total.has_volume and by_region
         whole = self.total.has_volume and whole and not by_region
         count = len(self.bodies.volumes) if whole else 0
@@ -137,6 +144,27 @@ class EnclosedVolume:
         if not wanted and not kept:
             return ()
         return consistent(wanted, kept, self.problem.rest_pose.vertices)
+
+    def _mirrored(
+        self,
+        goals: Mapping[str, VolumeGoal | None],
+        parts: Mapping[str, BoolArray],
+        mirror: Mirror,
+    ) -> tuple[Mapping[str, VolumeGoal | None], Mapping[str, BoolArray]]:
+        """Return *goals* and *parts*, and those of mirror images that overlap the parts little."""
+        goals, parts = dict(goals), dict(parts)
+        labels = self.problem.regions.labels
+        for name, goal in list(goals.items()):
+            kind, number = _split(name)
+            mask = parts.get(name, labels == number if kind == "region" else None)
+            if mask is None:
+                continue
+            image = np.zeros_like(mask)
+            image[mirror.mates[mask]] = True
+            if np.count_nonzero(image & mask) < _OVERLAP * np.count_nonzero(mask):
+                parts[f"{name}, mirrored"] = image
+                goals[f"{name}, mirrored"] = goal
+        return goals, parts
 
     def named(self, name: str, parts: Mapping[str, BoolArray] = _NO_PARTS) -> VolumeConstraint:
         """Return the volume called *name* at rest; see `volume_names`.
@@ -202,8 +230,16 @@ class EnclosedVolume:
 
     def volumes(self, x: FloatArray, parts: Mapping[str, BoolArray]) -> dict[str, float]:
         """Return all volumes by name, at the vertices *x* (n, 3)."""
-        every = {name: self.named(name, parts) for name in (*self.volume_names, *parts)}
-        return {name: each.target + each.violation(x) for name, each in every.items()}
+        return {name: self.volume(name, x, parts)[0] for name in (*self.volume_names, *parts)}
+
+    def volume(
+        self, name: str, x: FloatArray, parts: Mapping[str, BoolArray]
+    ) -> tuple[float, float]:
+        """Return a volume at the vertices *x* (n, 3), and (V - V0) / V0."""
+        found = self._named.get(name)
+        if found is None or name in parts:
+            found = self._named[name] = self.named(name, parts)
+        return found.target + found.violation(x), found.relative(x)
 
     def changes_of_regions(self, x: FloatArray) -> FloatArray:
         """Return the relative change of the volume of each region in the pose *x* (n, 3)."""

@@ -1,19 +1,30 @@
-"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`."""
+"""What a finish is given: the pose of the cages, and which vertices are held; see `finish`.
+
+Components without fixed or handle vertices that follow others are not finished: they move by what
+the finish has moved their carriers, and along their normals onto their own volumes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..arrays import BoolArray, FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..finish import Finish, Finisher
+from ..geometry import Carrying
 from ..progress import Progress
+from ..solver import VolumeConstraint, moved_along, steps_to_volume
 from .constraints import Constraints
 from .path import Path
+from .stiffness import rigid_places
+from .symmetry import Mirror
 
 VOLUME_MET = 1e-9
 """Relative error of a volume, at most; a finish with a larger error is not used."""
+_FIRM = 1e6  # weight of a handle or fixed vertex in the place of a rigid part
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -25,6 +36,10 @@ def finish_of(
     Its vertices are those of *start* if exact handles and exact volumes exclude each other.
     """
     constraints, problem = path.constraints, path.constraints.problem
+    mirror, given = constraints.mirror, start
+    if mirror is not None:
+        is_start, pose = start is pose, _symmetric(path, mirror, pose)
+        start = pose if is_start else start
     frame, preserved = problem.frame, constraints.preserved.constraints
     held = np.zeros(len(pose), dtype=bool)
     held[constraints.fixed] = held[constraints.handle] = True
@@ -32,32 +47,106 @@ def finish_of(
     places = np.array(problem.rest_pose.vertices)
     places[constraints.fixed] = frame.about_origin(constraints.fixed_at)
     places[constraints.handle] = frame.about_origin(frame.outward(path.targets))
+    for guide in constraints.guides:
+        free = ~held[guide.vertices]
+        places[guide.vertices[free]] = guide.track(pose[guide.vertices])[0][free]
+        held[guide.vertices] = True
+    _place_rigid_parts(path, places, held, pose)
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
-        stays = (far | _is_near_pulled_points(constraints)) & ~held
+        stays = far | _is_near_pulled_points(constraints)
+        if mirror is not None:
+            stays |= stays[mirror.mates]
+        stays &= ~held
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
+    is_carried = constraints.carrying.is_carried
+    held |= is_carried
+    places[is_carried] = pose[is_carried]
     active = set(path.active_volumes)
     while True:
+        volumes = [preserved[k] for k in sorted(active)]
         finisher = Finisher(
             problem.rest_pose,
             problem.cell_energy,
             held,
-            [preserved[k] for k in sorted(active)],
+            volumes,
             problem.cage_weights,
             progress,
             avoid_contact=constraints.contact is not None,
         )
         found = finisher.run(pose, places[held], progress, start=start)
+        if mirror is not None:
+            found = finisher.made(found, partial(_mean_with_image, path, mirror))
+        if is_carried.any() and found.vertices is not start:
+            followed = _followed(constraints.carrying, volumes, pose, found.vertices)
+            found = replace(found, vertices=followed)
         off = [each.missed(found.vertices) for each in preserved]
         missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
         if not missed:
             break
         active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
+    return replace(found, vertices=given) if max(off, default=0.0) > VOLUME_MET else found
+
+
+def _mean_with_image(path: Path, mirror: Mirror, x: FloatArray) -> FloatArray:
+    """Return the mean of the mesh *x* (n, 3) and its mirror image."""
+    rest = path.constraints.problem.rest_pose.vertices
+    return rest + mirror.symmetric(x - rest)
+
+
+def _symmetric(path: Path, mirror: Mirror, pose: FloatArray) -> FloatArray:
+    """Return the mean of a *pose* (n, 3) and its mirror image, moved onto the volumes."""
+    preserved = path.constraints.preserved.constraints
+    active = [preserved[k] for k in path.active_volumes]
+    x = _mean_with_image(path, mirror, pose)
+    if not active:
+        return x
+    outward = [mirror.symmetric(each.gradient(x)) for each in active]
+    paths = np.hstack([x, *(each / np.abs(each).max() for each in outward)])
+    return moved_along(paths, steps_to_volume(active, paths))
+
+
+def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:
+    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices."""
+    problem = path.constraints.problem
+    stiff = problem.inputs.stiffness
+    for ids in () if stiff is None else stiff.rigid:
+        own = held[ids]
+        near = np.where(own[:, None], places[ids], pose[ids])
+        weights = np.where(own, _FIRM, 1.0)
+        moved = rigid_places(problem.rest_pose.vertices[ids], near, weights)
+        places[ids[~own]] = moved[~own]
+        held[ids] = True
+
+
+def _followed(
+    carrying: Carrying, volumes: Sequence[VolumeConstraint], pose: FloatArray, x: FloatArray
+) -> FloatArray:
+    """Return the finished mesh *x* (n, 3) with the followers moved along from the *pose*."""
+    moved, stays = pose + carrying.carried(x - pose), ~carrying.is_carried
+    own = [each for each in volumes if not stays[each.faces[each.faces < len(x)]].all()]
+    landed = on_volumes(moved, own, np.flatnonzero(stays)) if own else moved
+    return np.where(stays[:, None], x, landed)
+
+
+def on_volumes(
+    x: FloatArray, constraints: Sequence[VolumeConstraint], stays: IntArray
+) -> FloatArray:
+    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*."""
+    centre = x.mean(axis=0)
+    moved, directions = x - centre, []
+    for constraint in constraints:
+        normals = constraint.gradient(moved)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.where(lengths > 0.0, lengths, 1.0)
+        normals[stays] = 0.0
+        directions.append(normals)
+    paths = np.hstack([moved, *directions])
+    return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

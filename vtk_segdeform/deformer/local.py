@@ -38,7 +38,8 @@ def near_point(
     """
     constraints, p = path.constraints, path.p
     problem, before = constraints.problem, constraints.solver
-    near = point, reach / problem.frame.size, follows
+    points = (point,) if constraints.mirror is None else (point, constraints.mirror.mate_of(point))
+    near = points, reach / problem.frame.size, follows
     energy, samples = problem.energy, problem.samples
     ids = np.concatenate([constraints.handle, constraints.fixed])
     quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)

@@ -42,6 +42,7 @@ change by 0.08 edges; with 0.05 another 1 to 2 %.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -231,14 +232,14 @@ class SurfaceSamples:
             found += np.linalg.norm(x[corners] - point.at(x), axis=1)[:, None]
         return np.asarray(found.min(axis=0), dtype=np.float64)
 
-    def weights(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
-        """Return w_s / a_s for kappa = 1, (s,).
+    def weights(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
+        """Return w_s / a_s for kappa = 1, (s,), around several *points*.
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
         """
         if np.isinf(reach):
             return np.zeros(len(self.points))
-        away = self.distances(point) / max(reach, _SHORTEST)
+        away = np.min([self.distances(each) for each in points], axis=0) / max(reach, _SHORTEST)
         nearer = np.clip(away, 1.0, 1e2)
         weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
@@ -246,11 +247,11 @@ class SurfaceSamples:
             _, part = csgraph.connected_components(self._joined[far][:, far], directed=False)
             size = np.bincount(part, self.areas[far])
             weights[far[(size < follows * size.max())[part]]] = 0.0
-        return weights
+        return np.asarray(weights)
 
-    def quadratic(self, point: SurfacePoint, reach: float, follows: float) -> FloatArray:
+    def quadratic(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
-        weights = self.areas * self.weights(point, reach, follows)
+        weights = self.areas * self.weights(points, reach, follows)
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)

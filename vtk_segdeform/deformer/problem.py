@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy
 from ..finish import CellEnergy
+from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
 from ..regions import Regions
@@ -24,6 +26,7 @@ from .binding import Binding, BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
 from .locality import SurfaceSamples
+from .stiffness import Stiffness
 
 _NO_POINTS = np.empty((0, 3))
 # l of the finish, in spacings of the cages.  With 1, the worst 1 % of distortion in 24 poses of
@@ -57,6 +60,7 @@ class Problem:
         *,
         stretch: float,
         rotation_groups: int,
+        stiffness: Stiffness | None = None,
         cache: FilePath | None = None,
         progress: Progress | None = None,
     ) -> Problem:
@@ -65,20 +69,30 @@ class Problem:
         rest = mesh.with_vertices(frame.inward(mesh.vertices))
         inside = [frame.inward(cage.vertices) for cage in cages]
         rest_cages = np.concatenate([_NO_POINTS, *inside])
-        inputs = BindingInputs(rest, regions, cages, rest_cages, stretch, rotation_groups)
+        given = rest, regions, cages, rest_cages, stretch, rotation_groups
+        inputs = BindingInputs(*given, stiffness=stiffness)
         binding = cached_binding(inputs, cache, progress)
         at_origin = frame.about_origin(mesh.vertices)
         rest_pose = mesh.with_vertices(at_origin) if frame.is_far else mesh
         parts = mesh, regions, cages, frame, rest, rest_pose, rest_cages
         return cls(*parts, shape=rest_pose, inputs=inputs, binding=binding)
 
+    def stiffened(self, stiffness: Stiffness | None) -> Problem:
+        """Return the problem with another stiffness."""
+        inputs = replace(self.inputs, stiffness=stiffness)
+        return self._with(inputs=inputs, binding=self.binding.stiffened(inputs))
+
     def grown(self, p: FloatArray) -> Problem:
         """Return the problem whose shape to keep is that of cages *p* (m, 3); see `growth`."""
         shape = self.rest_pose.with_vertices(self.map(p))
-        other = replace(self, shape=shape, binding=self.binding.grown(self.inputs, p))
-        for name in ("samples", "linked_parts", "cage_weights"):
-            if name in vars(self):
-                vars(other)[name] = vars(self)[name]
+        return self._with(shape=shape, binding=self.binding.grown(self.inputs, p))
+
+    def _with(self, **changes: Any) -> Problem:
+        """Return the problem with *changes* on which `samples` and `linked_parts` do not depend."""
+        other = replace(self, **changes)
+        vars(other).update(
+            {name: vars(self)[name] for name in ("samples", "linked_parts") if name in vars(self)}
+        )
         return other
 
     @property
@@ -123,6 +137,19 @@ class Problem:
         part = connected(count + n_regions, component, count + region)
         return part[:count], part[count:]
 
+    def carrying_from(self, ids: IntArray) -> Carrying:
+        """Return how motions are carried from the components of vertices *ids* to the others.
+
+        Regions without carriers may have several components as well: then each of these follows one
+        with which it shares regions.
+        """
+        roots, carrier = self.mesh.components[ids], self.regions.carrier
+        if carrier is None:
+            part, _ = self.linked_parts
+            found = carriers(self.mesh, roots=roots)
+            carrier = np.where(part[found] == part, found, np.arange(len(part)))
+        return Carrying(self.mesh, towards(carrier, roots))
+
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
 
@@ -152,13 +179,17 @@ class Problem:
     @cached_property
     def cell_energy(self) -> CellEnergy:
         """The energy of the finish."""
-        return CellEnergy.of(self.shape, self.mesh.n_vertices / len(self.rest_cages))
+        per_cage = self.mesh.n_vertices / len(self.rest_cages)
+        stiff = self.inputs.stiffness
+        return CellEnergy.of(self.shape, per_cage, None if stiff is None else stiff.factors)
 
     @cached_property
     def cage_weights(self) -> FloatArray:
         """Weights w (n,) of `finish.finisher`: 1 / 4 of a cage vertex, over its region by area."""
         own = self.regions.weights * self.mesh.vertex_areas
         counts = np.array([len(cage.vertices) for cage in self.cages])
-        areas = own.sum(axis=1)
+        areas = np.where(self.regions.is_carried, 0.0, own).sum(axis=1)  # cages are no coarser
         density = np.divide(counts, areas, where=areas > 0.0, out=np.zeros(len(areas)))
-        return np.asarray(density @ own) / _SPACINGS**2
+        weights = np.asarray(density @ own) / _SPACINGS**2
+        stiff = self.inputs.stiffness
+        return weights if stiff is None else weights * stiff.factors

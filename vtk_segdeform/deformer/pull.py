@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from numpy.typing import ArrayLike
 
 from ..cages import fit_cages, require_cage_vertices, suggested_size
 from ..checks import as_flag
 from ..errors import ConstraintError
+from ..geometry import Attach
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress
 from ..regions import segment
@@ -27,6 +28,9 @@ from .arguments import (
 )
 from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
+from .slides import Slide, checked_slides
+from .stiffness import Stiffness
+from .symmetry import Symmetry
 from .volume_goals import Goals
 
 
@@ -42,8 +46,12 @@ def pull(
     n_cage_vertices: int | None = None,
     volumes: Goals | None = None,
     parts: Mapping[str, ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None,
+    slides: Iterable[Slide] = (),
+    symmetry: Symmetry = None,
     lids: bool | None = None,
     avoid_contact: bool = False,
+    attach: Attach | None = None,
     refine: bool | None = None,
     progress: Progress | None = None,
 ) -> Solution:
@@ -74,14 +82,23 @@ def pull(
         Total number of cage vertices; by default it follows the number of regions.
     volumes, parts : mappings, optional
         Goals for volumes, by name, and named parts of the surface; see `Deformer`.
+    stiffness : (n,) float, optional
+        Of each vertex, relative to the others; infinite where the surface is rigid.
+    slides : sequence of Slide, optional
+        Vertices that move along a plane, a line or the surface at rest only.
+    symmetry : str or pair of (3,) float, optional
+        The plane about which motions are mirrored: "x", "y", "z", "auto", or a point and a normal.
     lids : bool or None
         Whether an open surface encloses a volume under lids over its borders; see `Deformer`.
     avoid_contact : bool
         Keep parts of the surface from crossing each other; see `Deformer`.
+    attach : mapping of int to int or "free", optional
+        The components that others follow, as of `deform`.  Those with pins are no exception: a pull
+        moves all that lies together.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
-        None does so only with *avoid_contact*: triangles are less distorted then, but a smooth
-        bend may get a step where the finish ends.
+        None does so only with *avoid_contact*, and to place rigid and sliding vertices exactly:
+        triangles are less distorted then, but a smooth bend may get a step where the finish ends.
     progress : Progress, optional
         Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
         before every step.  It cancels by raising `Cancelled`.
@@ -111,7 +128,9 @@ def pull(
     as_lids(lids)
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
-    refine = False if refine is None and not avoid_contact else refine
+    slides, stiff = checked_slides(mesh, slides), Stiffness.of(mesh, stiffness)
+    if refine is None and not (avoid_contact or slides or (stiff is not None and stiff.rigid)):
+        refine = False
     point = checked_place(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")
     target = checked_point(to)[None] - point.at(mesh.vertices) + mesh.vertices[handle]
@@ -121,13 +140,14 @@ def pull(
     if locality is None:
         locality = automatic_locality(len(fixed))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, progress=next(stages))
+    regions = segment(mesh, n_regions, attach=attach, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, progress=next(stages))
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, lids=lids, volumes=volumes, parts=parts,
-        avoid_contact=avoid_contact, progress=next(stages),
+        stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
+        progress=next(stages),
     )  # fmt: skip
     reach, follows = reach_and_follows(radius, locality)
     deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)

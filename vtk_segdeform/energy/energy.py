@@ -136,6 +136,7 @@ def shape_energy(
     stretch: float,
     clusters: IntArray,
     *,
+    stiffness: FloatArray | None = None,
     progress: Progress | None = None,
 ) -> Energy:
     """Return the detail and stretch of *mesh*, whose size should be about 1, in *subspace*.
@@ -150,6 +151,8 @@ def shape_energy(
         Trace of the stretch term in the subspace, as a multiple of that of the detail term.
     clusters : (n,) int
         The rotation cluster of each vertex.
+    stiffness : (n,) float, optional
+        Factors of the terms of each vertex; by default 1.
     progress : Progress, optional
         Called between the steps; may cancel.
     """
@@ -162,9 +165,12 @@ def shape_energy(
     else:
         surface, weights = sample.surface, sample.weights
         rows, own, inner = sample.rows(subspace), clusters[sample.ids], inner[sample.ids]
-    shape = surface_operators(surface, own, weights, inner=inner)
+    factors = weights
+    if stiffness is not None:
+        factors = stiffness if sample is None else stiffness[sample.ids] * sample.weights
+    shape = surface_operators(surface, own, factors, inner=inner)
     tell(progress, 0.5, "computing the energy")
-    areas = shape.weights * shape.areas
+    areas = shape.areas if weights is None else weights * shape.areas
     bending, stretching, mass = reduced_operators(
         rows,
         shape.laplacian,
@@ -189,7 +195,12 @@ def shape_energy(
 
 
 def with_cage_stiffness(
-    energy: Energy, rest: FloatArray, faces: Sequence[IntArray], clusters: IntArray
+    energy: Energy,
+    rest: FloatArray,
+    faces: Sequence[IntArray],
+    clusters: IntArray,
+    *,
+    share: float = 1.0,
 ) -> Energy:
     """Return *energy* plus the stiffness of the cages.
 
@@ -203,6 +214,8 @@ def with_cage_stiffness(
         The faces of each cage.
     clusters : (n,) int
         The rotation cluster of each vertex.
+    share : float
+        Of the energy that the surface would have without stiff parts.
     """
     tail, head = _cage_edges(energy, faces)
     offset = rest[tail] - rest[head]
@@ -210,16 +223,16 @@ def with_cage_stiffness(
     laplacian = np.zeros((m, m))
     np.add.at(laplacian, (tail, tail), 1.0)
     np.add.at(laplacian, (tail, head), -1.0)
-    strength = _CAGE_STIFFNESS * energy.scale / np.trace(laplacian)
+    strength = share * _CAGE_STIFFNESS * energy.scale / np.trace(laplacian)
 
-    share = energy.subspace.sums_of_squares(clusters)  # omega, (G, m)
-    share /= np.maximum(share.sum(axis=0), np.finfo(float).tiny)
-    rows = np.empty((len(share), 3, m))
+    omega = energy.subspace.sums_of_squares(clusters)  # (G, m)
+    omega /= np.maximum(omega.sum(axis=0), np.finfo(float).tiny)
+    rows = np.empty((len(omega), 3, m))
     ends = np.concatenate([tail, tail]), np.concatenate([tail, head])
     for axis in range(3):
         half = 0.5 * offset[:, axis]  # row a: half of sum_b (q_a - q_b) (p_a - p_b), along the axis
         by_tail = sparse.coo_array((np.concatenate([half, -half]), ends), (m, m)).tocsr()
-        rows[:, axis] = (by_tail.T @ share.T).T
+        rows[:, axis] = (by_tail.T @ omega.T).T
     return replace(
         energy,
         quadratic=energy.quadratic + strength * laplacian,

@@ -46,7 +46,13 @@ class Interior:
     weights: FloatArray  # (r, k): the blend weights
 
     @classmethod
-    def of(cls, mesh: Mesh, weights: FloatArray, encloses: BoolArray) -> Interior:
+    def of(
+        cls,
+        mesh: Mesh,
+        weights: FloatArray,
+        encloses: BoolArray,
+        stiffness: FloatArray | None = None,
+    ) -> Interior:
         """Return points in those components of *mesh* that are bodies.
 
         Parameters
@@ -57,11 +63,14 @@ class Interior:
             Blend weights of the regions.
         encloses : (c,) bool
             Whether each component is a body.
+        stiffness : (n,) float, optional
+            Factors of the volumes; by default 1.
         """
         component = mesh.components
         if mesh.n_vertices > sizes.DECIMATED:
             mesh, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
             component, weights = component[kept], weights[:, kept]
+            stiffness = None if stiffness is None else stiffness[kept]
         x, area = mesh.vertices, mesh.vertex_areas
         inward, _, diameters = inner_balls(x, mesh.faces)
         radius = 0.5 * diameters
@@ -69,6 +78,8 @@ class Interior:
         own &= diameters < mesh.diagonal  # otherwise nothing is opposite
         x, radius, area, component = x[own], radius[own], area[own], component[own]
         points, volume = x + 0.75 * radius[:, None] * inward[own], area * radius
+        if stiffness is not None:
+            volume = volume * stiffness[own]
         if not len(x):
             return cls(points, radius, volume, weights[:, own])
         patch = cluster_positions(x, _PATCHES)

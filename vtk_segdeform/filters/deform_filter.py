@@ -33,7 +33,7 @@ from scipy.spatial.transform import Rotation
 from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtkmodules.vtkCommonDataModel import vtkDataObject, vtkPolyData
 
-from ..arrays import FloatArray, as_ids
+from ..arrays import FloatArray, IntArray, as_ids
 from ..cages import Cage, fit_cages, suggested_size
 from ..deformer import Deformer
 from ..errors import CageError, Cancelled, ConstraintError, SegDeformError
@@ -92,7 +92,6 @@ class SegmentedCageDeformFilter(FilterSettings):
         if settings.region_array:
             labels = _required(source, settings.region_array, "SetRegionArrayName")
             labels = soup.at_vertices(labels)
-        deformer = self._binding(soup.mesh, labels, _cages_of(cages))
         fixed = _marked(source, settings.fixed, settings.fixed_array)
         handle = _marked(source, settings.handle, settings.handle_array)
         if handle is None:
@@ -103,8 +102,11 @@ class SegmentedCageDeformFilter(FilterSettings):
         else:
             vertices, _ = soup.targets_at(handle, soup.points[handle])
             targets = self._moved(soup.mesh.vertices[vertices])
+        held = soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed)
+        both = np.union1d(held, vertices)
+        deformer = self._binding(soup.mesh, labels, _cages_of(cages), both)
         constrained = deformer.hold(
-            fixed=soup.vertices_at(np.zeros(0, np.int64) if fixed is None else fixed),
+            fixed=held,
             handle=vertices,
             preserve_volume=settings.preserve_volume,
             lids=settings.lids,
@@ -127,12 +129,13 @@ class SegmentedCageDeformFilter(FilterSettings):
             surfaces.add_array(output.GetFieldData(), name, value)
         self.UpdateProgress(1.0)
 
-    def _binding(self, mesh: Mesh, labels: Any, cages: Sequence[Cage]) -> Deformer:
+    def _binding(self, mesh: Mesh, labels: Any, cages: Sequence[Cage], held: IntArray) -> Deformer:
         """Return a deformer without constraints: that of the last execution, if still valid."""
         settings, key = self._settings, hashlib.blake2b()
         choices = settings.n_regions, settings.n_cage_vertices, settings.overlap, settings.stretch
         key.update(repr((choices, labels is None, len(cages))).encode())
         arrays = [mesh.vertices, mesh.faces, *([] if labels is None else [labels])]
+        arrays.append(np.unique(mesh.components[held]))  # others may follow these
         for cage in cages:
             arrays += [cage.vertices, cage.faces]
         for array in arrays:
@@ -140,10 +143,12 @@ class SegmentedCageDeformFilter(FilterSettings):
         if self._cached is None or self._cached[0] != key.digest():
             self._cached = None
             self.rebinds += 1
-            self._cached = key.digest(), self._new_deformer(mesh, labels, cages)
+            self._cached = key.digest(), self._new_deformer(mesh, labels, cages, held)
         return self._cached[1]
 
-    def _new_deformer(self, mesh: Mesh, labels: Any, cages: Sequence[Cage]) -> Deformer:
+    def _new_deformer(
+        self, mesh: Mesh, labels: Any, cages: Sequence[Cage], held: IntArray
+    ) -> Deformer:
         settings, progress = self._settings, self._progress()
         if labels is not None:
             regions = Regions.from_labels(mesh, labels, settings.overlap)
@@ -154,7 +159,8 @@ class SegmentedCageDeformFilter(FilterSettings):
                 f"{len(cages)} cages need regions; set an array of labels with SetRegionArrayName"
             )
         else:
-            regions = segment(mesh, settings.n_regions or None, progress=part(progress, 0.0, 0.2))
+            number, share = settings.n_regions or None, part(progress, 0.0, 0.2)
+            regions = segment(mesh, number, held=held, progress=share)
         if not cages:
             size = settings.n_cage_vertices or suggested_size(regions)
             cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))

@@ -114,13 +114,20 @@ class CellEnergy:
         self._rooms: tuple[FloatArray, ...] | None = None
 
     @classmethod
-    def of(cls, mesh: Mesh, per_cage: float = 0.0) -> CellEnergy:
+    def of(
+        cls, mesh: Mesh, per_cage: float = 0.0, stiffness: FloatArray | None = None
+    ) -> CellEnergy:
         """Return the energy of *mesh*, with so many vertices *per_cage* vertex.
 
-        On its intrinsic triangulation.
+        On its intrinsic triangulation, whose triangles have the *stiffness* (n,) of their corners.
         """
         surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-        given = mesh.vertices, surface.faces, surface.cotangents, area_gradients(surface)
+        cotangents, gradients = surface.cotangents, area_gradients(surface)
+        if stiffness is not None:
+            factors = stiffness[surface.faces].mean(axis=1)
+            cotangents = cotangents * factors[:, None]
+            gradients = gradients * factors[:, None, None]
+        given = mesh.vertices, surface.faces, cotangents, gradients
         order = reverse_cuthill_mckee(mesh.adjacency, symmetric_mode=True).astype(np.int64)
         walk = _CELL * per_cage
         rounds = min(math.ceil(walk / _WALK), _ROUNDS)

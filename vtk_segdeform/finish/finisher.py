@@ -27,7 +27,7 @@ place; so do vertices in no triangle.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -157,6 +157,16 @@ class Finisher:
         found = self._apart(self._descend(begin, progress), progress)
         tell(progress, 1.0, "finished")
         return found
+
+    def made(self, found: Finish, change: Callable[[FloatArray], FloatArray]) -> Finish:
+        """Return *found* with its free vertices after an affine *change*, on the volumes.
+
+        The directions of the volumes are changed alike.
+        """
+        x = found.vertices.copy()
+        x[self._free] = change(x)[self._free]
+        directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
+        return replace(found, vertices=self._landed(x, directions))
 
     def _apart(self, found: Finish, progress: Progress | None) -> Finish:
         """Return *found* with w raised around faces that do not cross in y, until they do not."""

@@ -12,7 +12,8 @@ The files, in reading order:
     kmeans          clusters of points, and points far from each other
     sampling        even samples of the vertices, and their Voronoi cells
     decimation      a mesh with one vertex for each cluster of neighbours
-    attached        components that belong together
+    following       components that follow others
+    attached        lines between components that move together
     normals         vertex normals for drawing
     normal_transport   given normals and tangents, carried along by a deformation
     distortion      stretch and shear of each triangle
@@ -21,7 +22,7 @@ The files, in reading order:
     up_axis         a guess of the axis that points up
 """
 
-from .attached import SMALL_COMPONENT, attached, component_shares, joints, nearest_pairs
+from .attached import component_shares, joints, nearest_pairs
 from .chambers import Chambers, chambers_of
 from .decimation import decimated
 from .differential import (
@@ -32,6 +33,15 @@ from .differential import (
     with_least_areas,
 )
 from .distortion import distortion, triangle_distortion
+from .following import (
+    FREE,
+    SMALL_COMPONENT,
+    Attach,
+    Carrying,
+    carriers,
+    checked_attach,
+    towards,
+)
 from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts
 from .lids import Lids, lids_of, volume_summary
@@ -54,7 +64,10 @@ from .volume import (
 )
 
 __all__ = [
+    "FREE",
     "SMALL_COMPONENT",
+    "Attach",
+    "Carrying",
     "Chambers",
     "IntrinsicTriangulation",
     "Lids",
@@ -62,8 +75,9 @@ __all__ = [
     "NormalTransport",
     "VertexNormals",
     "area_gradients",
-    "attached",
+    "carriers",
     "chambers_of",
+    "checked_attach",
     "closest_rotations",
     "cluster_positions",
     "cluster_within_parts",
@@ -89,6 +103,7 @@ __all__ = [
     "signed_volume",
     "step_to_volume",
     "tie_breakers",
+    "towards",
     "triangle_distortion",
     "turned_over",
     "unique_edges",

@@ -1,10 +1,4 @@
-"""Components that belong together: a coat and its buttons, a jaw and its teeth.
-
-A component is *attached* to the nearest large one if it is near and smaller than the smallest limb
-that the segmentation looks for, or if it is set into a larger one, as an eye into its socket: all
-of it is near.  It has no region of its own.  The components of a *part*, those that share regions,
-are joined by lines, so that distances along the surface go on.
-"""
+"""Lines between components that move together, so that distances along the surface go on."""
 
 from __future__ import annotations
 
@@ -14,51 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
-
-SMALL_COMPONENT = 0.0125  # of the whole area; also the smallest limb of a segmentation
-_LARGEST_INSET = 0.1  # of the whole area; also the smallest component that another is set into
-
-
-def attached(points: FloatArray, areas: FloatArray, component: IntArray) -> BoolArray:
-    """Return which components are attached to larger ones, (c,) bool.
-
-    Parameters
-    ----------
-    points, areas : (n, 3) and (n,) float
-        Areas in any unit.
-    component : (n,) int
-        From 0; every number occurs.
-    """
-    share = component_shares(areas, component)
-    is_attached = np.zeros(len(share), dtype=bool)
-    if len(share) == 1:
-        return is_attached
-    near = 0.05 * float(np.linalg.norm(np.ptp(points, axis=0)))
-    large = share >= SMALL_COMPONENT
-    large[share.argmax()] = True
-    one, _, gap = nearest_pairs(points, component, large)
-    is_attached[component[one[gap <= near]]] = True
-    return is_attached | _set_in(points, component, large & (share < _LARGEST_INSET), share, near)
-
-
-def _set_in(
-    points: FloatArray, component: IntArray, some: BoolArray, share: FloatArray, near: float
-) -> BoolArray:
-    """Return which of *some* components, (c,) bool, have all points *near* one larger component."""
-    found = np.zeros(len(share), dtype=bool)
-    if not some.any():
-        return found
-    own = {int(k): points[component == k] for k in np.flatnonzero(some)}
-    for host in np.flatnonzero(share >= _LARGEST_INSET):
-        there = points[component == host]
-        low, high = there.min(axis=0) - near, there.max(axis=0) + near
-        inside = [k for k, x in own.items() if ((low <= x) & (x <= high)).all() and not found[k]]
-        if inside:
-            tree = cKDTree(there, compact_nodes=False, balanced_tree=False)
-            for k in inside:
-                away, _ = tree.query(own[k], distance_upper_bound=near)
-                found[k] = np.isfinite(away).all()
-    return found
+from .following import SMALL_COMPONENT
 
 
 def joints(

@@ -7,6 +7,7 @@ The files, in reading order:
     convert            `read_polydata`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
     moving             a PolyData at other positions, with its normals and tangents
+    fields             vectors and tensors that follow the surface
     number_lines       lines of numbers, parsed at once
     off                OFF
     ply ply_tables     PLY, and the tables of its elements

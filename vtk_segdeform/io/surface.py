@@ -10,6 +10,7 @@ some.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from ..checks import Described, require
 from ..errors import ArgumentError, MeshError
 from ..mesh import Mesh, Soup, Workaround, mesh_of
 from .convert import as_polydata, read_polydata, write_mesh
+from .fields import follow
 from .moving import MovingSurface
 from .polygons import triangles_of
 
@@ -187,17 +189,38 @@ class Surface(Described):
         """
         return self._soup.targets_at(points, targets)
 
-    def moved(self, vertices: ArrayLike) -> pv.PolyData:
+    def moved(
+        self,
+        vertices: ArrayLike,
+        *,
+        turn: Iterable[str] = (),
+        push: Iterable[str] = (),
+        displacement: str | None = None,
+    ) -> pv.PolyData:
         """Return what was given for the mesh at *vertices* (n, 3): coordinates and normals differ.
 
         Points, cells and arrays are the same, in the same order.
+
+        Parameters
+        ----------
+        vertices : (n, 3) float
+            The pose.
+        turn, push : sequence of str
+            Arrays of vectors or tensors that turn with the surface, such as fibres, or are pushed
+            forward with it, such as velocities; see `fields`.
+        displacement : str, optional
+            The name of a point array to add: how far each point has moved, (p, 3).
         """
         x = as_points(vertices, "vertices", self.mesh.n_vertices)
-        return self._moving.at(self._soup.moved(x))
+        moved = self._moving.at(self._soup.moved(x))
+        follow(moved, self._given, turn=turn, push=push)
+        if displacement is not None:
+            moved.point_data[displacement] = moved.points - np.asarray(self._given.points)
+        return moved
 
-    def write(self, path: str | Path, vertices: ArrayLike) -> None:
-        """Write `moved` to a file, as `write_mesh` does."""
-        write_mesh(path, self.moved(vertices))
+    def write(self, path: str | Path, vertices: ArrayLike, **fields: Any) -> None:
+        """Write `moved`, with its options *fields*, to a file, as `write_mesh` does."""
+        write_mesh(path, self.moved(vertices, **fields))
 
     @cached_property
     def _moving(self) -> MovingSurface:

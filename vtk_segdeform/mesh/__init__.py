@@ -41,7 +41,7 @@ from .mesh import Mesh, conversion_of, require_mesh
 from .report import Kind, MeshReport, counted
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
-from .surface_point import SurfacePoint
+from .surface_point import SurfacePoint, nearest_on_triangles
 from .topology import HalfEdges
 from .triangles import corner_angles, cross_rows, flat_faces, least_angle, normals
 
@@ -76,6 +76,7 @@ __all__ = [
     "least_angle",
     "mesh_of",
     "misoriented_shells",
+    "nearest_on_triangles",
     "new_crossings",
     "next_half_edge",
     "normals",

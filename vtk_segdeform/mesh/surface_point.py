@@ -49,13 +49,13 @@ class SurfacePoint(NamedTuple):
     def in_face(cls, vertices: FloatArray, corners: ArrayLike, point: FloatArray) -> SurfacePoint:
         """Return the point of the face *corners* (3,) of *vertices* (n, 3) nearest to *point*."""
         ids = np.asarray(corners)
-        shares, _ = _nearest(vertices[ids[None]], point)
+        shares, _ = nearest_on_triangles(vertices[ids[None]], point)
         return cls.of(ids, shares[0])
 
     @classmethod
     def nearest(cls, mesh: Mesh, point: FloatArray) -> SurfacePoint:
         """Return the point of *mesh* that is nearest to *point* (3,)."""
-        shares, away = _nearest(mesh.vertices[mesh.faces], point)
+        shares, away = nearest_on_triangles(mesh.vertices[mesh.faces], point)
         face = int(away.argmin())
         return cls.of(mesh.faces[face], shares[face])
 
@@ -76,12 +76,13 @@ class SurfacePoint(NamedTuple):
         return np.asarray(np.array(self.shares) @ values[list(self.corners)])
 
 
-def _nearest(corners: FloatArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+def nearest_on_triangles(corners: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the shares (k, 3) of the nearest points of triangles (k, 3, 3), and how far they are.
 
-    The nearest point is on one of the three edges, unless *point* (3,) is above the triangle.
+    From *points* (k, 3), or one (3,).  The nearest point is on one of the three edges, unless the
+    point is above the triangle.
     """
-    a = corners - point
+    a = corners - np.reshape(points, (-1, 1, 3))
     along = np.roll(a, -1, axis=1) - a  # from each corner to the next one
     squares = np.einsum("kcj,kcj->kc", along, along)
     t = -np.einsum("kcj,kcj->kc", a, along) / np.where(squares > 0.0, squares, 1.0)

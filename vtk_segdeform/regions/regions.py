@@ -22,10 +22,12 @@ from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole, plain
 from ..checks import Described, shown
 from ..errors import RegionError
 from ..freezing import Frozen, read_only
+from ..geometry import Carrying
 from ..mesh import Mesh, counted, distance_to_surface, require_mesh
 from .blending import blend_weights, border_distance, overlap_weights
 from .borders import within_rings
 
+_LEAST_WEIGHT = 1e-3  # of a region at a vertex of a follower
 _EQUAL_WEIGHT = 1e-9  # weights that differ by rounding only
 
 
@@ -54,17 +56,21 @@ class Regions(Described, Frozen):
     smoothness : float
         The power p of `blending.blend_weights`: 1 fades linearly across an overlap, larger values
         with zero slope at its border.
+    carrier : (c,) int, optional
+        The components that carry others, as of `geometry.carriers`: a follower is in the regions of
+        the nearest points of its carrier, with their weights, whatever its *membership*.
 
     Raises
     ------
     RegionError
-        If the shape is wrong, a region is empty, or a vertex is in no region; the message
-        lists them.
+        If the shape is wrong, a region is empty, or a vertex is in no region, the message lists
+        them; or if *carrier* does not lead to components that nothing carries.
     """
 
     mesh: Mesh
     membership: BoolArray
     smoothness: float = 1.0
+    carrier: IntArray | None = None
 
     def __post_init__(self) -> None:
         require_mesh(self.mesh)
@@ -75,21 +81,28 @@ class Regions(Described, Frozen):
                 f"membership must be a bool array of shape (regions, {n}); "
                 f"got {membership.dtype} of shape {membership.shape}"
             )
-        empty = np.flatnonzero(~membership.any(axis=1))
-        if len(empty):
-            raise RegionError(
-                f"{counted(len(empty), 'region has', 'regions have')} no vertices: {_some(empty)}; "
-                "leave out empty regions"
-            )
-        uncovered = np.flatnonzero(~membership.any(axis=0))
-        if len(uncovered):
-            raise RegionError(
-                f"{counted(len(uncovered), 'vertex is', 'vertices are')} in no region: "
-                f"{_some(uncovered)}; add every vertex to a region"
-            )
         if not (is_number(self.smoothness) and self.smoothness > 0.0):
             raise RegionError(f"smoothness must be a number above 0; got {shown(self.smoothness)}")
+        if self.carrier is not None:
+            carrier = _checked_carrier(self.mesh, self.carrier)
+            object.__setattr__(self, "carrier", carrier)
+            membership[:, self._carrying.is_carried] = False
+        _require_complete(membership, self.is_carried)
         object.__setattr__(self, "membership", read_only(membership))
+        if self.is_carried.any():
+            object.__setattr__(self, "membership", read_only(membership | (self.weights > 0.0)))
+
+    @cached_property
+    def _carrying(self) -> Carrying:
+        assert self.carrier is not None
+        return Carrying(self.mesh, self.carrier)
+
+    @property
+    def is_carried(self) -> BoolArray:
+        """(n,) bool: the vertices of components that others carry."""
+        if self.carrier is None:
+            return np.zeros(self.mesh.n_vertices, dtype=bool)
+        return self._carrying.is_carried
 
     @classmethod
     def single(cls, mesh: Mesh) -> Regions:
@@ -103,7 +116,14 @@ class Regions(Described, Frozen):
         return cls(mesh, np.atleast_2d(plain(masks, "masks")))
 
     @classmethod
-    def from_labels(cls, mesh: Mesh, labels: ArrayLike, overlap: int = 4) -> Regions:
+    def from_labels(
+        cls,
+        mesh: Mesh,
+        labels: ArrayLike,
+        overlap: int = 4,
+        *,
+        carrier: IntArray | None = None,
+    ) -> Regions:
         """Return one region per label, grown so that neighbouring regions overlap.
 
         Parameters
@@ -115,6 +135,8 @@ class Regions(Described, Frozen):
         overlap : int
             Number of edge rings by which each region grows beyond its label; an overlap is about
             twice as wide.  With 0 there are no overlaps, and the surface may tear at borders.
+        carrier : (c,) int, optional
+            As of `Regions`; every label must occur on a component that nothing carries.
 
         Raises
         ------
@@ -140,7 +162,7 @@ class Regions(Described, Frozen):
                 f"got {array.dtype} of shape {array.shape}"
             )
         masks = array == np.unique(array)[:, None]
-        return cls(mesh, masks).grow(overlap)
+        return cls(mesh, masks, carrier=carrier).grow(overlap)
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -183,7 +205,12 @@ class Regions(Described, Frozen):
         Zero outside a region and on its border, except at vertices that are on the border of all
         their regions.
         """
-        return read_only(overlap_weights(self.mesh, self.membership, self.smoothness))
+        weights = overlap_weights(self.mesh, self.membership, self.smoothness)
+        if self.is_carried.any():
+            weights = self._carrying.carried(weights.T).T
+            weights = np.where(weights > _LEAST_WEIGHT, weights, 0.0)
+            weights /= weights.sum(axis=0)
+        return read_only(weights)
 
     @property
     def labels(self) -> IntArray:
@@ -203,7 +230,43 @@ class Regions(Described, Frozen):
         membership = self.membership.copy()
         for members in membership:
             members[within_rings(self.mesh.adjacency, np.flatnonzero(members), int(rings))] = True
-        return Regions(self.mesh, membership, self.smoothness)
+        return self.with_membership(membership)
+
+    def with_membership(self, membership: BoolArray) -> Regions:
+        """Return regions with another *membership* (s, n), otherwise like these."""
+        return Regions(self.mesh, membership, self.smoothness, self.carrier)
+
+
+def _require_complete(membership: BoolArray, is_carried: BoolArray) -> None:
+    """Raise a RegionError if a region is empty, or a vertex that is not carried in none."""
+    empty = np.flatnonzero(~membership.any(axis=1))
+    if len(empty):
+        raise RegionError(
+            f"{counted(len(empty), 'region has', 'regions have')} no vertices: {_some(empty)}; "
+            "leave out empty regions"
+        )
+    uncovered = np.flatnonzero(~membership.any(axis=0) & ~is_carried)
+    if len(uncovered):
+        raise RegionError(
+            f"{counted(len(uncovered), 'vertex is', 'vertices are')} in no region: "
+            f"{_some(uncovered)}; add every vertex to a region"
+        )
+
+
+def _checked_carrier(mesh: Mesh, carrier: ArrayLike) -> IntArray:
+    """Return the *carrier* of each component of *mesh*; RegionError if one has no root."""
+    found, count = plain(carrier, "carrier"), int(mesh.components.max()) + 1
+    is_valid = found.shape == (count,) and found.dtype.kind in "iu"
+    if is_valid and ((found >= 0) & (found < count)).all():
+        at = found.astype(np.int64)
+        for _ in range(count.bit_length()):
+            at = at[at]
+        if (found[at] == at).all():
+            return read_only(found.astype(np.int64))
+    raise RegionError(
+        f"carrier must be one of 0..{count - 1} for each of {count} components, and lead to one "
+        f"that carries itself; got {shown(carrier)}"
+    )
 
 
 def usual_overlap(n_vertices: float) -> int:

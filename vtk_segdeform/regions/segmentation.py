@@ -6,8 +6,8 @@ separated; if more, the largest parts are cut into slices of about equal area (`
 is computed on a coarse surface (`coarse`), so that it costs about the same for every mesh and
 hardly depends on the resolution of the mesh.
 
-Large components have regions of their own.  Buttons, teeth and screws, and eyes in their sockets,
-belong to the part that they are nearest to; small components far from everything share a region.
+Components that follow others have no regions of their own, but are in those of the nearest points
+of their carriers (`geometry.following`).  Small components far from everything share a region.
 
 Finally the borders between parts are shortened and moved into creases on the mesh (`borders`), or,
 of a large mesh, on a decimated one.
@@ -18,14 +18,16 @@ from __future__ import annotations
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import sizes
-from ..arrays import BoolArray, IntArray, is_whole
+from ..arrays import BoolArray, IntArray, as_ids, is_whole
 from ..checks import shown
 from ..errors import ArgumentError, RegionError
 from ..geometry import (
     SMALL_COMPONENT,
-    attached,
+    Attach,
+    carriers,
     component_shares,
     decimated,
     nearest_pairs,
@@ -49,6 +51,8 @@ def segment(
     n_regions: int | None = None,
     *,
     overlap: int | None = None,
+    attach: Attach | None = None,
+    held: ArrayLike = (),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Regions:
@@ -61,12 +65,18 @@ def segment(
     n_regions : int, optional
         Number of regions, 1 to n.  None separates every limb and nothing else: one region for
         a sphere, three for a cactus with two arms, six for a man: head, arms, legs and trunk.
-        Components that are small and near a large one, or set into one, and all but the 16 largest
-        get no region of their own.
+        Components that follow others get no region of their own.
     overlap : int, optional
         Number of edge rings by which each region grows over its neighbours.  None means a tenth of
         the width of a region in edges, sqrt(n / regions) / 10, at least 2: the same width in space
         on coarse and fine meshes.
+    attach : mapping of int to int or "free", optional
+        For components, numbered as in `Mesh.components`, the one that each follows; ``"free"`` if
+        it follows none.  By default a component follows one that it lies against, is around or
+        inside of; see `geometry.following`.
+    held : (k,) int or (n,) bool
+        Vertices that will be fixed or in handles.  Components with any of them follow none, unless
+        *attach* has another carrier for them.
     seed : int
         Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
@@ -76,14 +86,16 @@ def segment(
     -------
     regions : Regions
         Before they are grown, their parts of one component are connected.  If *n_regions* is less
-        than the number of components, each of the largest components is a region; every other
-        component is added to the region of the vertex that it is nearest to.  For None, small
-        components far from large ones share a region.
+        than the number of components that follow none, each of the largest of these is a region,
+        and the others follow the one that they are nearest to.  For None, these are at most 16, and
+        small components far from all others share a region.
 
     Raises
     ------
     RegionError
         If *n_regions* is not an integer in 1..n.
+    ArgumentError
+        If *attach* is for other components, or they carry each other.
 
     Notes
     -----
@@ -99,7 +111,8 @@ def segment(
         raise ArgumentError(f"seed must be a whole number, 0 or more; got {shown(seed)}")
     tell(progress, 0.0, "sampling vertices")
     whole, kept = mesh, np.arange(n)
-    main, far = _main_components(mesh, n_regions)
+    carrier = carriers(mesh, attach, roots=mesh.components[as_ids(held, n, "held")])
+    main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)
     shape = mesh
@@ -124,7 +137,12 @@ def segment(
     tell(progress, 0.95, "growing regions")
     if overlap is None:
         overlap = usual_overlap(n / (labels.max() + 1))
-    regions = Regions.from_labels(whole, _with_others(whole, kept, labels, far), overlap)
+    every = np.full(n, labels.max() + 1)  # components that are far share a region
+    every[kept] = labels
+    is_carried = carrier != np.arange(len(carrier))
+    every[is_carried[whole.components]] = labels[0]  # will be those of the carrier
+    follows = carrier if is_carried.any() else None
+    regions = Regions.from_labels(whole, every, overlap, carrier=follows)
     tell(progress, 1.0, "regions found")
     return regions
 
@@ -185,36 +203,23 @@ def _parts(surface: Surface, n_regions: int | None, progress: Progress | None) -
     return labels
 
 
-def _main_components(mesh: Mesh, n_regions: int | None) -> tuple[BoolArray, BoolArray]:
-    """Return which components are segmented, and which others are small and far, (c,) bool each."""
-    main = np.ones(int(mesh.components.max()) + 1, dtype=bool)
-    far = np.zeros_like(main)
-    if len(main) == 1 or (n_regions is not None and n_regions >= len(main)):
-        return main, far
-    share = component_shares(mesh.vertex_areas, mesh.components)
-    main[np.argsort(-share, kind="stable")[n_regions or _TYPICAL_REGIONS :]] = False
-    if n_regions is None:
-        small = share < SMALL_COMPONENT
-        small[share.argmax()] = False
-        near = attached(mesh.vertices, mesh.vertex_areas, mesh.components)
-        main &= ~(small | near)
-        far = small & ~near
-    return main, far
+def _main_components(mesh: Mesh, n_regions: int | None, carrier: IntArray) -> BoolArray:
+    """Return which components are segmented, (c,) bool.
 
-
-def _with_others(mesh: Mesh, kept: IntArray, labels: IntArray, far: BoolArray) -> IntArray:
-    """Return the labels (n,) of all vertices, from those of the *kept* ones.
-
-    Other components have the label of the nearest of these, those that are *far* one of their own.
+    If there are too many for regions of their own, the others get the nearest one as their
+    *carrier*; for None, small ones are far from all others and get none.
     """
-    if len(kept) == mesh.n_vertices:
-        return labels
-    component, every = mesh.components, np.full(mesh.n_vertices, -1, dtype=np.int64)
-    every[kept] = labels
-    one, other, _ = nearest_pairs(
-        _without_ties(mesh).vertices, component, np.isin(np.arange(len(far)), component[kept])
-    )
-    of_component = np.empty(len(far), dtype=np.int64)
-    of_component[component[one]] = every[other]
-    of_component[far] = labels.max() + 1
-    return np.where(every < 0, of_component[component], every)
+    main: BoolArray = carrier == np.arange(len(carrier))
+    share = np.where(main, component_shares(mesh.vertex_areas, mesh.components), 0.0)
+    if main.sum() <= (n_regions or 1):
+        return main
+    main[np.argsort(-share, kind="stable")[n_regions or _TYPICAL_REGIONS :]] = False
+    is_far = np.zeros_like(main)
+    if n_regions is None:
+        is_far = (share > 0.0) & (share < SMALL_COMPONENT) & (share < share.max())
+        main &= ~is_far
+    one, other, _ = nearest_pairs(_without_ties(mesh).vertices, mesh.components, main)
+    here, there = mesh.components[one], mesh.components[other]
+    joins = (carrier[here] == here) & ~is_far[here]
+    carrier[here[joins]] = there[joins]
+    return main

@@ -32,12 +32,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IntArray, frozen
-from ..deformer import Deformer
+from ..deformer import Deformer, on_volumes
 from ..errors import SessionError
 from ..geometry import turned_over
 from ..mesh import Mesh, new_crossings
 from ..progress import Progress
-from ..solver import Solution, Status, VolumeConstraint, errors_at, moved_along, steps_to_volume
+from ..solver import Solution, Status, errors_at
 from .handles import stacked
 from .poses import VOLUME_TOLERANCE, Poses
 from .pulls import localised
@@ -203,7 +203,7 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
     if constraints:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
-            tried.append(_on_volumes(moved, constraints, stays))
+            tried.append(on_volumes(moved, constraints, stays))
             if max(each.missed(tried[-1]) for each in constraints) <= VOLUME_TOLERANCE:
                 exact.append(tried[-1])
                 if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
@@ -213,22 +213,6 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
     for array in (moved, known, shifts):
         frozen(array)
     return replace(finished, vertices=moved, held=known, shifts=shifts)
-
-
-def _on_volumes(
-    x: FloatArray, constraints: tuple[VolumeConstraint, ...], stays: IntArray
-) -> FloatArray:
-    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*."""
-    centre = x.mean(axis=0)
-    moved, directions = x - centre, []
-    for constraint in constraints:
-        normals = constraint.gradient(moved)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        normals /= np.where(lengths > 0.0, lengths, 1.0)
-        normals[stays] = 0.0
-        directions.append(normals)
-    paths = np.hstack([moved, *directions])
-    return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
 def _offset(poses: Poses, state: State, cages: Cages, *, fades: bool) -> FloatArray:

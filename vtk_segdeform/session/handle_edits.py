@@ -15,6 +15,7 @@ from ..deformer import checked_point, checked_radius
 from ..geometry import rigid_fit
 from . import handles, pulls
 from .poses import Poses
+from .separating import separated
 from .state import State
 from .timeline import Timeline
 
@@ -62,7 +63,7 @@ class Handles(Mapping[str, IntArray]):
         after = handles.with_handle(self._poses.mesh, state, name, vertices)
         known = state.handles.get(name)
         if known is None or not np.array_equal(after[name], known):
-            self._step(f"set {name}", replace(state, handles=after))
+            self._step(f"set {name}", separated(self._poses, replace(state, handles=after)))
         return name
 
     def remove(self, *names: str) -> None:

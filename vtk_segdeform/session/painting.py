@@ -34,10 +34,18 @@ def with_regions(state: State, regions: Regions, names: naming.Names = ()) -> St
     cages: tuple[Cage, ...] = ()
     if old is not None:
         same = np.array_equal(old.membership, regions.membership)
-        if same and old.smoothness == regions.smoothness:
+        if same and old.smoothness == regions.smoothness and _same_carrier(old, regions):
             return state
         cages = state.cages if _still_fit(old, regions, state.cages) else ()
     return replace(state, regions=regions, cages=cages, region_names=names).at_rest()
+
+
+def _same_carrier(old: Regions, new: Regions) -> bool:
+    """Return whether the same components carry others in both."""
+    one, other = old.carrier, new.carrier
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:
@@ -190,8 +198,7 @@ class Painting:
         return naming.region_name(self._names, region)
 
     def _step(self, label: str, membership: BoolArray, names: naming.Names) -> None:
-        regions = self._regions
-        after = Regions(regions.mesh, membership, regions.smoothness)
+        after = self._regions.with_membership(membership)
         self._history.step(label, with_regions(self._history.state, after, names))
 
 

@@ -129,7 +129,12 @@ class Poses:
                 progress=progress,
             )
 
-        return self.memo.get("bound", _binding(state), bound, _KEPT)
+        def stiffened() -> Deformer:
+            return self.memo.get("bound", _binding(state), bound, _KEPT).stiffened(state.stiffness)
+
+        if state.stiffness is None:
+            return self.memo.get("bound", _binding(state), bound, _KEPT)
+        return self.memo.get("stiffened", (*_binding(state), state.stiffness), stiffened)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
@@ -299,4 +304,9 @@ def _volumes(state: State) -> dict[str, Any]:
     """Return the options of *state* for `Deformer.hold`."""
     names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
     given = {name: getattr(state.options, name) for name in names}
-    return {**given, "volumes": dict(state.options.volumes)}
+    return {
+        **given,
+        "volumes": dict(state.options.volumes),
+        "slides": state.slides,
+        "symmetry": state.options.symmetry,
+    }

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from ..arrays import IntArray
 from ..cages import Cage, fit_cages, require_cage_vertices, suggested_size
 from ..deformer import Deformer
 from ..errors import RegionError
@@ -32,13 +35,24 @@ def preparation(poses: Poses, state: State, progress: Progress | None = None) ->
     """Return the regions and cages that *state* lacks, bound."""
     mesh, regions = poses.mesh, state.regions
     if regions is None:
-        regions = segment(mesh, None, progress=part(progress, 0.0, _SEGMENTED))
+        regions = segment(mesh, None, progress=part(progress, 0.0, _SEGMENTED), **following(state))
     state = replace(state, regions=regions)
     cages = state.cages or fitted(mesh, state, part(progress, _SEGMENTED, _FITTED))
     state = State(regions, cages, options=state.options)
     deformer = Poses(mesh).bind(state, part(progress, _FITTED, 1.0))
     _ = mesh.adjacency, poses.lids(state)  # the first frame needs them
     return Preparation(regions, cages, deformer)
+
+
+def following(state: State) -> dict[str, Any]:
+    """Return the arguments of `segment` for what follows what in *state*."""
+    return {"attach": dict(state.options.attach), "held": held_firmly(state)}
+
+
+def held_firmly(state: State) -> IntArray:
+    """Return the fixed vertices and those of handles that were not made by pulls and pins, (k,)."""
+    own = [ids for name, ids in state.handles.items() if name not in state.pulls and len(ids) > 1]
+    return np.concatenate([state.fixed, *own])
 
 
 def fits(mesh: Mesh, state: State, preparation: Preparation) -> bool:

@@ -26,7 +26,7 @@ Long because it is the interface of one class; the implementation is in the othe
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -40,13 +40,14 @@ from ..cages import Cage
 from ..checks import Described, require, require_sequence, shown
 from ..deformer import (
     Deformer,
+    Slide,
     checked_constraints,
     checked_locality,
     checked_place,
     checked_radius,
 )
 from ..errors import CageError, SessionError
-from ..geometry import Lids
+from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
@@ -59,15 +60,18 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
+from .separating import separated
 from .state import (
     Cages,
     Options,
     Pose,
     State,
     checked_state,
+    checked_stiffness,
     fitting_cages,
     label_of_change,
     of_mesh,
+    owned_slides,
 )
 from .timeline import Timeline
 
@@ -307,7 +311,10 @@ class Session(Described):
         progress: Progress | None = None,
     ) -> None:
         """Segment the mesh automatically; see `vtk_segdeform.segment`."""
-        regions = segment(self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress)
+        follows = preparing.following(self.state)
+        regions = segment(
+            self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
+        )
         self.history.step("segment", painting.with_regions(self.state, regions))
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
@@ -433,9 +440,25 @@ class Session(Described):
         fixed, _ = checked_constraints(self.mesh, vertices, self.state.handle)
         if not np.array_equal(fixed, self.fixed):
             after = handles.with_fixed(self.mesh, self.state, fixed, self.vertices)
-            self.history.step("set fixed vertices", after)
+            self.history.step("set fixed vertices", separated(self.poses, after))
 
     # The pose.
+
+    def set_stiffness(self, stiffness: ArrayLike | None) -> None:
+        """Let the surface have a *stiffness* (n,), as `Deformer` takes it; None: the same all over.
+
+        The pose stays; call `refine` to apply it.
+        """
+        checked = checked_stiffness(self.mesh, stiffness)
+        self.history.step("set stiffness", replace(self.state, stiffness=checked))
+
+    def set_slides(self, slides: Iterable[Slide]) -> None:
+        """Let vertices slide along planes, lines or the surface at rest only; see `Slide`.
+
+        The pose stays; call `refine` to apply them.
+        """
+        owned = owned_slides(self.mesh, slides)
+        self.history.step("set slides", replace(self.state, slides=owned))
 
     def drag(
         self,
@@ -616,6 +639,16 @@ class Session(Described):
         """Return all volumes of the pose by name, in the mesh's unit cubed; see `Deformer`."""
         return self.deformer.volumes(self.vertices)
 
+    def volume(self, name: str) -> tuple[float, float]:
+        """Return one of `volumes`, and (V - V0) / V0."""
+        return self.deformer.volume(name, self.vertices)
+
+    def forget_volume(self, name: str) -> None:
+        """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
+        goals = {own: goal for own, goal in self.options.volumes if own != name}
+        options = replace(self.options, volumes=tuple(goals.items()))
+        self.history.step(f"forget the volume of {name}", replace(self.state, options=options))
+
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
         """Change the volume called *name*, as part of a drag, like `drag`.
 
@@ -741,7 +774,9 @@ class Session(Described):
         """Reset the pose to rest; an ongoing drag is committed first."""
         self.history.step("reset pose", self.state.at_rest())
 
-    def change_options(self, **changes: float | bool | Mapping[str, str | float] | None) -> None:
+    def change_options(
+        self, **changes: float | bool | Attach | Mapping[str, str | float] | None
+    ) -> None:
         """Change some of the `Options` by name; call `refine` to apply them to the pose."""
         unknown = sorted(changes.keys() - vars(self.options).keys())
         if unknown:
@@ -761,9 +796,9 @@ class Session(Described):
         """Redo the last step undone; return its label, or None if there is none."""
         return self.history.redo()
 
-    def commit(self, label: str | None = None) -> str | None:
+    def commit(self, label: str | None = None, *, join: bool = False) -> str | None:
         """End the drag as one step, and return its label; see `Timeline.commit`."""
-        return self.history.commit(label)
+        return self.history.commit(label, join=join)
 
     def revert(self) -> None:
         """Cancel the drag and restore the state before it."""

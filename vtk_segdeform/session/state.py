@@ -11,24 +11,35 @@ Long because each part of a state is checked here, where it enters.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number
+from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
-from ..deformer import checked_constraints, checked_goals, checked_place
-from ..errors import CageError, ConstraintError, RegionError, SessionError
+from ..deformer import (
+    Slide,
+    Stiffness,
+    checked_constraints,
+    checked_goals,
+    checked_place,
+    checked_slides,
+)
+from ..errors import ArgumentError, CageError, ConstraintError, RegionError, SessionError
 from ..freezing import Frozen
+from ..geometry import FREE, checked_attach
 from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
 from .naming import Names, checked_names, fault_of, region_name
 
+Attachments: TypeAlias = tuple[tuple[int, int | str], ...]
+"""Components and their carriers; see `Options`."""
 Cages: TypeAlias = tuple[FloatArray, ...]
 """One (m_r, 3) float per region: the vertices of the cages in a pose."""
 
@@ -42,10 +53,12 @@ _WORDS = {
     "preserve_volume": "volume preservation",
     "preserve_region_volumes": "volume preservation per region",
     "volumes": "volumes",
+    "symmetry": "symmetry",
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
     "avoid_contact": "contact avoidance",
+    "attach": "attached components",
 }
 
 
@@ -68,12 +81,17 @@ class Options:
         each connected part, as `Deformer` does.
     volumes : mapping of str to str or float
         Goals by the names of volumes, as `Deformer` takes them; kept as pairs.
+    symmetry : str, optional
+        Mirror motions about a plane: "x", "y", "z" or "auto", as `Deformer` does.
     stretch : float
         Stretch resistance relative to detail preservation; 0 is the paper's energy.
     rotation_groups : int
         Number of rotation clusters.
     avoid_contact : bool
         Keep parts of the surface from crossing each other, as `Deformer` does.
+    attach : mapping of int to int or "free"
+        The components that others follow, as of `segment`, used at the next segmentation; kept as
+        sorted pairs.
 
     Raises
     ------
@@ -89,7 +107,9 @@ class Options:
     stretch: float = 1.0
     rotation_groups: int = 300
     avoid_contact: bool = False
+    attach: Attachments = ()
     volumes: tuple[tuple[str, str | float], ...] = ()
+    symmetry: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "volumes", _pairs(self.volumes))
@@ -98,13 +118,33 @@ class Options:
             value = getattr(self, name)
             if not isinstance(value, bool):
                 raise SessionError(f"{name} must be True or False; got {shown(value)}")
+        object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
+        if self.symmetry not in (None, "x", "y", "z", "auto"):
+            raise SessionError(
+                f"symmetry must be x, y, z, auto or None; got {shown(self.symmetry)}"
+            )
         _require_number("n_cage_vertices", self.n_cage_vertices, 8, whole=True)
         _require_number("stretch", self.stretch, 0.0)
         if self.offset is not None:
             _require_number("offset", self.offset, _TINY)
         _require_number("rotation_groups", self.rotation_groups, 1, whole=True)
+
+
+def _checked_attach(attach: Any) -> Attachments:
+    """Return *attach*, a mapping or pairs, as sorted pairs; SessionError if it is neither."""
+    try:
+        pairs = dict(attach)
+        return tuple(sorted(checked_attach(pairs, 1 + max(_numbers(pairs), default=0)).items()))
+    except (ArgumentError, TypeError, ValueError):
+        raise SessionError(
+            f"attach must map components to others or {FREE!r}; got {shown(attach)}"
+        ) from None
+
+
+def _numbers(pairs: Mapping[Any, Any]) -> list[int]:
+    return [each for pair in pairs.items() for each in pair if is_whole(each, 0)]
 
 
 def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
@@ -205,6 +245,10 @@ class State(Described, Frozen):
     """For handles by name, (3,): the point about which they rotate, at rest, if it was moved."""
     fixed_at: FloatArray | None = None
     """(f, 3) float: where the fixed vertices stay, if they were fixed in a pose; None: at rest."""
+    stiffness: FloatArray | None = None
+    """(n,) float: as `Deformer` takes it."""
+    slides: tuple[Slide, ...] = ()
+    """As `Deformer` takes them, with read-only arrays."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -248,7 +292,9 @@ class State(Described, Frozen):
                 Change.CONSTRAINTS,
                 self.fixed is other.fixed
                 and self.handles is other.handles
-                and self.fixed_at is other.fixed_at,
+                and self.fixed_at is other.fixed_at
+                and self.stiffness is other.stiffness
+                and self.slides is other.slides,
             ),
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
@@ -304,8 +350,25 @@ def checked_state(mesh: Mesh, state: State) -> State:
     constraints = frozen(fixed.copy()), owned
     places = None if pose is None else _checked_places(mesh, fixed, state)
     return State(
-        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places
-    )
+        regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
+        checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
+    )  # fmt: skip
+
+
+def checked_stiffness(mesh: Mesh, stiffness: ArrayLike | None) -> FloatArray | None:
+    """Return a read-only copy of *stiffness* (n,); ConstraintError if it is none."""
+    if stiffness is None:
+        return None
+    Stiffness.of(mesh, stiffness)
+    return frozen(np.array(stiffness, dtype=np.float64))
+
+
+def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
+    """Return checked *slides* with read-only arrays; ConstraintError if they are none."""
+    checked = checked_slides(mesh, slides)
+    for each in checked:
+        frozen(np.asarray(each.vertices))
+    return checked
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -315,7 +378,7 @@ def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
             raise RegionError("these regions belong to another mesh; create them on this mesh")
-    return Regions(mesh, regions.membership, regions.smoothness)
+    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier)
 
 
 def fitting_cages(

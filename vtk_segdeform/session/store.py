@@ -5,6 +5,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     header.json           format, version, counts, names, options
     mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
     membership.npy        (r, n) bool      region by vertex                        if any
+    carrier.npy           (c,) int         `Regions.carrier`                       if any
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
@@ -42,6 +43,7 @@ import numpy as np
 
 from ..cages import Cage
 from ..checks import as_flag, as_path, require, shown
+from ..deformer import Slide
 from ..errors import SessionError
 from ..files import open_regular, replacing
 from ..importing import imported
@@ -68,12 +70,14 @@ if TYPE_CHECKING:
     from ..io import Surface
 
 FORMAT = "vtk_segdeform session"
-VERSION = 2
+VERSION = 3
 
-_LATER = {
+_LATER: dict[str, Any] = {
+    "attach": (),
     "lids": None,
     "avoid_contact": False,
     "volumes": (),
+    "symmetry": None,
 }  # options that version 1 does not have, and their defaults
 
 # Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
@@ -172,9 +176,10 @@ def _write(
     options = {name: _plain(value) for name, value in asdict(state.options).items()}
     options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
     is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
+    is_new = state.stiffness is not None or bool(state.slides)
     header: dict[str, Any] = {
         "format": FORMAT,
-        "version": 1 if is_simple else VERSION,
+        "version": 3 if is_new else 1 if is_simple else 2,
         "n_vertices": mesh.n_vertices,
         "n_faces": mesh.n_faces,
         "n_regions": 0 if regions is None else regions.n_regions,
@@ -193,6 +198,9 @@ def _write(
     arrays |= {"fixed": state.fixed, "handle": state.handle}
     if regions is not None:
         arrays["membership"] = regions.membership
+        if regions.carrier is not None:  # optional: earlier versions have the same membership
+            header["n_components"] = len(regions.carrier)
+            arrays["carrier"] = regions.carrier
     if state.cages:
         arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
         arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
@@ -219,6 +227,20 @@ def _write(
         arrays["fixed_at"] = state.fixed_at
     if state.pivots:
         header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
+    if state.stiffness is not None:
+        header["has_stiffness"] = True
+        arrays["stiffness"] = state.stiffness
+    if state.slides:
+        sliding = [np.asarray(each.vertices) for each in state.slides]
+        header["slides"] = [
+            [
+                len(ids),
+                each.along,
+                None if each.direction is None else np.asarray(each.direction).tolist(),
+            ]
+            for ids, each in zip(sliding, state.slides, strict=True)
+        ]
+        arrays["sliding"] = np.concatenate(sliding)
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -238,7 +260,11 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     regions = None
     if r:
         membership = archive.array("membership", "b", (r, n))
-        regions = Regions(mesh, membership, field(header, "smoothness", number))
+        carrier = None
+        if "n_components" in header:
+            count = field(header, "n_components", whole)
+            carrier = archive.array("carrier", "i", (count,))
+        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier)
     counts = field(header, "cages", list_of(row_of(whole, whole)))
     n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
     total = sum(n_vertices)
@@ -292,6 +318,17 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         more["pivots"] = {name: np.array(point) for name, point in pivots.items()}
     if "fixed_in_pose" in header and field(header, "fixed_in_pose", flag):
         more["fixed_at"] = archive.array("fixed_at", "f", (len(fixed), 3))
+    if "has_stiffness" in header and field(header, "has_stiffness", flag):
+        more["stiffness"] = archive.array("stiffness", "f", (n,))
+    if "slides" in header:
+        kind = row_of(whole, text, optional(row_of(number, number, number)))
+        kinds = field(header, "slides", list_of(kind))
+        lengths = [count for count, *_ in kinds]
+        total = sum(lengths)
+        own = split_rows(archive.array("sliding", "i", (total,)), lengths)
+        more["slides"] = tuple(
+            Slide(ids, *kind) for ids, (_, *kind) in zip(own, kinds, strict=True)
+        )
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:

@@ -162,14 +162,19 @@ class Timeline:
             self._go(self._position + 1)
         return label
 
-    def commit(self, label: str | None = None) -> str | None:
+    def commit(self, label: str | None = None, *, join: bool = False) -> str | None:
         """End the drag and record it as one step, by default labelled "drag handle 1".
+
+        If they are to *join*, it becomes part of the step before it with the same label.
 
         Returns
         -------
         label : str or None
             The label of the step; None if there was no drag.
         """
+        joined = join and self._drag is not None and self._labels[self._position] == label
+        if joined:
+            self._position -= 1
         label = self._end_drag(None if label is None else require(label, str, "label"))
         if label is not None:
             self._listeners.notify(Change.HISTORY)

@@ -12,6 +12,8 @@ The files, in reading order:
     extrapolation           where a solve starts in a drag
     exact_volume            motion of a pose onto its exact volumes
     coarse_volume           volume of a large mesh from a coarse surface
+    sliding                 vertices that stay on a plane, a line or a surface
+    mirror_term             symmetry of the cages
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
@@ -29,8 +31,10 @@ from .exact_volume import (
     steps_to_volume,
 )
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
+from .mirror_term import MirrorTerm
 from .newton import Step, constrained_step, minimise
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
+from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .terms import Term
 from .volume_constraints import (
@@ -56,13 +60,16 @@ __all__ = [
     "ContactSurface",
     "GaussNewton",
     "HeldVolumes",
+    "MirrorTerm",
     "ScaledSurface",
+    "Sliding",
     "Solution",
     "SolverOptions",
     "SolverResult",
     "Status",
     "Step",
     "Term",
+    "Track",
     "VolumeConstraint",
     "Volumes",
     "are_met",

@@ -202,6 +202,8 @@ class Contact:
         """Return the term of *surface* beside a shape energy of this *scale*."""
         return cls(surface, held, _STIFFNESS * scale)
 
+    is_always_active = False
+
     def value_and_slope(
         self, p: FloatArray, x: FloatArray = NO_SURFACE
     ) -> tuple[float, FloatArray]:

@@ -306,7 +306,8 @@ class GaussNewton:
         rows = [self.volumes.surface.adjoint(g) for g in gradients(self.volumes.constraints, x)]
         energy, slope = self.energy.value_and_slope(p)
         value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
-        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, value != energy)
+        is_active = value != energy or any(term.is_always_active for term in self.terms)
+        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, is_active)
         return here.toward(self._term)
 
     def compliance(self, rows: FloatArray) -> FloatArray:

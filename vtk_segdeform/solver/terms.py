@@ -1,7 +1,7 @@
 """Further terms of the objective, such as contact.
 
-A term is smooth, and inactive, exactly 0, at most poses: then a step costs hardly more, and its
-result is bit for bit that without the term.
+A term is smooth.  One that is not always active is exactly 0 at most poses: then a step costs
+hardly more, and its result is bit for bit that without the term.
 """
 
 from __future__ import annotations
@@ -19,8 +19,13 @@ NO_SURFACE = np.empty((0, 3))  # of a pose whose surface is not known
 class Term(Protocol):
     """A further term of the objective; see `terms`."""
 
+    @property
+    def is_always_active(self) -> bool:
+        """Whether its Hessian counts at all poses."""
+        ...
+
     def value_and_slope(
-        self, p: FloatArray, x: FloatArray = NO_SURFACE
+        self, p: FloatArray, x: FloatArray = NO_SURFACE, /
     ) -> tuple[float, FloatArray]:
         """Return the term for cages at *p* (m, 3), and half its gradient (m, 3).
 
@@ -29,14 +34,14 @@ class Term(Protocol):
         """
         ...
 
-    def hessian(self, p: FloatArray, x: FloatArray = NO_SURFACE) -> FloatArray | None:
+    def hessian(self, p: FloatArray, x: FloatArray = NO_SURFACE, /) -> FloatArray | None:
         """Return half the Hessian at *p*, made positive semi-definite; None while inactive.
 
         It is (3m, 3m), stacked axis by axis.  Only its lower half is read.
         """
         ...
 
-    def share(self, p: FloatArray, step: FloatArray) -> float:
+    def share(self, p: FloatArray, step: FloatArray, /) -> float:
         """Return the share of a *step* (m, 3) from *p*, at most 1, that the term allows."""
         ...
 

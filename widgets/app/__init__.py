@@ -6,17 +6,14 @@ The files, in reading order:
     pages         the pages of the window
     start_page    the page shown before a document is open
     documents     the open document, and readers for it
-    opening       the request to open a document, and the waiting page
-    qt_timer      a timer of Qt for background jobs
+    qt_ticker     the timers of Qt, for a queue
     saving        saving, and the questions asked before
     dialogs       the dialogs
     menus         the menus
     stored_keys   the user's keys
     repairing repair_dialog repair_preview
                   repair and open: a closed copy of the surface as a new document
-    drops         files dropped on the window
     recent        recent files
-    autosaver     when to autosave
 """
 
 from .window import Window

@@ -1,4 +1,4 @@
-"""The document in the window, and readers for meshes, sessions and autosaves.
+"""The document in the window, requests to open one, and readers of files and autosaves.
 
 Readers run in any thread; this file does not use Qt.
 """
@@ -48,18 +48,34 @@ class Document:
         """The description stored with autosaved work."""
         return About(self.name, _text(self.session_path), _text(self.source))
 
-    def file(self, session: Session, *, is_unsaved: bool = False) -> SessionFile:
-        """Return the editor's file for *session*, which is modified at first if *is_unsaved*."""
-        saved = Session(session.mesh) if is_unsaved else session
-        file = SessionFile(self.proposal.with_suffix(SUFFIX), saved)
+    def file(self, session: Session, *, is_new: bool = False) -> SessionFile:
+        """Return the editor's file for *session*, which has yet to be saved if it *is_new*."""
+        file = SessionFile(self.proposal.with_suffix(SUFFIX), session)
         if self.session_path is not None:
             file.path = self.session_path
-            file.mark_saved(saved)
+            file.mark_saved(session)
+        file.is_new = is_new
         return file
 
 
 Opened = tuple[Document, Session]
 Reader = Callable[[Progress], Opened]
+
+
+@dataclass(frozen=True)
+class Request:
+    """A document to open."""
+
+    name: str
+    """Its name for users."""
+    reader: Reader
+    """``reader(progress)`` reads it, in another thread."""
+    path: Path | None = None
+    """The file, if the user chose one."""
+    slot: Slot | None = None
+    """Where it was autosaved, if it is recovered work."""
+    is_new: bool = False
+    """Whether it has been made or recovered by the program, and is to be saved."""
 
 
 def from_file(path: Path) -> Reader:

@@ -10,7 +10,6 @@ from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.version import __version__
 
-from ..editor import actions
 from ..qt import add_view_entries, name_keys
 from . import saving
 from .dialogs import show_about
@@ -68,9 +67,9 @@ class Menus:
         self._add(menu, "&Quit", window.close, _Keys.Quit).setMenuRole(_role("QuitRole"))
 
     def _edit(self) -> None:
-        menu = self._menu("&Edit")
-        self._undo = self._add(menu, "Undo", self._doing(actions.undo))
-        self._redo = self._add(menu, "Redo", self._doing(actions.redo))
+        window, menu = self._window, self._menu("&Edit")
+        self._undo = self._add(menu, "Undo", lambda: window.editor.run("undo"))
+        self._redo = self._add(menu, "Redo", lambda: window.editor.run("redo"))
         menu.aboutToShow.connect(self._update_steps)
 
     def _view(self) -> None:
@@ -79,19 +78,17 @@ class Menus:
         add_view_entries(menu, lambda: window.editor if window.has_mesh else None)
 
     def _help(self) -> None:
-        menu = self._menu("&Help")
-        card = self._add(menu, "&Keys ...", self._doing(actions.toggle_help))
+        window, menu = self._window, self._menu("&Help")
+        card = self._add(menu, "&Keys ...", lambda: window.editor.run("help"))
         self._need_mesh.append(card)
         named = [(card, card.text(), "help")]
-        menu.aboutToShow.connect(lambda: name_keys(named, self._window.keys))
-        self._need_mesh.append(self._add(menu, "&First steps", self._show_first_steps))
-        self._add(menu, "&About segdeform", self._show_about).setMenuRole(_role("AboutRole"))
-
-    def _show_first_steps(self) -> None:
-        self._window.editor_widget.first_steps.show()
-
-    def _show_about(self) -> None:
-        show_about(self._window, __version__)
+        menu.aboutToShow.connect(lambda: name_keys(named, window.keys))
+        self._need_mesh.append(
+            self._add(menu, "&First steps", lambda: window.editor_widget.first_steps.show())
+        )
+        self._add(menu, "&About segdeform", lambda: show_about(window, __version__)).setMenuRole(
+            _role("AboutRole")
+        )
 
     # Entries that are updated when a menu opens.
 
@@ -113,11 +110,11 @@ class Menus:
 
     def _update_steps(self) -> None:
         window = self._window
-        session = window.session if window.has_mesh else None
-        is_free = session is not None and not window.editor.is_busy
+        history = window.editor.controller.history if window.has_mesh else None
+        is_free = history is not None and not window.editor.is_busy
         for action, verb, label in (
-            (self._undo, "undo", session and window.editor.controller.undo_label),
-            (self._redo, "redo", session and window.editor.controller.redo_label),
+            (self._undo, "undo", history and history.undo_label),
+            (self._redo, "redo", history and history.redo_label),
         ):
             name = str(label or "").replace("&", "&&")
             name_keys([(action, f"&{verb.capitalize()} {name}".rstrip(), verb)], window.keys)
@@ -139,10 +136,6 @@ class Menus:
             action.setShortcut(QtGui.QKeySequence(keys))
         action.triggered.connect(lambda: call())
         return action
-
-    def _doing(self, action: actions.Action) -> Callable[[], None]:
-        while_busy = action is actions.toggle_help
-        return lambda: self._window.editor.do(action, while_busy=while_busy)
 
 
 def connect_panel(window: Any) -> None:

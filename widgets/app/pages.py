@@ -3,14 +3,63 @@
 from __future__ import annotations
 
 import gc
+from typing import Any
 
 from qtpy import QtCore, QtOpenGLWidgets, QtWidgets
 
-from .opening import WaitingPage
 from .start_page import StartPage
 
+Qt = QtCore.Qt
 _DELETE = QtCore.QEvent.Type.DeferredDelete
 _PERMANENT = 2  # number of pages that are never deleted
+
+
+class WaitingPage(QtWidgets.QWidget):
+    """The page shown while a document is read: its name, the progress and a Cancel button."""
+
+    cancelled = QtCore.Signal()
+    """The Cancel button was clicked, or Escape was pressed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.label, self.bar = QtWidgets.QLabel(), QtWidgets.QProgressBar()
+        self.cancel = QtWidgets.QPushButton("Cancel")
+        self.cancel.clicked.connect(self.cancelled)
+        self.bar.setTextVisible(False)
+        self.label.setWordWrap(True)
+        self.label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        inside = QtWidgets.QWidget()
+        inside.setFixedWidth(48 * self.fontMetrics().averageCharWidth())
+        column = QtWidgets.QVBoxLayout(inside)
+        column.addWidget(self.label)
+        column.addWidget(self.bar)
+        column.addWidget(self.cancel, 0, Qt.AlignmentFlag.AlignCenter)
+        layout = QtWidgets.QVBoxLayout(self)
+        layout.addWidget(inside, 0, Qt.AlignmentFlag.AlignCenter)
+
+    def begin(self, name: str) -> None:
+        """Show that *name* is being opened."""
+        self._name = name
+        self.show_progress(0.0, "")
+
+    def showEvent(self, event: Any) -> None:  # noqa: N802
+        """Take the keyboard."""
+        super().showEvent(event)
+        self.cancel.setFocus()
+
+    def keyPressEvent(self, event: Any) -> None:  # noqa: N802
+        """Cancel at Escape."""
+        if event.key() == Qt.Key.Key_Escape:
+            self.cancelled.emit()
+        else:
+            super().keyPressEvent(event)
+
+    def show_progress(self, fraction: float, text: str) -> None:
+        """Show the progress, 0..1, and the current step."""
+        title = f"Opening {self._name} ..."
+        self.label.setText(f"{title}\n{text}" if text else f"{title}\n")
+        self.bar.setRange(0, 1000 if fraction else 0)  # an unknown fraction shows a busy bar
+        self.bar.setValue(round(1000.0 * fraction))
 
 
 class Pages(QtWidgets.QStackedWidget):

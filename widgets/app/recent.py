@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 _KEY = "recent files"
-_MOST = 8
+_MOST_FILES = 8
 
 
 class Recent:
@@ -34,7 +34,7 @@ class Recent:
         path = path.absolute()
         if not _is_text(str(path)):
             return
-        self._store([path, *(each for each in self.paths if each != path)][:_MOST])
+        self._store([path, *(each for each in self.paths if each != path)][:_MOST_FILES])
 
     def drop(self, path: Path) -> None:
         """Remove a file."""

@@ -6,7 +6,6 @@ wanted stops at its next progress report.
 
 from __future__ import annotations
 
-import gc
 from typing import Any
 
 import numpy as np
@@ -17,16 +16,14 @@ from vtk_segdeform.mesh import Mesh, counted
 from vtk_segdeform.mesh_repair import Repair
 from vtk_segdeform.progress import Progress, part
 
-from ..editor import Job, error_text
+from ..editor import Kind, Queue, Task, error_text
 from ..qt import check_box, shortcut
-from .qt_timer import qt_timer
+from .qt_ticker import QtTicker
 from .repair_preview import Preview
 
-_DELAY = 300  # milliseconds between a change of the settings and the repair
-_PERIOD = 30  # milliseconds between two polls of the job
+_REST = 0.3  # seconds between a change of the settings and the repair
 _MOST_EDGES, _USUAL_EDGES = 1_000_000, 100
 _DELETE = QtCore.QEvent.Type.DeferredDelete
-_Result = tuple[Surface, Repair]
 
 
 class RepairDialog(QtWidgets.QDialog):
@@ -58,7 +55,7 @@ class RepairDialog(QtWidgets.QDialog):
         self.setWindowTitle("Repair and open")
         self.repaired: Surface | None = None
         self._given = given
-        self._job: Job[_Result] | None = None
+        self._queue = Queue(QtTicker(self), self._show_progress)
         shown = given if np.isfinite(given.points).all() else to_polydata(mesh)
         self.preview = Preview(shown, mesh, camera, self)
         self.before, self.after = (QtWidgets.QRadioButton(text) for text in ("Before", "After"))
@@ -102,29 +99,23 @@ class RepairDialog(QtWidgets.QDialog):
         for key in ("Return", "Enter"):
             shortcut(key, self, self._press_button)
         self._lay_out(buttons)
-        self._delay = QtCore.QTimer(self)
-        self._delay.setSingleShot(True)
-        self._delay.setInterval(_DELAY)
-        self._delay.timeout.connect(self._start)
         self.fill.toggled.connect(self.edges.setEnabled)
         for signal in (self.fill.toggled, self.edges.valueChanged, self.distance.valueChanged):
-            signal.connect(self._changed)
-        self._start()
+            signal.connect(lambda *_: self._repair(_REST))
+        self._repair(0.0)
 
     @property
     def is_computing(self) -> bool:
         """Whether a repair is being computed, or will be in a moment."""
-        return self._job is not None or bool(self._delay.isActive())
+        return self._queue.task(Kind.DOCUMENT) is not None
 
     def release(self) -> None:
         """Cancel a repair that is still running, and delete the dialog with its view."""
-        self._delay.stop()
-        self._cancel()
+        self._queue.stop()
         self.preview.close()
         self.setParent(None)
         self.deleteLater()
         QtCore.QCoreApplication.sendPostedEvents(self, getattr(_DELETE, "value", _DELETE))
-        gc.collect()  # as `Pages.delete_views`
 
     def _press_button(self) -> None:
         (self.cancelling if self.cancelling.hasFocus() else self.accepting).click()
@@ -155,39 +146,28 @@ class RepairDialog(QtWidgets.QDialog):
 
     # The repair.
 
-    def _changed(self, *_: object) -> None:
-        self._cancel()
+    def _repair(self, rest: float) -> None:
+        """Repair with the present settings, instead of earlier ones, after *rest* seconds."""
+        self._queue.cancel(Kind.DOCUMENT)
         self._show_busy()
-        self._delay.start()
-
-    def _cancel(self) -> None:
-        if self._job is not None:
-            self._job.cancel()
-        self._job = None
-
-    def _start(self) -> None:
         given, weld = self._given, self.distance.value()
         largest = self.edges.value() if self.fill.isChecked() else 0
 
-        def work(progress: Progress) -> _Result:
+        def work(progress: Progress) -> tuple[Surface, Repair]:
             repaired, done = repair_surface(
                 given, weld_distance=weld, largest_hole=largest, progress=part(progress, 0.0, 0.9)
             )
             progress(0.9, "Checking mesh")
             return Surface(repaired), done
 
-        self._show_busy()
-        job: Job[_Result] = Job(
-            qt_timer(self, _PERIOD),
-            work,
-            done=lambda result: self._show(*result) if self._is_wanted(job) else None,
-            failed=lambda error: self._fail(error) if self._is_wanted(job) else None,
-            watch=lambda job: self._show_progress(job) if self._is_wanted(job) else None,
+        task = Task(
+            kind=Kind.DOCUMENT,
+            begin=lambda: work,
+            done=lambda result: self._show(*result),
+            failed=self._fail,
+            rest=rest,
         )
-        self._job = job
-
-    def _is_wanted(self, job: Job[_Result]) -> bool:
-        return job is self._job
+        self._queue.add(task)
 
     def _show_busy(self) -> None:
         self.repaired = None
@@ -196,8 +176,9 @@ class RepairDialog(QtWidgets.QDialog):
             each.show()
         self.accepting.setEnabled(False)
 
-    def _show_progress(self, job: Job[_Result]) -> None:
-        self._set_progress(job.fraction, job.text)
+    def _show_progress(self) -> None:
+        if (task := self._queue.task(Kind.DOCUMENT)) is not None:
+            self._set_progress(task.fraction, task.text)
 
     def _set_progress(self, fraction: float, text: str) -> None:
         self.bar.setRange(0, 1000 if fraction else 0)  # an unknown fraction shows a busy bar
@@ -205,7 +186,6 @@ class RepairDialog(QtWidgets.QDialog):
         self.stage.setText(text)
 
     def _end(self) -> None:
-        self._job = None
         for each in (self.bar, self.stage):
             each.hide()
         self.steps.clear()

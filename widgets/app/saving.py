@@ -61,14 +61,11 @@ def export_picture(window: Any) -> bool:
     return path is not None and _done(window, lambda controller: _draw(window, controller, path))
 
 
-def may_discard(window: Any, *, is_kept: bool = False) -> bool:
-    """Return whether the document may be closed: it is saved or *is_kept*, or the user discards it.
-
-    It is kept if undo or redo returns to it.
-    """
+def may_discard(window: Any) -> bool:
+    """Return whether the document may be closed: it is saved, or the user discards it."""
     if window.has_mesh and window.editor.controller.queue.task(Kind.SAVE):
         _settle(window)
-    if is_kept or not window.is_modified:
+    if not window.is_modified:
         return True
     mesh_is_saved = _mesh_is_saved(window)
     answer = ask_save(window, window.document.name, mesh_is_saved=mesh_is_saved)
@@ -115,8 +112,9 @@ def _session_saved(window: Any, path: Path) -> None:
 
 
 def _mesh_saved(window: Any, path: Path) -> None:
-    window.set_document(replace(window.document, mesh_path=path))
+    window.editor.controller.file.is_new = False
     window.mesh_state = window.session.state
+    window.set_document(replace(window.document, mesh_path=path))
 
 
 def _done(window: Any, action: Action) -> bool:

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from qtpy import QtCore, QtGui, QtWidgets
+from qtpy import QtCore, QtWidgets
 
 Qt = QtCore.Qt
 _WIDTH = 64  # letters
-_ROUND = 10.0
-_MOST = 6  # recent files; the menu has the rest
 
 
 class StartPage(QtWidgets.QWidget):
@@ -65,7 +63,7 @@ class StartPage(QtWidgets.QWidget):
             self._list.removeWidget(button)
             button.hide()  # it is deleted only after a dialog that is shown next
             button.deleteLater()
-        self.recent = [self._recent_button(path) for path in paths[:_MOST]]
+        self.recent = [self._recent_button(path) for path in paths]
         for button in self.recent:
             self._list.addWidget(button)
         self._heading.setVisible(bool(self.recent))
@@ -85,49 +83,27 @@ class StartPage(QtWidgets.QWidget):
         return button
 
 
-class _Target(QtWidgets.QWidget):
+class _Target(QtWidgets.QLabel):
     """The drop area: a dashed frame, highlighted while a file is dragged over the window."""
 
     def __init__(self) -> None:
-        super().__init__()
-        self.is_highlighted = False
+        super().__init__(
+            "<p style='font-size: x-large'>Drop a mesh or a session here</p>"
+            "<p>ply, obj, off, stl, vtk, vtp, glb ... or .segdeform</p>"
+        )
+        self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setMinimumHeight(9 * self.fontMetrics().height())
         self.setAccessibleName("Drop a mesh or a session here")
+        self.highlight(False)
 
     def highlight(self, on: bool) -> None:
         """Highlight the area, or end that."""
         self.is_highlighted = on
-        self.update()
-
-    def paintEvent(self, event: Any) -> None:  # noqa: N802, ARG002 - Qt's name
-        """Draw the frame and the text."""
-        roles, palette = QtGui.QPalette.ColorRole, self.palette()
-        ink = palette.color(roles.WindowText)
-        line = palette.color(roles.Highlight) if self.is_highlighted else QtGui.QColor(ink)
-        fill = QtGui.QColor(line)
-        line.setAlphaF(1.0 if self.is_highlighted else 0.45)
-        fill.setAlphaF(0.15 if self.is_highlighted else 0.03)
-        painter = QtGui.QPainter(self)
-        painter.setRenderHint(QtGui.QPainter.RenderHint.Antialiasing)
-        painter.setPen(QtGui.QPen(line, 1.5, Qt.PenStyle.DashLine))
-        painter.setBrush(fill)
-        frame = QtCore.QRectF(self.rect()).adjusted(1.0, 1.0, -1.0, -1.0)
-        painter.drawRoundedRect(frame, _ROUND, _ROUND)
-        painter.setPen(ink)
-        font, middle = self.font(), frame.center().y()
-        small = QtGui.QFont(font)
-        font.setPointSizeF(1.5 * font.pointSizeF())
-        painter.setFont(font)
-        top = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom
-        painter.drawText(_part(frame, frame.top(), middle), top, "Drop a mesh or a session here")
-        ink.setAlphaF(0.7)
-        painter.setPen(ink)
-        painter.setFont(small)
-        below = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-        kinds = "ply, obj, off, stl, vtk, vtp, glb ... or .segdeform"
-        gap = 0.4 * self.fontMetrics().height()
-        painter.drawText(_part(frame, middle + gap, frame.bottom()), below, kinds)
-        painter.end()
+        colour = "palette(highlight)" if on else "palette(mid)"
+        fill = "palette(base)" if on else "rgba(128, 128, 128, 8%)"
+        self.setStyleSheet(
+            f"QLabel {{ border: 2px dashed {colour}; border-radius: 10px; background: {fill}; }}"
+        )
 
 
 def home_as_tilde(folder: Path) -> str:
@@ -136,10 +112,6 @@ def home_as_tilde(folder: Path) -> str:
         return f"~/{folder.relative_to(Path.home())}".removesuffix("/.")
     except ValueError:
         return str(folder)
-
-
-def _part(frame: Any, top: float, bottom: float) -> Any:
-    return QtCore.QRectF(frame.left(), top, frame.width(), bottom - top)
 
 
 def _button(text: str) -> Any:

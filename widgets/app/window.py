@@ -11,52 +11,47 @@ read, so an unreadable file loses nothing.  `Autosaver` saves unsaved work meanw
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
+from vtk_segdeform.kernels import load_early
 from vtk_segdeform.session import Session
 
 from ..editor import (
+    INTERVAL,
+    Autosaver,
     Autosaves,
     DeformEditor,
-    Job,
-    Neighbour,
-    Slot,
-    expect_session,
-    jumping_to,
-    position_of,
-    states_of,
+    Kind,
+    Queue,
+    Task,
 )
-from ..qt import DeformWidget, menu_keys
-from .autosaver import INTERVAL, Autosaver, stops_of
+from ..qt import DeformWidget, menu_keys, stopper
+from ..scene import Stop
 from .dialogs import ask_file, ask_repair_instead, choose_work, show_error
 from .documents import (
     Document,
     Opened,
+    Request,
     Unopenable,
     from_file,
     from_slot,
     opening_error,
     sample_model,
 )
-from .drops import Drops
 from .menus import Menus, connect_panel
-from .opening import Request
 from .pages import Pages
-from .qt_timer import qt_timer
+from .qt_ticker import QtTicker
 from .recent import Recent
 from .repairing import ask_repair, ask_repair_of
 from .saving import may_discard
 from .stored_keys import read_keys, write_keys
 
 _SIZE = 1200, 800
-_REPAIR = "repair"
 _PAUSE = 300  # milliseconds from the start page to the loading of the compiled kernels
-_PERIOD = 30  # milliseconds between two polls of the job that opens a document
 
 
 class Window(QtWidgets.QMainWindow):
@@ -75,14 +70,14 @@ class Window(QtWidgets.QMainWindow):
 
     Attributes
     ----------
-    document : Document
-        The open document.
     editor_widget : DeformWidget or None
         The widget that edits it.
     keys : Keys
         The user's keys.
-    autosaver, autosaves, recent : Autosaver, Autosaves, Recent
-        The autosave, its folder, and the recently opened files.
+    autosaver : Autosaver or None
+        The autosave of the document.
+    autosaves, recent : Autosaves, Recent
+        The folder of autosaves, and the recently opened files.
     mesh_state : object
         The state of the session when its mesh was last saved.
     """
@@ -101,19 +96,15 @@ class Window(QtWidgets.QMainWindow):
         self._first_run = self._settings if first_run else None
         self.keys, self._fault_of_keys = read_keys(self._settings)
         self.autosaves = autosaves or Autosaves()
-        self.autosaver = Autosaver(self.autosaves, self, interval=interval)
-        self.autosaver.failed.connect(self._say)
-        self.document = Document("")
+        self.autosaver: Autosaver | None = None
+        self._interval = interval
+        self._documents: dict[Session, Document] = {}  # of the sessions in the history
         self.mesh_state: object = None
-        self._is_new = False  # made by the program and not saved yet
-        self._original: Request | None = None  # of which the document is a repaired copy
-        self._repaired: Request | None = None  # its repaired copy, if that was undone
-        self._make_other = partial(Window, settings, autosaves, interval=interval)
-        self._other: Window | None = None  # for a file beside recovered work
         self.editor_widget: Any = None
-        self._request: Request | None = None
-        self._job: Job[Opened] | None = None
-        self._stops = stops_of(self)
+        self._request: Request | None = None  # that is being opened
+        self._queue = Queue(QtTicker(self), self._show_progress)
+        self._stops: list[Stop] = []  # end when Qt deletes the window, too
+        self.destroyed.connect(stopper(self._stops))
         self.pages = Pages()
         self.pages.start.open_wanted.connect(self.ask_and_open)
         self.pages.start.sample_wanted.connect(self.open_sample)
@@ -121,9 +112,7 @@ class Window(QtWidgets.QMainWindow):
         self.pages.waiting.cancelled.connect(self._cancel_opening)
         self.setCentralWidget(self.pages)
         self.menus = Menus(self)
-        drops = Drops(self)
-        drops.hovered.connect(self.pages.start.target.highlight)
-        drops.dropped.connect(self.open)
+        self.setAcceptDrops(True)  # of its children none does
         self.resize(*_SIZE)
         self._show_page()
 
@@ -148,31 +137,27 @@ class Window(QtWidgets.QMainWindow):
     @property
     def is_modified(self) -> bool:
         """Whether the document has unsaved changes."""
-        if not self.has_mesh:
-            return False
-        return self._is_new or self.editor.controller.is_modified
+        return self.has_mesh and self.editor.controller.is_modified
+
+    @property
+    def document(self) -> Document:
+        """The open document."""
+        return self._documents.get(self.session) or Document(self.editor.path.stem)
 
     def set_document(self, document: Document) -> None:
         """Change the files of the open document; the session is unchanged."""
-        self.document = document
-        self._is_new &= document.session_path is None and document.mesh_path is None
-        self.autosaver.about = document.about
+        self._documents[self.session] = document
         self._update_title()
 
     # Opening.
 
     def begin(self, path: Path | None = None) -> None:
-        """Offer to recover autosaved work; open *path*, in another window beside recovered work."""
-        slot = self._recover()
+        """Offer to recover autosaved work; open *path*, if it is given, unless that is accepted."""
+        is_recovered = self.recover()
         if path is None:
             QtCore.QTimer.singleShot(_PAUSE, self, self._load_kernels)
-            return
-        if slot is None:
+        elif not is_recovered:
             self.open(path)
-        elif str(path.absolute()) not in (slot.about.session, slot.about.mesh):
-            self._other = self._make_other()
-            self._other.show()
-            self._other.open(path)
 
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
@@ -192,69 +177,26 @@ class Window(QtWidgets.QMainWindow):
 
     def repair(self) -> None:
         """Show what a repair would do; open the result as a new document if the user accepts."""
-        request = ask_repair(self)
-        if request is not None:
-            self._open(request)
+        repaired = ask_repair(self)
+        if repaired is not None:
+            document, session = repaired
+            self._documents[session] = document
+            file = document.file(session, is_new=True)
+            self.editor.do(lambda controller: controller.open_repaired(session, file))
 
     def _load_kernels(self) -> None:
         """Load the compiled kernels while the start page is shown, so that files open faster."""
-        if not self.has_mesh and self._job is None:
-            expect_session()
-
-    def _repair_soon(self) -> None:
-        """Repair once the current event of the view has been handled."""
-        QtCore.QTimer.singleShot(0, self, self.repair)
-
-    @property
-    def current(self) -> Request:
-        """How to return to the open document, in its place of the history."""
-        opened, controller = (self.document, self.session), self.editor.controller
-        names = states_of(controller)[: position_of(controller) + 1]
-        return Request(
-            self.document.name,
-            lambda _: opened,
-            is_new=self._is_new,
-            names=names,
-            file=controller.file,
-            original=self._original,
-            repaired=self._repaired if controller.neighbours.after(self.session) else None,
-        )
-
-    def _follow_history(self, request: Request) -> None:
-        """Connect the history with that of the original, and with that of the repaired copy."""
-        self._original, self._repaired = original, repaired = request.original, request.repaired
-        neighbours = self.editor.controller.neighbours
-        if original is not None:
-            undo = partial(self._undo_repair, original)
-            neighbours.before = Neighbour(_REPAIR, original.names, undo)
-        if repaired is not None and repaired.original is not None:
-            place = len(repaired.original.names) - 1 - neighbours.count_before
-            after = Neighbour(_REPAIR, repaired.names, partial(self._open_soon, repaired))
-            neighbours.follow(self.session, place, after)
-
-    def _undo_repair(self, original: Request, position: int, message: str) -> None:
-        """Return from a repaired copy to the original document; the copy is kept for redo."""
-        names = states_of(self.editor.controller)[len(original.names) + 1 :]
-        repaired = replace(self.current, names=names)
-        self._open_soon(replace(original, repaired=repaired), position, message)
-
-    def _open_soon(self, request: Request, position: int, message: str) -> None:
-        """Open another document of the history once the current event has been handled."""
-        there = replace(request, position=position, message=message)
-        QtCore.QTimer.singleShot(0, self, lambda: self._open(there))
+        if not self.has_mesh and self._request is None:
+            load_early()
 
     def recover(self) -> bool:
         """Offer to recover autosaved work; return whether the user accepts."""
-        return self._recover() is not None
-
-    def _recover(self) -> Slot | None:
-        """Offer to recover autosaved work; return what the user has chosen."""
         slot = choose_work(self, self.autosaves)
-        if slot is not None and not self._open(
-            Request(slot.about.name, from_slot(slot), slot=slot)
-        ):
+        if slot is None:
+            return False
+        if not self._open(Request(slot.about.name, from_slot(slot), slot=slot, is_new=True)):
             slot.release()
-        return slot
+        return True
 
     def _keep_keys(self) -> None:
         """Store the keys that were assigned in the dialog."""
@@ -268,52 +210,55 @@ class Window(QtWidgets.QMainWindow):
 
     def _open(self, request: Request) -> bool:
         """Start reading; return False if the user keeps the current document."""
-        if not may_discard(self, is_kept=bool(request.original or request.repaired)):
+        if not may_discard(self):
             return False
         self._cancel_opening()
         self.pages.waiting.begin(request.name)
         self._request = request
-        self._job = Job(
-            qt_timer(self, _PERIOD),
-            request.reader,
+        task = Task(
+            kind=Kind.DOCUMENT,
+            begin=lambda: request.reader,
             done=lambda opened: self._opened(request, opened),
             failed=lambda error: self._failed(request, error),
-            watch=self._show_progress,
         )
+        self._queue.add(task)
         self._show_page()
         return True
 
-    def _show_progress(self, job: Job[Opened]) -> None:
-        if job is self._job:  # a cancelled job may still be running
-            self.pages.waiting.show_progress(job.fraction, job.text)
+    def _show_progress(self) -> None:
+        if (task := self._queue.task(Kind.DOCUMENT)) is not None:
+            self.pages.waiting.show_progress(task.fraction, task.text)
 
     def _opened(self, request: Request, opened: Opened) -> None:
-        self._end_opening()
-        self.autosaver.discard()
+        self._request = None
         self._close_document()
         self.pages.delete_views()
-        self.document, session = opened
-        self.mesh_state, self._is_new = None, request.is_new
+        document, session = opened
+        self._documents, self.mesh_state = {session: document}, None
         widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
-        file = request.file or self.document.file(session, is_unsaved=bool(request.slot))
-        widget.editor.controller.file = file
+        widget.editor.controller.file = document.file(session, is_new=request.is_new)
         widget.editor.show_cube = True
         widget.editor.keys = self.keys
         widget.taken_keys = lambda: menu_keys(self.menuBar())
         widget.keys_changed.connect(self._keep_keys)
-        own = self.document.session_path or self.document.source
+        own = document.session_path or document.source
         if (path := request.slot.path if request.slot else own) is not None:
             widget.editor.controller.restore_view(path)
         connect_panel(self)
-        if not session.mesh.is_two_manifold:  # a closed one with seams needs no repair
-            widget.editor.controller.notices.offer("Repair ...", self._repair_soon)
-        self._follow_history(request)
-        if request.position is not None:
-            widget.editor.do(jumping_to(request.position, request.message))
+        widget.editor.controller.notices.offer(
+            "Repair ...",
+            partial(QtCore.QTimer.singleShot, 0, self, self.repair),  # after the press
+            lambda session: not session.mesh.is_two_manifold,  # a closed one with seams needs none
+        )
         widget.editor.controller.refresh()  # and with it the history in the panel
         self._stops.append(widget.editor.controller.messages.on_change(self._update_title))
-        widget.session_changed.connect(lambda _: self._autosave())
-        self._autosave(request.slot)
+        self.autosaver = Autosaver(
+            widget.editor.controller,
+            self.autosaves,
+            lambda: self.document.about,
+            slot=request.slot,
+            interval=self._interval,
+        )
         self.pages.addWidget(widget)
         if request.path is not None:
             self.recent.add(request.path)
@@ -335,29 +280,25 @@ class Window(QtWidgets.QMainWindow):
         if path is None or not isinstance(error, Unopenable):
             show_error(self, title, text)
         elif ask_repair_instead(self, title, text):
-            repairing = ask_repair_of(self, path, error)
-            if repairing is not None:
-                self._open(repairing)
+            repaired = ask_repair_of(self, path, error)
+            if repaired is not None:
+                self._open(Request(repaired[0].name, lambda _: repaired, is_new=True))
 
     def _cancel_opening(self) -> None:
-        """Cancel; the job stops at its next progress report and is not waited for."""
-        if self._job is not None:
-            self._job.cancel()
-        if self._request is not None and self._request.slot is not None:
-            self._request.slot.release()
-        self._end_opening()
-
-    def _end_opening(self) -> None:
-        job, self._job, self._request = self._job, None, None
-        if job is not None:
+        """Cancel; the thread stops at its next progress report and is not waited for."""
+        self._queue.cancel(Kind.DOCUMENT)
+        request, self._request = self._request, None
+        if request is not None:
+            if request.slot is not None:
+                request.slot.release()
             self._show_page()
 
-    def _autosave(self, slot: Slot | None = None) -> None:
-        watch = partial(self.autosaver.watch, view=lambda: self.editor.controller.view_settings)
-        watch(self.session, self.document.about, lambda: self.is_modified, slot=slot)
-
     def _close_document(self) -> None:
+        """Close the editor, and delete the autosave."""
         widget, self.editor_widget = self.editor_widget, None
+        if self.autosaver is not None:
+            self.autosaver.discard()
+            self.autosaver = None
         while self._stops:
             self._stops.pop()()
         if widget is not None:
@@ -370,21 +311,36 @@ class Window(QtWidgets.QMainWindow):
         here = self.editor_widget or pages.start
         if here is pages.start:
             pages.start.show_recent(self.recent.paths)
-        pages.setCurrentWidget(here if self._job is None else pages.waiting)
+        pages.setCurrentWidget(here if self._request is None else pages.waiting)
         self.menus.refresh()
         self._update_title()
 
     def _update_title(self) -> None:
-        """Show the name and the unsaved mark; delete the autosave of saved work."""
+        """Show the name and the unsaved mark."""
         name = self.document.name if self.has_mesh else ""
-        is_modified = self.is_modified
         self.setWindowTitle(f"{name}[*] - segdeform" if name else "segdeform")
-        self.setWindowModified(is_modified)
-        if self.has_mesh and not is_modified:
-            self.autosaver.save()
+        self.setWindowModified(self.is_modified)
 
     def _say(self, text: str) -> None:
         self.editor.controller.say(text)
+
+    def dragEnterEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
+        """Accept local files."""
+        if _dropped(event):
+            event.acceptProposedAction()
+            self.pages.start.target.highlight(True)
+
+    def dragLeaveEvent(self, event: Any) -> None:  # noqa: N802
+        """Show that no file is dropped."""
+        super().dragLeaveEvent(event)
+        self.pages.start.target.highlight(False)
+
+    def dropEvent(self, event: Any) -> None:  # noqa: N802
+        """Open the first file, once the drop has been accepted."""
+        event.acceptProposedAction()
+        self.pages.start.target.highlight(False)
+        path = _dropped(event)[0]
+        QtCore.QTimer.singleShot(0, self, lambda: self.open(path))
 
     def closeEvent(self, event: Any) -> None:  # noqa: N802
         """Close the window and delete the autosave, unless the user keeps the document."""
@@ -392,6 +348,11 @@ class Window(QtWidgets.QMainWindow):
             event.ignore()
             return
         self._cancel_opening()
-        self.autosaver.discard()
         self._close_document()
         super().closeEvent(event)
+
+
+def _dropped(event: Any) -> list[Path]:
+    """Return the local files of an event of drag and drop."""
+    urls = event.mimeData().urls()
+    return [Path(url.toLocalFile()) for url in urls if url.isLocalFile()]

@@ -4,13 +4,14 @@ Every action is a function of the `Controller`; `bindings` names them and assign
 operations are started as jobs.  An action reports its result in the status line unless the view
 shows it.
 
-Long because each key has its function here.
+Long because nearly every key has its function here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from vtk_segdeform.cages import Cage
@@ -21,10 +22,11 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 from vtk_segdeform.session import FinishedPose, State
 
-from ..region_selector import Paint, Tool
+from ..region_selector import Paint, RegionSelector
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
+from .session_file import pose_remark, write_posed
 from .widget_set import Mode
 
 Action = Callable[[Controller], None]
@@ -39,22 +41,19 @@ def to_mode(mode: Mode) -> Action:
     return enter
 
 
-def with_tool(tool: Tool) -> Action:
-    """Return the action that paints with *tool*."""
+def assigning(owner: Callable[[Controller], object], name: str, value: object) -> Action:
+    """Return the action that sets an attribute of what *owner* returns, such as a widget."""
+    return lambda controller: setattr(owner(controller), name, value)
 
-    def select(controller: Controller) -> None:
-        controller.widgets.selector.tool = tool
 
-    return select
+def selector_of(controller: Controller) -> RegionSelector:
+    """Return the selector, with the tools of painting."""
+    return controller.widgets.selector
 
 
 def painting(target: Paint) -> Action:
     """Return the action that selects the *target* of painting."""
-
-    def paint(controller: Controller) -> None:
-        controller.widgets.selector.paints = target
-
-    return paint
+    return assigning(selector_of, "paints", target)
 
 
 # In all modes.
@@ -66,22 +65,18 @@ def undo(controller: Controller) -> None:
     if puller.waiting.has_pull and puller.cancel():
         controller.say("Undo: pull")
         return
-    label, before = controller.undo_label, controller.neighbours.before
-    message = f"Undo: {label}" if label else "Nothing to undo"
-    if not controller.session.undo() and before is not None:
-        before.enter(len(before.names) - 1, message)
-    controller.say(message)
+    history, label = controller.history, controller.history.undo_label
+    if label:
+        history.jump(history.position - 1)
+    controller.say(f"Undo: {label}" if label else "Nothing to undo")
 
 
 def redo(controller: Controller) -> None:
     """Redo the last undone step."""
-    label, session, neighbours = controller.redo_label, controller.session, controller.neighbours
-    after, message = neighbours.after(session), f"Redo: {label}" if label else "Nothing to redo"
-    if after is not None and after[0] == session.history.position:
-        after[1].enter(neighbours.count_before + after[0] + 1, message)
-    else:
-        session.redo()
-    controller.say(message)
+    history, label = controller.history, controller.history.redo_label
+    if label:
+        history.jump(history.position + 1)
+    controller.say(f"Redo: {label}" if label else "Nothing to redo")
 
 
 def reset(controller: Controller) -> None:
@@ -111,6 +106,47 @@ def save(controller: Controller) -> None:
 def once_settled(action: Action) -> Action:
     """Return the action that waits until the pose has settled."""
     return lambda controller: controller.once_settled(lambda: action(controller))
+
+
+def opening(path: Path) -> Action:
+    """Return the action that opens a session or a mesh."""
+    return lambda controller: controller.open(path)
+
+
+def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
+    """Return the action that saves the session to *path*, which becomes its file.
+
+    A pose that still converges is saved once it has settled, and *then* is called.
+    """
+
+    def save(controller: Controller) -> None:
+        controller.file.path = path
+        controller.save()
+        then()
+
+    return once_settled(save)
+
+
+def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
+    """Return the action that writes the surface in the pose, otherwise as it was given.
+
+    The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
+    left out is said.  The file is then read again in another thread, see `Controller.read_again`.
+    A pose that still converges is written once it has settled, and *then* is called.
+    """
+
+    def export(controller: Controller) -> None:
+        session = controller.session
+        if session.is_dragging:
+            raise SessionError("Finish the drag before saving the mesh")
+        controller.finishing.interrupt()
+        written = write_posed(session, path)
+        saved = f"Mesh saved to {path}{pose_remark(session)}"
+        controller.say(". ".join([saved, *written.remarks]))
+        controller.read_again(written)
+        then()
+
+    return once_settled(export)
 
 
 def open_file(controller: Controller) -> None:
@@ -206,11 +242,6 @@ def show_rest(controller: Controller) -> None:
     controller.show_instead(controller.session.mesh.vertices, "The mesh at rest")
 
 
-def show_pose(controller: Controller) -> None:
-    """Show the current pose again."""
-    controller.show_instead(None)
-
-
 def toggle_overlay(controller: Controller) -> None:
     """Show or hide the local volume change."""
     controller.widgets.overlay_wanted = not controller.widgets.overlay_wanted
@@ -234,28 +265,46 @@ def toggle_notices(controller: Controller) -> None:
         controller.say("The mesh is closed and exactly as given: nothing to show")
 
 
-def toggle_help(controller: Controller) -> None:
-    """Show or hide the help card."""
-    controller.show_keys()
-
-
 def cancel(controller: Controller) -> None:
     """Cancel the job, the drag or the stroke, or close the help card."""
     controller.show_instead(None)
     controller.cancel()
 
 
+def looking_from(name: str) -> Action:
+    """Return the action that shows the model from a view: "front", "top" or another of `VIEWS`."""
+    return lambda controller: controller.camera.viewpoint.look_from(name)
+
+
+def frame_selection(controller: Controller) -> None:
+    """Frame the selected region or handle, or else all."""
+    controller.camera.frame_selection(controller.mode)
+
+
+def frame_all(controller: Controller) -> None:
+    """Frame the model."""
+    controller.camera.viewpoint.frame()
+
+
+def toggle_projection(controller: Controller) -> None:
+    """Switch between perspective and orthographic projection."""
+    is_orthographic = controller.camera.viewpoint.toggle_projection()
+    controller.say("Orthographic" if is_orthographic else "Perspective")
+
+
 # Pulling.
 
 
-def more_local(controller: Controller) -> None:
-    """Make the next pull more local."""
-    _change_locality(controller, +0.1)
+def changing_locality(change: float) -> Action:
+    """Return the action that makes the next pull more local by *change*, or less."""
 
+    def make_local(controller: Controller) -> None:
+        puller = controller.widgets.puller
+        before = LOCALITY if puller.locality is None else puller.locality
+        puller.locality = min(max(round(before + change, 1), 0.0), 1.0)
+        controller.say(f"Locality: {100.0 * puller.locality:.0f} %")
 
-def less_local(controller: Controller) -> None:
-    """Make the next pull less local."""
-    _change_locality(controller, -0.1)
+    return make_local
 
 
 def auto_locality(controller: Controller) -> None:
@@ -284,32 +333,12 @@ def toggle_through(controller: Controller) -> None:
         controller.say("Visible surface only")
 
 
-def grow(controller: Controller) -> None:
-    """Grow the painted area by one ring."""
-    controller.widgets.selector.grow()
-
-
-def shrink(controller: Controller) -> None:
-    """Shrink the painted area by one ring."""
-    controller.widgets.selector.shrink()
-
-
 def select_all(controller: Controller) -> None:
     """Add all vertices that are free to the painted region, fixed vertices or handle."""
     selector = controller.widgets.selector
     selector.select_all()
     if selector.remark:
         controller.say(selector.remark)
-
-
-def select_none(controller: Controller) -> None:
-    """Remove all vertices from the painted fixed vertices or handle."""
-    controller.widgets.selector.select_none()
-
-
-def invert(controller: Controller) -> None:
-    """Exchange the painted fixed vertices or handle for the free vertices outside."""
-    controller.widgets.selector.invert()
 
 
 def next_region(controller: Controller) -> None:
@@ -332,10 +361,19 @@ def merge_region(controller: Controller) -> None:
         raise RegionError(
             f"Point at the region to merge with {controller.session.region_name(selector.region)}"
         )
-    names = " and ".join(map(controller.session.region_name, sorted([selector.region, other])))
-    controller.session.painting.merge([selector.region, other])
-    selector.region = min(selector.region, other)
-    controller.say(f"Merged {names}")
+    merging([selector.region, other])(controller)
+
+
+def merging(regions: Sequence[int]) -> Action:
+    """Return the action that merges two or more *regions*."""
+
+    def merge(controller: Controller) -> None:
+        *names, last = map(controller.session.region_name, sorted(regions))
+        controller.session.painting.merge(sorted(regions))
+        controller.widgets.choose_region(min(regions))
+        controller.say(f"Merged {', '.join(names)} and {last}")
+
+    return merge
 
 
 def split_region(controller: Controller) -> None:
@@ -367,12 +405,7 @@ def new_handle(controller: Controller) -> None:
 
 def remove_handle(controller: Controller) -> None:
     """Remove the selected handle."""
-    _handle_names(controller)
-    widgets = controller.widgets
-    name = widgets.selector.handle if controller.mode is Mode.HANDLES else widgets.dragger.handle
-    if name is None:
-        key = controller.keys.cap("next_handle")
-        raise ConstraintError(f"No handle selected. Press {key} to select one")
+    name = _selected_handle(controller)
     controller.session.handles.remove(name)
     controller.say(f"Removed {name}")
 
@@ -386,7 +419,7 @@ def toggle_local_axes(controller: Controller) -> None:
 
 def move_pivot(controller: Controller) -> None:
     """Move the pivot of the handle to the surface under the pointer; beside it, reset it."""
-    name, session = _dragged_handle(controller), controller.session
+    name, session = _selected_handle(controller), controller.session
     point = controller.widgets.point_at(controller.view.pointer(Phase.HOVER))
     if point is None and name not in session.state.pivots:
         raise ConstraintError("Point at the surface to place the pivot")
@@ -401,7 +434,7 @@ def convert_handle(controller: Controller) -> None:
         if name is None:
             raise ConstraintError("Point at a pin to make it a handle")
     else:
-        name = _dragged_handle(controller)
+        name = _selected_handle(controller)
     converting(name)(controller)
 
 
@@ -422,15 +455,16 @@ def converting(name: str) -> Action:
 
 def reset_pivot(controller: Controller) -> None:
     """Reset the pivot of the handle to its centre."""
-    name = _dragged_handle(controller)
+    name = _selected_handle(controller)
     controller.session.handles.set_pivot(name, None)
     controller.say(f"Pivot of {name} reset")
 
 
-def _dragged_handle(controller: Controller) -> str:
-    """Return the handle with the gizmo; raise if there is none."""
+def _selected_handle(controller: Controller) -> str:
+    """Return the handle that is painted, or the one with the gizmo; raise if there is none."""
     _handle_names(controller)
-    name = controller.widgets.dragger.handle
+    widgets = controller.widgets
+    name = widgets.selector.handle if controller.mode is Mode.HANDLES else widgets.dragger.handle
     if name is None:
         key = controller.keys.cap("next_handle")
         raise ConstraintError(f"No handle selected. Press {key} to select one")
@@ -458,13 +492,6 @@ def _handle_names(controller: Controller) -> list[str]:
 
 def _detecting(controller: Controller) -> str:
     return f"Press {controller.keys.cap('segment')} to detect them"
-
-
-def _change_locality(controller: Controller, change: float) -> None:
-    puller = controller.widgets.puller
-    before = LOCALITY if puller.locality is None else puller.locality
-    puller.locality = min(max(round(before + change, 1), 0.0), 1.0)
-    controller.say(f"Locality: {100.0 * puller.locality:.0f} %")
 
 
 def _count(number: int, noun: str) -> str:

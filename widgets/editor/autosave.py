@@ -9,9 +9,9 @@ Each document has a slot from its first change until it is saved or discarded.  
 lock is abandoned: its program has crashed or was killed.  `Autosaves.abandoned` locks the slots
 that it returns, so that only one of several programs offers to recover them.
 
-A folder is a slot only if its name has 16 hexadecimal digits and its lock contains the mark of this
-program.  Only these four files and their drafts (`files.replacing`) are ever deleted in it, and
-the folder itself once it is empty.  Symbolic links are not followed.
+A folder is a slot only if its name has 16 hexadecimal digits and it has a lock.  Only these four
+files and their drafts (`files.replacing`) are ever deleted in it, and the folder itself once it is
+empty.  Symbolic links are not followed.
 """
 
 from __future__ import annotations
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
 _LOCK, _ABOUT, _SESSION = "lock", "about.json", "session.segdeform"
 _SURFACE = "surface.segdeform"
 _NAME = re.compile(r"[0-9a-f]{16}")
-_MARK = b"vtk_segdeform: unsaved work, held while the program runs\n"
 _LONGEST_ABOUT = 1 << 20  # bytes
 _ATTEMPTS = 5
 
@@ -185,8 +184,8 @@ class Autosaves:
                 with suppress(FileNotFoundError):  # another program has just deleted it as empty
                     handle = hold(folder / _LOCK)
                     if handle is not None:
-                        os.write(handle, _MARK)
-                        _write_about(folder, about)
+                        with replacing(folder / _ABOUT) as draft:
+                            draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
                         return Slot(folder, handle, about)
         except OSError as fault:
             raise SessionError(f"{self.folder}: {fault.strerror or fault}") from fault
@@ -222,20 +221,10 @@ class Autosaves:
 
 
 def _hold(folder: Path) -> int | None:
-    """Lock a folder if its name and mark are those of a slot; otherwise leave it untouched."""
+    """Lock a folder if it is a slot; otherwise leave it untouched."""
     status = os.lstat(folder)
     named = _NAME.fullmatch(folder.name) and stat.S_ISDIR(status.st_mode) and is_ours(status)
-    if not (named and _is_file(folder / _LOCK)):
-        return None
-    handle = hold(folder / _LOCK)
-    if handle is None:
-        return None
-    mark = os.read(handle, len(_MARK) + 1)
-    is_older = not mark and (_is_file(folder / _SESSION) or _read_about(folder) != About())
-    if mark == _MARK or is_older:  # earlier versions left the lock empty
-        return handle
-    os.close(handle)
-    return None
+    return hold(folder / _LOCK) if named and _is_file(folder / _LOCK) else None
 
 
 def _same(one: Mesh, other: Mesh) -> bool:
@@ -249,11 +238,6 @@ def _is_file(path: Path) -> bool:
         return not fault_of(os.lstat(path), own=True)
     except OSError:
         return False
-
-
-def _write_about(folder: Path, about: About) -> None:
-    with replacing(folder / _ABOUT) as draft:
-        draft.write_text(json.dumps(asdict(about)), encoding="utf-8")
 
 
 def _read_about(folder: Path) -> About:

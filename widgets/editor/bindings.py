@@ -11,29 +11,28 @@ from collections.abc import Mapping, Sequence
 from vtk_segdeform.checks import require_sequence, shown
 from vtk_segdeform.errors import ArgumentError
 
-from ..region_selector import Paint, Tool
-from . import actions, panel_actions
+from ..region_selector import Paint
+from . import actions
+from .hints import TOOLS
 from .keys import VIEW, Binding, Keys
 from .widget_set import Mode
 
 KeyChoice = str | Mapping[str, str | Sequence[str]]
 """A preset, "pyvista" or "Blender", or the keys of some actions by name; see `keys_of`."""
 
-P, R, C, H, D = Mode
 ALL = frozenset(Mode)
-PAINTING = frozenset({R, H})
-DRAGGING = frozenset({P, D})
-
+P, R, C, H, D = (frozenset({mode}) for mode in Mode)
+PAINTING, DRAGGING = R | H, P | D
 
 BINDINGS = (
     *(
         Binding(mode.name.lower(), (str(mode.value),), ALL, label, actions.to_mode(mode))
         for mode, label in (
-            (P, "Pull the surface"),
-            (R, "Regions: paint"),
-            (C, "Cages: drag vertices"),
-            (H, "Handles: paint"),
-            (D, "Deform: drag handles"),
+            (Mode.PULL, "Pull the surface"),
+            (Mode.REGIONS, "Regions: paint"),
+            (Mode.CAGES, "Cages: drag vertices"),
+            (Mode.HANDLES, "Handles: paint"),
+            (Mode.DEFORM, "Deform: drag handles"),
         )
     ),
     Binding("segment", ("g",), ALL, "Auto-segment", actions.segment),
@@ -55,85 +54,65 @@ BINDINGS = (
     Binding("save", ("ctrl+s",), ALL, "Save", actions.save),
     Binding("open", ("ctrl+o",), ALL, "Open", actions.open_file),
     Binding(
-        "help", ("h", "f1", "question"), ALL, "Show keys", actions.toggle_help, while_busy=True
+        "help", ("h", "f1", "question"), ALL, "Show keys", lambda c: c.show_keys(), while_busy=True
     ),
     Binding("cancel", ("escape",), ALL, "Cancel", actions.cancel, while_busy=True),
-    Binding("brush", ("b",), PAINTING, "Brush", actions.with_tool(Tool.BRUSH)),
-    Binding("lasso", ("l",), PAINTING, "Lasso", actions.with_tool(Tool.LASSO)),
-    Binding("rectangle", ("t",), PAINTING, "Rectangle", actions.with_tool(Tool.RECTANGLE)),
-    Binding(
-        "connected_part", ("k",), PAINTING, "Connected part", actions.with_tool(Tool.COMPONENT)
+    *(
+        Binding(
+            TOOLS[tool],
+            (key,),
+            PAINTING,
+            TOOLS[tool].replace("_", " ").capitalize(),
+            actions.assigning(actions.selector_of, "tool", tool),
+        )
+        for tool, key in zip(TOOLS, "bltkr", strict=True)
     ),
-    Binding("whole_region", ("r",), PAINTING, "Whole region", actions.with_tool(Tool.REGION)),
-    Binding(
-        "",
-        ("bracketleft", "bracketright"),
-        PAINTING,
-        "Smaller, larger brush",
-        None,
-        is_reserved=True,
+    *(
+        Binding("", ("bracketleft", "bracketright"), modes, label, None, is_reserved=True)
+        for modes, label in (
+            (PAINTING, "Smaller, larger brush"),
+            (P, "Smaller, larger radius"),
+        )
     ),
-    Binding(
-        "",
-        ("bracketleft", "bracketright"),
-        frozenset({P}),
-        "Smaller, larger radius",
-        None,
-        is_reserved=True,
-    ),
-    Binding("more_local", ("plus", "equal"), frozenset({P}), "More local", actions.more_local),
-    Binding("less_local", ("minus",), frozenset({P}), "Less local", actions.less_local),
-    Binding("auto_locality", ("a",), frozenset({P}), "Automatic locality", actions.auto_locality),
-    Binding("remove_pins", ("u",), frozenset({P}), "Remove all points", actions.unpin_all),
-    Binding("", ("r",), frozenset({P}), "While pulling: turn", None),
+    Binding("more_local", ("plus", "equal"), P, "More local", actions.changing_locality(0.1)),
+    Binding("less_local", ("minus",), P, "Less local", actions.changing_locality(-0.1)),
+    Binding("auto_locality", ("a",), P, "Automatic locality", actions.auto_locality),
+    Binding("remove_pins", ("u",), P, "Remove all points", actions.unpin_all),
+    Binding("", ("r",), P, "While pulling: turn", None),
     Binding("select_through", ("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
-    Binding("grow", ("plus", "equal"), PAINTING, "Grow by one ring", actions.grow),
-    Binding("shrink", ("minus",), PAINTING, "Shrink by one ring", actions.shrink),
+    Binding(
+        "grow", ("plus", "equal"), PAINTING, "Grow by one ring", lambda c: c.widgets.selector.grow()
+    ),
+    Binding(
+        "shrink", ("minus",), PAINTING, "Shrink by one ring", lambda c: c.widgets.selector.shrink()
+    ),
     Binding("select_all", ("ctrl+a",), PAINTING, "Select all", actions.select_all),
-    Binding("select_none", ("ctrl+shift+a",), frozenset({H}), "Select none", actions.select_none),
-    Binding("invert", ("ctrl+i",), frozenset({H}), "Invert selection", actions.invert),
-    Binding("next_region", ("n", "tab"), frozenset({R}), "Next region", actions.next_region),
-    Binding("new_region", ("a",), frozenset({R}), "New region", actions.new_region),
     Binding(
-        "merge_region",
-        ("m",),
-        frozenset({R}),
-        "Merge with region under pointer",
-        actions.merge_region,
+        "select_none",
+        ("ctrl+shift+a",),
+        H,
+        "Select none",
+        lambda c: c.widgets.selector.select_none(),
     ),
-    Binding("split_region", ("x",), frozenset({R}), "Split region", actions.split_region),
+    Binding("invert", ("ctrl+i",), H, "Invert selection", lambda c: c.widgets.selector.invert()),
+    Binding("next_region", ("n", "tab"), R, "Next region", actions.next_region),
+    Binding("new_region", ("a",), R, "New region", actions.new_region),
+    Binding("merge_region", ("m",), R, "Merge with region under pointer", actions.merge_region),
+    Binding("split_region", ("x",), R, "Split region", actions.split_region),
+    Binding("paint_fixed", ("s",), H, "Paint fixed vertices", actions.painting(Paint.FIXED)),
+    Binding("paint_handle", ("d",), H, "Paint handle", actions.painting(Paint.HANDLE)),
+    Binding("new_handle", ("a",), H, "New handle", actions.new_handle),
+    Binding("next_handle", ("n", "tab"), H | D, "Next handle", actions.next_handle),
     Binding(
-        "paint_fixed", ("s",), frozenset({H}), "Paint fixed vertices", actions.painting(Paint.FIXED)
-    ),
-    Binding("paint_handle", ("d",), frozenset({H}), "Paint handle", actions.painting(Paint.HANDLE)),
-    Binding("new_handle", ("a",), frozenset({H}), "New handle", actions.new_handle),
-    Binding("next_handle", ("n", "tab"), frozenset({H, D}), "Next handle", actions.next_handle),
-    Binding(
-        "remove_handle",
-        ("delete", "backspace"),
-        frozenset({H, D}),
-        "Remove handle",
-        actions.remove_handle,
+        "remove_handle", ("delete", "backspace"), H | D, "Remove handle", actions.remove_handle
     ),
     Binding(
         "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
     ),
+    Binding("local_axes", ("l",), D, "Local or global axes", actions.toggle_local_axes),
+    Binding("pivot", ("v",), D, "Move pivot to the pointer, or reset it", actions.move_pivot),
     Binding(
-        "local_axes", ("l",), frozenset({D}), "Local or global axes", actions.toggle_local_axes
-    ),
-    Binding(
-        "pivot",
-        ("v",),
-        frozenset({D}),
-        "Move pivot to the pointer, or reset it",
-        actions.move_pivot,
-    ),
-    Binding(
-        "show_volume_change",
-        ("o",),
-        frozenset({P, C, D}),
-        "Show local volume change",
-        actions.toggle_overlay,
+        "show_volume_change", ("o",), P | C | D, "Show local volume change", actions.toggle_overlay
     ),
     Binding("", ("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
     Binding("", ("return",), DRAGGING, "After a number: drag by that amount", None),
@@ -144,16 +123,21 @@ BINDINGS = (
     *(
         Binding(name, (key,), ALL, label, action, while_busy=True, heading=VIEW)
         for name, key, label, action in (
-            ("view_front", "kp_1", "Front", panel_actions.looking_from("front")),
-            ("view_back", "ctrl+kp_1", "Back", panel_actions.looking_from("back")),
-            ("view_right", "kp_3", "Right", panel_actions.looking_from("right")),
-            ("view_left", "ctrl+kp_3", "Left", panel_actions.looking_from("left")),
-            ("view_top", "kp_7", "Top", panel_actions.looking_from("top")),
-            ("view_bottom", "ctrl+kp_7", "Bottom", panel_actions.looking_from("bottom")),
-            ("view_home", "kp_0", "Three-quarter view", panel_actions.looking_from("home")),
-            ("projection", "kp_5", "Orthographic or perspective", panel_actions.toggle_projection),
-            ("frame_selection", "period", "Frame selection", panel_actions.frame_selection),
-            ("frame_all", "comma", "Frame all", panel_actions.frame_all),
+            *(
+                (f"view_{name}", key, label, actions.looking_from(name))
+                for name, key, label in (
+                    ("front", "kp_1", "Front"),
+                    ("back", "ctrl+kp_1", "Back"),
+                    ("right", "kp_3", "Right"),
+                    ("left", "ctrl+kp_3", "Left"),
+                    ("top", "kp_7", "Top"),
+                    ("bottom", "ctrl+kp_7", "Bottom"),
+                    ("home", "kp_0", "Three-quarter view"),
+                )
+            ),
+            ("projection", "kp_5", "Orthographic or perspective", actions.toggle_projection),
+            ("frame_selection", "period", "Frame selection", actions.frame_selection),
+            ("frame_all", "comma", "Frame all", actions.frame_all),
         )
     ),
 )

@@ -75,9 +75,7 @@ class Camera:
 
     def follow(self, widgets: WidgetSet) -> None:
         """Continue with the widgets over another session."""
-        before, self._widgets = self._widgets.session, widgets
-        if not np.array_equal(before.mesh.vertices, widgets.session.mesh.vertices):
-            self.show_model()
+        self._widgets = widgets
 
     def show_model(self, path: Path | None = None) -> None:
         """Guess the up axis, of a file *path* if it is known, and show the model from there."""

@@ -14,6 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
+
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
@@ -27,11 +29,11 @@ from .help_card import HelpCard
 from .hints import hint
 from .keys import Keys
 from .messages import Messages
-from .neighbours import Neighbours
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
-from .session_file import SessionFile, WrittenMesh, is_mesh, read_session
+from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
+from .session_history import SessionHistory
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
@@ -55,6 +57,8 @@ class Controller:
     ----------
     file : SessionFile
         The file to save to and open from.
+    history : SessionHistory
+        The steps of `session`, and of those that it was repaired from.
     widgets : WidgetSet
         The widgets over `session`; replaced when another session is opened.
     help : HelpCard
@@ -65,8 +69,6 @@ class Controller:
         The status line.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
-    neighbours : Neighbours
-        The sessions before and after this one in the history.
     camera : Camera
         Navigation, views and the orientation cube.
     queue : Queue
@@ -83,11 +85,10 @@ class Controller:
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
-        self.neighbours = Neighbours()
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
-        self._left = False, False  # by turning off: as `_ahead`
-        self._instead = self._unmoved = ""
+        self._interrupted = False, False  # by turning off: settling, and finishing
+        self._text_instead = self._unmoved = ""
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
         self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
@@ -96,13 +97,15 @@ class Controller:
             self.queue,
             lambda: self.session,
             lambda: self.widgets.surface,
-            self._is_free,
+            self.is_free,
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
+        self.history = SessionHistory(session, self._enter)
+        self._files: dict[Session, SessionFile] = {}  # of the other sessions in the history
         self._is_intact = True  # the mesh file that was saved last, as far as is known
         self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
@@ -111,20 +114,6 @@ class Controller:
     def session(self) -> Session:
         """The session being edited; another one after `open`."""
         return self.widgets.session
-
-    @property
-    def undo_label(self) -> str | None:
-        """The step to undo: of the session, or else the one from which the session came."""
-        label, before = self.session.history.undo_label, self.neighbours.before
-        return before.step if label is None and before is not None else label
-
-    @property
-    def redo_label(self) -> str | None:
-        """The step to redo: to the session that came from this state, or else of the session."""
-        after = self.neighbours.after(self.session)
-        if after is not None and after[0] == self.session.history.position:
-            return after[1].step
-        return self.session.history.redo_label
 
     @property
     def mode(self) -> Mode:
@@ -164,28 +153,25 @@ class Controller:
                 if not on:
                     self.widgets.finish()  # a drag that ends now is completed as any other
                     if was_on:
-                        self._left = self._ahead
+                        self._interrupted = self.widgets.is_settling, self.finishing.is_pending
                     self.help.hide()
                     self.queue.hurry(Kind.SAVE)
                     self._preparing.stop()
                     self.finishing.interrupt()
                     self.queue.cancel(Kind.JOB, Kind.LOAD)
-                    self.wait()
+                    self.queue.wait(Kind.JOB)
             finally:
                 self._apply_mode()
-
-    @property
-    def _ahead(self) -> tuple[bool, bool]:
-        """Whether the pose is settling, and whether it will be finished."""
-        return self.widgets.is_settling, self.finishing.is_pending
 
     def complete(self, progress: Progress | None = None) -> None:
         """Settle and finish the pose now, as it would have been soon, had the editor stayed on.
 
         The part that is done when *progress* cancels remains.
         """
-        settles, finishes = self._ahead if self._is_on else self._left
-        self._left = False, False
+        settles, finishes = self._interrupted
+        if self._is_on:
+            settles, finishes = self.widgets.is_settling, self.finishing.is_pending
+        self._interrupted = False, False
         session = self.session
         if settles:
             session.refine(progress=part(progress, 0.0, 0.5))
@@ -198,7 +184,7 @@ class Controller:
         self.queue.stop()
         self._stop_listening()
         self._stop_failures()
-        self.finishing.remove()
+        self.finishing.interrupt()
         self.camera.remove()
         self.widgets.remove()
         self.help.remove()
@@ -209,15 +195,10 @@ class Controller:
     # Messages.
 
     @property
-    def status(self) -> str:
-        """Text of the status line."""
-        return self.messages.text
-
-    @property
     def hint(self) -> str:
         """The next step, or what is shown."""
         if self.widgets.surface.instead is not None:
-            return self._instead
+            return self._text_instead
         return hint(self.widgets, self._mode, self.keys)
 
     def say(self, text: str) -> None:
@@ -230,8 +211,12 @@ class Controller:
         mode = f"{self._mode.value} {self._mode.name}"
         job = self.queue.job
         if self.widgets.is_settling and self.queue.task(Kind.SETTLE) is None:
-            may_begin = self._has_settled
-            self.queue.add(Task(kind=Kind.SETTLE, begin=self.refresh, may_begin=may_begin))
+            task = Task(
+                kind=Kind.SETTLE,
+                begin=self.refresh,
+                may_begin=lambda: not self.widgets.is_settling,
+            )
+            self.queue.add(task)
         if job is not None:
             self.messages.show_progress(
                 mode, self.queue.text, job.fraction, is_cancelled=job.is_cancelled
@@ -267,7 +252,7 @@ class Controller:
 
     def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
         """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""
-        surface, self._instead = self.widgets.surface, text
+        surface, self._text_instead = self.widgets.surface, text
         if vertices is not None:
             self.widgets.show_instead(vertices)
         elif surface.instead is None:
@@ -314,19 +299,15 @@ class Controller:
             and pulled in self.session.handles
         ):
             self.widgets.dragger.handle = pulled  # as in `_gesture_began`
-        if widget is self.widgets.dragger:
-            self._tell_unmoved()
+        if widget is self.widgets.dragger:  # name the parts that no handle moves, once
+            solution, mesh = self.session.solution, self.session.mesh
+            text = "" if solution is None else solution.unmoved_summary(mesh)
+            if text and text != self._unmoved:
+                self.messages.note(text[:1].upper() + text[1:])
+            self._unmoved = text
         if widget is self.widgets.dragger or (is_pull and self.session.options.avoid_contact):
             self.finishing.rest()
         self.refresh()
-
-    def _tell_unmoved(self) -> None:
-        """Name the parts that no handle moves, once."""
-        solution = self.session.solution
-        text = "" if solution is None else solution.unmoved_summary(self.session.mesh)
-        if text and text != self._unmoved:
-            self.messages.note(text[:1].upper() + text[1:])
-        self._unmoved = text
 
     def _gesture_began(self, *_: object) -> None:
         self._began_at = self.session.history.position
@@ -363,11 +344,6 @@ class Controller:
         """Whether a job is running."""
         return self.queue.job is not None
 
-    @property
-    def refusal(self) -> str:
-        """Why an action is refused while a job is running."""
-        return self.queue.refusal
-
     def start(
         self, name: str, work: Callable[[Progress], T], done: Callable[[T], str | None]
     ) -> None:
@@ -403,10 +379,6 @@ class Controller:
             self.widgets.switch_off()
             self.refresh()
 
-    def wait(self) -> None:
-        """Block until no job is running; for scripts."""
-        self.queue.wait(Kind.JOB)
-
     @property
     def is_modified(self) -> bool:
         """Whether there are unsaved changes, or a released pull that will be one."""
@@ -433,11 +405,6 @@ class Controller:
         elif self._preparing.cancel():
             self.say("Preparation cancelled. Drag the surface to start it again")
 
-    def refuse(self) -> None:
-        """Show that the running job must end, or be cancelled, before anything else."""
-        self.queue.refuse()
-        self.refresh()
-
     def prepare(self) -> None:
         """Precompute the data of the first drag, or of the overlay, in the background."""
         widgets, session = self.widgets, self.session
@@ -448,11 +415,6 @@ class Controller:
             self.start("Binding mesh to cages", widgets.bind, lambda _: None)
         elif widgets.wants_overlay(self._mode) and not widgets.overlay.is_prepared:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
-
-    @property
-    def is_preparing(self) -> bool:
-        """Whether pulls are being prepared in the background, and will be possible afterwards."""
-        return self._mode is Mode.PULL and self._preparing.fraction is not None
 
     def _prepare_pulls(self, *, again: bool = False) -> None:
         """Prepare the session for pulls in mode PULL; *again* even after an error or Escape.
@@ -470,16 +432,13 @@ class Controller:
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
         return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
 
-    def _is_free(self) -> bool:
+    def is_free(self) -> bool:
         """Return whether nothing is being dragged, refined or computed."""
         widgets = self.widgets
         is_used = self.session.is_dragging or any(w.is_grabbing for w in widgets.interactive)
         is_used |= widgets.puller.waiting.is_active
         is_refined = widgets.dragger.is_refining or widgets.puller.is_refining
         return self._is_on and not (self.is_busy or is_used or is_refined)
-
-    def _is_at_rest(self) -> bool:
-        return self._is_free() and self.queue.task(Kind.PREPARE) is None
 
     def _load_later(self) -> None:
         """Load kernels once the hand has rested: a press would wait for it."""
@@ -488,13 +447,14 @@ class Controller:
         def load() -> None:
             load_early()
 
-        may_begin = self._is_at_rest
-        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=may_begin, rest=_REST))
+        def is_at_rest() -> bool:
+            return self.is_free() and self.queue.task(Kind.PREPARE) is None
+
+        self.queue.add(Task(kind=Kind.LOAD, begin=load, may_begin=is_at_rest, rest=_REST))
 
     def _accept(self, session: Session, preparation: Preparation) -> None:
-        was_modified, after = self.file.is_modified(session), self.neighbours.after(session)
+        was_modified = self.file.is_modified(session)
         session.accept(preparation)
-        self.neighbours.prepared(session, after)
         self._load_later()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()
@@ -528,8 +488,12 @@ class Controller:
         if not self.widgets.is_pose_to_come:
             act()
             return
-        may_begin = self._has_come
-        self.queue.add(Task(kind=Kind.SAVE, begin=act, may_begin=may_begin))
+        task = Task(
+            kind=Kind.SAVE,
+            begin=act,
+            may_begin=lambda: not self.widgets.is_pose_to_come,
+        )
+        self.queue.add(task)
         self.say("Saving once the pose has settled")
 
     def settle(self) -> None:
@@ -540,17 +504,11 @@ class Controller:
         if not self.widgets.is_pose_to_come:
             self.queue.hurry(Kind.SAVE)
 
-    def _has_settled(self) -> bool:
-        return not self.widgets.is_settling
-
-    def _has_come(self) -> bool:
-        return not self.widgets.is_pose_to_come
-
     def save(self) -> None:
         """Write the session to the file, in the pose that is shown."""
         self.finishing.interrupt()
-        self.file.write(self.session, self.view_settings)
-        self.say(f"Saved to {self.file.path}{self.pose_remark}")
+        self.file.write(self.session, self.camera.settings(self._mode))
+        self.say(f"Saved to {self.file.path}{pose_remark(self.session)}")
 
     def read_again(self, written: WrittenMesh) -> None:
         """Read a mesh again in another thread, and say what the file has lost, if anything.
@@ -573,7 +531,7 @@ class Controller:
 
         self.queue.cancel(Kind.CHECK)
         self._is_intact = True
-        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self._is_free)
+        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self.is_free)
         self.queue.add(task)
 
     def saved_intact(self) -> bool:
@@ -581,31 +539,46 @@ class Controller:
         self.queue.wait(Kind.CHECK)
         return self._is_intact
 
-    @property
-    def view_settings(self) -> dict[str, object]:
-        """Camera, mode, up axis, and what is hidden and locked, for a session file."""
-        return self.camera.settings(self._mode)
-
-    @property
-    def pose_remark(self) -> str:
-        """What to say about a saved pose; "" if it has settled."""
-        return ". The pose had not settled" if self.session.is_unsettled else ""
-
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""
 
         def replace(session: Session) -> str:
-            self.widgets = self.widgets.replaced_by(session)
-            self.camera.follow(self.widgets)
-            self._stop_listening()
-            self._listen()
-            self.notices.follow(session)
+            is_other = not np.array_equal(self.session.mesh.vertices, session.mesh.vertices)
+            self._edit(session)
+            self.history.begin(session)
+            self._files.clear()
             self.file.opened(path, session)
+            if is_other:
+                self.camera.show_model()
             self.restore_view(path)
             self.view.render()  # before anything else is computed
             return f"Opened {path}"
 
         self.start(f"Opening {path}", lambda progress: read_session(path, progress), replace)
+
+    def open_repaired(self, session: Session, file: SessionFile) -> None:
+        """Edit *session*, a repaired copy of the current one, with a *file* of its own.
+
+        It is a step of the history: undo returns to the original.
+        """
+        self._files[session] = file
+        self.history.repaired(session)
+        self.say("Repaired")
+
+    def _enter(self, session: Session) -> None:
+        """Edit another session of the history, seen from the same side."""
+        self._preparing.interrupt()
+        self.finishing.interrupt()
+        self._files[self.session], self.file = self.file, self._files[session]
+        self._edit(session)
+        self._apply_mode()
+
+    def _edit(self, session: Session) -> None:
+        self.widgets = self.widgets.replaced_by(session)
+        self.camera.follow(self.widgets)
+        self._stop_listening()
+        self._listen()
+        self.notices.follow(session)
 
     def restore_view(self, path: Path) -> None:
         """Restore camera and mode from a session file; set the up axis that a mesh file has."""

@@ -29,7 +29,7 @@ from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
 from ..scene import Phase, Stop, View
-from .actions import Action, show_pose, show_rest
+from .actions import Action, show_rest
 from .bindings import KeyChoice, keys_of
 from .controller import Controller
 from .keys import Keys, key_cap, pressed_key
@@ -77,7 +77,7 @@ class DeformEditor:
         self._took_key = False
         self._is_removed = False
         self._stops: list[Stop] = []
-        self._stop_waiting: Stop = _nothing  # for a key to be pressed again
+        self._stop_waiting: Stop = lambda: None  # for a key to be pressed again
 
     @property
     def session(self) -> Session:
@@ -144,7 +144,7 @@ class DeformEditor:
     @property
     def status(self) -> str:
         """Text of the status line."""
-        return self._controller.status
+        return self._controller.messages.text
 
     @property
     def is_busy(self) -> bool:
@@ -154,11 +154,11 @@ class DeformEditor:
     @property
     def is_preparing(self) -> bool:
         """Whether pulls are being prepared in the background; nothing else waits for that."""
-        return self._controller.is_preparing
+        return self.mode is Mode.PULL and self._controller.queue.fraction(Kind.PREPARE) is not None
 
     def wait(self) -> None:
         """Block until no job is running; raise the error of a failed job.  For scripts."""
-        self._controller.wait()
+        self._controller.queue.wait(Kind.JOB)
 
     def do(self, action: Action, *, while_busy: bool = False) -> Exception | None:
         """Run an action as if its key had been pressed; an error is shown in the status line.
@@ -298,7 +298,7 @@ class DeformEditor:
 
     def _show_pose(self) -> None:
         self._stop_waiting()
-        show_pose(self._controller)
+        self._controller.show_instead(None)
 
     def _type(self, key: str) -> None:
         binding = self.keys.binding_of(key, self.mode)
@@ -307,7 +307,7 @@ class DeformEditor:
             return
         modes = ", ".join(f"{mode.value} ({label})" for mode, label in self.keys.modes_of(key))
         if self.is_busy:
-            self._controller.refuse()
+            self._controller.queue.refuse()
         else:  # no action, so a drag continues
             self._controller.messages.clear()
             self._controller.say(f"{key_cap(key)} works in mode {modes}")
@@ -316,8 +316,8 @@ class DeformEditor:
         controller = self._controller
         if not while_busy:
             if controller.is_busy:
-                controller.refuse()
-                return SessionError(controller.refusal)
+                controller.queue.refuse()
+                return SessionError(controller.queue.refusal)
             controller.widgets.finish()
         controller.messages.clear()
         if not while_busy:
@@ -333,10 +333,6 @@ class DeformEditor:
             controller.prepare()
         controller.refresh()
         return None
-
-
-def _nothing() -> None:
-    pass
 
 
 def _is_aimed(renderer: Any) -> bool:

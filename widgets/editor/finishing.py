@@ -105,10 +105,6 @@ class Finishing:
         self.glide.end()
         return self._queue.cancel(Kind.FINISH)
 
-    def remove(self) -> None:
-        """Stop permanently."""
-        self.interrupt()
-
     def _begin(self) -> Work | None:
         session = self._session()
         if session.solution is None or not session.can_finish:  # None after undo

@@ -14,13 +14,14 @@ from ..volume_overlay import brief, signed
 from .keys import Keys
 from .widget_set import Mode, WidgetSet
 
-_TOOLS = {
-    Tool.BRUSH: "Brush",
-    Tool.LASSO: "Lasso",
-    Tool.RECTANGLE: "Rectangle",
-    Tool.COMPONENT: "Connected part",
-    Tool.REGION: "Whole region",
+TOOLS = {
+    Tool.BRUSH: "brush",
+    Tool.LASSO: "lasso",
+    Tool.RECTANGLE: "rectangle",
+    Tool.COMPONENT: "connected_part",
+    Tool.REGION: "whole_region",
 }
+"""The actions that select them, by name."""
 
 
 def missing(session: Session, mode: Mode, keys: Keys) -> str:
@@ -46,14 +47,14 @@ def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
         return lacking
     if mode is Mode.DEFORM:
         return _deform_hint(widgets, keys)
-    now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets)
+    now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets, keys)
     if mode is Mode.REGIONS and widgets.session.state.pose is not None:
         now += ". A stroke resets the pose"
     next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
 
 
-def _painting_hint(widgets: WidgetSet) -> str:
+def _painting_hint(widgets: WidgetSet, keys: Keys) -> str:
     selector = widgets.selector
     if selector.paints is Paint.REGION:
         new = selector.region >= widgets.n_regions
@@ -64,7 +65,7 @@ def _painting_hint(widgets: WidgetSet) -> str:
     else:
         target = "new handle" if selector.handle is None else selector.handle
     through = " (X-ray)" if selector.through else ""
-    return f"{_TOOLS[selector.tool]}: paint {target}{through}. Ctrl: erase"
+    return f"{keys[TOOLS[selector.tool]].label}: paint {target}{through}. Ctrl: erase"
 
 
 def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:

@@ -15,7 +15,7 @@ from vtk_segdeform.errors import SegDeformError
 from ..scene import Stop, View
 from .status_line import StatusLine
 
-_SECONDS = 6.0  # for which a result is shown; it disappears at the next change
+_NOTE_SECONDS = 6.0  # for which a result is shown; it disappears at the next change
 
 
 def error_text(error: BaseException) -> str:
@@ -115,7 +115,7 @@ class Messages:
         At the right, show which fraction of the background *work* is complete, if any is running.
         """
         self._preparing, self._work = preparing, "" if preparing is None else work
-        if time.monotonic() > self._noted + _SECONDS and not self._question:
+        if time.monotonic() > self._noted + _NOTE_SECONDS and not self._question:
             self._note = ""
         share = f" {100.0 * preparing:.0f} %" if preparing else ""
         aside = "" if preparing is None else f"{work} ...{share} (Esc)"

@@ -12,10 +12,10 @@ from ..scene import Panel, Text, View
 from .status_line import letter_size, wrapped
 
 _PAPER, _LETTERS = "#2B2F36", "#FFFFFF"  # contrast 13 to 1
-_BUTTON, _POINTED, _INK = "#8CC4EA", "#FFFFFF", "#14181D"  # contrasts above 9 to 1
+_BUTTON, _INK = "#8CC4EA", "#14181D"  # contrast above 9 to 1
 _LINES = 2
 _SMALLER = 0.85  # than the status line
-_MOST = 0.96  # of the width of the window
+_WIDEST = 0.96  # of the width of the window
 
 
 class NoticeLine:
@@ -46,12 +46,10 @@ class NoticeLine:
         return self._box
 
     def show(self, text: str, buttons: Sequence[str]) -> None:
-        """Show *text* and *buttons* after it."""
-        self._set(text, tuple(buttons))
-
-    def hide(self) -> None:
-        """Hide it."""
-        self._set("", ())
+        """Show *text* and *buttons* after it; "" hides the line."""
+        if (text, tuple(buttons)) != self._content:
+            self._content = text, tuple(buttons)
+            self.view.request_render()
 
     def button_at(self, pointer: Any) -> str | None:
         """Return the button at *pointer* (2,), pixels of the renderer; "" beside the buttons."""
@@ -64,23 +62,12 @@ class NoticeLine:
         x, y, wide, high = next(b.box for b in self._buttons if b.label == label)
         return x + 0.5 * wide, y + 0.5 * high
 
-    def point_at(self, label: str | None) -> None:
-        """Highlight the button *label*, and no other one."""
-        for button in self._buttons:
-            if button.point(button.label == label):
-                self.view.request_render()
-
     def remove(self) -> None:
         """Remove it from the view, permanently."""
         self._stop()
         parts: list[Panel | Text | _Button] = [self._paper, *self._texts, *self._buttons]
         for each in parts:
             each.remove()
-
-    def _set(self, text: str, buttons: tuple[str, ...]) -> None:
-        if (text, buttons) != self._content:
-            self._content = text, buttons
-            self.view.request_render()
 
     def _lay_out(self) -> None:
         width, height = self.view.renderer.GetSize()
@@ -95,7 +82,7 @@ class NoticeLine:
         self._buttons = [_Button(self.view.foreground, label, size) for label in labels]
         gap, left, bottom = 0.5 * size, 0.6 * size, self._foot() + 0.6 * size
         aside = sum(button.width + gap for button in self._buttons)
-        room = max(_MOST * width - left - 2 * gap - aside, 4 * size)
+        room = max(_WIDEST * width - left - 2 * gap - aside, 4 * size)
         lines = wrapped(self._texts[0], text, size, room=room, most=_LINES)
         leading = 1.45 * size
         high = leading * max(1, len(lines)) + 0.5 * size
@@ -116,7 +103,6 @@ class _Button:
 
     def __init__(self, renderer: Any, label: str, size: float) -> None:
         self.label, self.box, self._size = label, (0.0, 0.0, 0.0, 0.0), size
-        self._is_pointed = False
         self._face = Panel(renderer, _BUTTON, layer=3)
         self._words = Text(renderer, _INK, bold=True, layer=4)
         self._words.set_text(label, size)
@@ -126,13 +112,6 @@ class _Button:
         self.box = x, y, self.width, high
         self._face.place(*self.box)
         self._words.place(x + 0.5 * self._size, y + 0.5 * high)
-
-    def point(self, pointed: bool) -> bool:
-        """Highlight it or not; return whether that is a change."""
-        changed, self._is_pointed = pointed != self._is_pointed, pointed
-        if changed:
-            self._face.set_colour(_POINTED if pointed else _BUTTON)
-        return changed
 
     def remove(self) -> None:
         self._face.remove()

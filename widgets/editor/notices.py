@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from vtk_segdeform.arrays import IntArray
 from vtk_segdeform.mesh import Kind
 from vtk_segdeform.session import Change, Session
 
-from ..scene import Highlights, Stop, View
+from ..scene import Highlights, View
 from .notice_line import NoticeLine
 
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
@@ -40,23 +39,14 @@ class Notice:
 
 def notices_of(session: Session) -> tuple[Notice, ...]:
     """Return the notices about the mesh of *session*: its borders, then each workaround."""
-    return (*_of_borders(session), *_of_workarounds(session))
-
-
-def _of_borders(session: Session) -> list[Notice]:
-    borders = session.mesh.borders
-    return [Notice(session.volume_summary, tuple(borders))] if len(borders) else []
-
-
-def _of_workarounds(session: Session) -> list[Notice]:
-    surface = session.surface
-    if surface is None:
-        return []
-    return [
+    borders, surface = session.mesh.borders, session.surface
+    of_borders = [Notice(session.volume_summary, tuple(borders))] if len(borders) else []
+    of_workarounds = [
         Notice(each.text, dots=surface.vertices_at(each.points))
-        for each in surface.workarounds
-        if each.kind is not Kind.HOLE  # see above
+        for each in (surface.workarounds if surface else ())
+        if surface and each.kind is not Kind.HOLE  # see the borders
     ]
+    return *of_borders, *of_workarounds
 
 
 class Notices:
@@ -74,21 +64,25 @@ class Notices:
         self.view = view
         self._session: Session | None = None
         self._notices: tuple[Notice, ...] = ()
-        self._offers: dict[str, Callable[[], object]] = {}
+        self._offers: dict[str, tuple[Callable[[], object], Callable[[Session], bool]]] = {}
         self._marks = Highlights(view)
         self._line = NoticeLine(view, foot)
         self._is_open = self._is_enabled = False
         self._was_edited = False
-        observe = view.observe
-        self._stops: list[Stop] = [
-            observe("LeftButtonPressEvent", self._press, _ABOVE_WIDGETS),
-            observe("MouseMoveEvent", self._hover, _ABOVE_WIDGETS),
-        ]
+        self._stop = view.observe("LeftButtonPressEvent", self._press, _ABOVE_WIDGETS)
 
     @property
     def text(self) -> str:
         """All notices in one line; "" if there are none."""
-        return "; ".join(_sentence(notice.text, k) for k, notice in enumerate(self._notices))
+        text = "; ".join(notice.text for notice in self._notices)
+        return text[:1].upper() + text[1:]
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        """The buttons for this session, apart from those that all have."""
+        session = self._session
+        offers = self._offers.items()
+        return tuple(label for label, (_, suits) in offers if session and suits(session))
 
     @property
     def is_open(self) -> bool:
@@ -123,9 +117,11 @@ class Notices:
         elif change & Change.POSE and self.are_marked:
             self._marks.move(self._session.vertices)
 
-    def offer(self, label: str, act: Callable[[], object]) -> None:
-        """Add a button that calls *act*, to this line and those of later sessions."""
-        self._offers[label] = act
+    def offer(
+        self, label: str, act: Callable[[], object], suits: Callable[[Session], bool]
+    ) -> None:
+        """Add a button that calls *act*, to this line and later ones, of sessions that it suits."""
+        self._offers[label] = act, suits
         self._draw()
 
     def enable(self, enabled: bool) -> None:
@@ -157,8 +153,7 @@ class Notices:
 
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
-        for stop in self._stops:
-            stop()
+        self._stop()
         self._marks.hide()
         self._line.remove()
 
@@ -172,12 +167,14 @@ class Notices:
     def _draw(self) -> None:
         if self.is_open and self._notices:
             show = _HIDE if self.are_marked else _SHOW
-            self._line.show(self.text, (show, *self._offers, _CLOSE))
+            self._line.show(self.text, (show, *self.offers, _CLOSE))
         else:
-            self._line.hide()
+            self._line.show("", ())
 
     def _press(self) -> bool:
-        button = self._line.button_at(self._pointer())
+        origin = self.view.renderer.GetOrigin()
+        pointer = np.subtract(self.view.interactor.GetEventPosition(), origin)
+        button = self._line.button_at(pointer)
         if button == _CLOSE:
             self.close()
         elif button in (_SHOW, _HIDE):
@@ -187,18 +184,6 @@ class Notices:
                 self._mark()
             self._draw()
         elif button:
-            self._offers[button]()
+            act, _ = self._offers[button]
+            act()
         return button is not None
-
-    def _hover(self) -> bool:
-        self._line.point_at(self._line.button_at(self._pointer()))
-        return False
-
-    def _pointer(self) -> Any:
-        origin = self.view.renderer.GetOrigin()
-        return np.subtract(self.view.interactor.GetEventPosition(), origin)
-
-
-def _sentence(text: str, position: int) -> str:
-    """Return *text* with a capital letter at the beginning of the line only."""
-    return text if position else text[:1].upper() + text[1:]

@@ -98,7 +98,7 @@ class Preparing:
         self._queue, self._is_due, self._accept, self._ended = queue, is_due, accept, ended
         self._inputs: tuple[Any, ...] = ()  # of the running stage
         self._declined: tuple[Any, ...] = ()
-        self._stand_in: StandIn | None = None
+        self._stand_ins: list[StandIn] = []  # which the worker may hold, unlike a widget
 
     @property
     def fraction(self) -> float | None:
@@ -107,7 +107,7 @@ class Preparing:
 
     def stand_in(self, session: Session) -> StandIn | None:
         """Return what can be pulled instead of *session*; None if there is nothing yet."""
-        made = self._stand_in
+        made = self._stand_ins[-1] if self._stand_ins else None
         return made if made and made.mesh is session.mesh and not _is_posed(session) else None
 
     def update(self, session: Session, *, start: bool, again: bool = False) -> None:
@@ -124,7 +124,7 @@ class Preparing:
             self.interrupt()
         if start and inputs != self._declined and not session.is_bound:
             self._inputs = inputs
-            made = None if self.stand_in(session) is not None else self._made
+            made = None if self.stand_in(session) is not None else self._stand_ins.append
             task = Task(
                 kind=Kind.PREPARE,
                 begin=lambda: lacking(session, made),
@@ -149,19 +149,16 @@ class Preparing:
     def stop(self) -> None:
         """Cancel the running stage and drop the stand-in."""
         self.interrupt()
-        self._stand_in = None
-
-    def _made(self, stand_in: StandIn) -> None:
-        self._stand_in = stand_in  # in the thread of the work
+        self._stand_ins = []
 
     def _finish(self, session: Session, result: Preparation) -> None:
-        self._stand_in = None
+        self._stand_ins = []
         if _key(session) == self._inputs:
             self._accept(session, result)
         self._ended()
 
     def _fail(self, error: BaseException) -> None:
-        self._declined, self._stand_in = self._inputs, None
+        self._declined, self._stand_ins = self._inputs, []
         if isinstance(error, SegDeformError):
             raise SessionError(
                 f"Cannot prepare this mesh for pulling: {error_text(error)}. Press 1 to paint "

@@ -53,10 +53,13 @@ class SessionFile:
     ----------
     path : Path
         The path; may be changed.
+    is_new : bool
+        Whether the session was made or recovered by the program, and has yet to be saved.
     """
 
     def __init__(self, path: Path, session: Session) -> None:
         self.path = path
+        self.is_new = False
         self._written: Path | None = None
         self._saved = session.state
 
@@ -67,7 +70,7 @@ class SessionFile:
 
     def is_modified(self, session: Session) -> bool:
         """Return whether *session* has unsaved changes."""
-        return bool(self._saved.changes(session.state))
+        return self.is_new or bool(self._saved.changes(session.state))
 
     def prepared(self, session: Session, *, was_modified: bool) -> None:
         """Continue after *session* was prepared for pulls, which is no change to be saved."""
@@ -78,7 +81,7 @@ class SessionFile:
         """Continue with *path*, from which *session* was read; a mesh file is never overwritten."""
         if is_mesh(path):
             self.path, self._written = path.with_suffix(_SUFFIX), None
-            self._saved = session.state
+            self._saved, self.is_new = session.state, False
         else:
             self.path = path
             self.mark_saved(session)
@@ -90,7 +93,7 @@ class SessionFile:
 
     def mark_saved(self, session: Session) -> None:
         """Record that the file contains *session*."""
-        self._written, self._saved = self.path, session.state
+        self._written, self._saved, self.is_new = self.path, session.state, False
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +143,11 @@ class WrittenMesh:
         return loss and f"In the file, {loss}"
 
 
+def pose_remark(session: Session) -> str:
+    """Return what to say about a saved pose; "" if it has settled."""
+    return ". The pose had not settled" if session.is_unsettled else ""
+
+
 def write_posed(session: Session, path: Path) -> WrittenMesh:
     """Write the surface of *session* in its pose."""
     with _warnings() as warnings:
@@ -183,11 +191,6 @@ def is_mesh(path: Path) -> bool:
     from vtk_segdeform.io import is_mesh_file
 
     return is_mesh_file(path)
-
-
-def expect_session() -> None:
-    """Load the compiled kernels in another thread, for a session that will be opened soon."""
-    load_early()
 
 
 def read_session(path: Path, progress: Progress) -> Session:

@@ -13,7 +13,7 @@ The files, in reading order:
 
     fields      what fields, tables and sections are
     panel       `sections` and `press`
-    pulling handles options regions painting
+    pulling handles options volumes regions painting
                 the sections
     toolbar     the toolbar and the menu about the view
     status      the status, the history and the first steps

@@ -221,6 +221,11 @@ def key_button(keys: Keys, name: str, action: str, label: str = "", **state: Any
     return Field(name, "button", label or tip, tip, action, **state)
 
 
+def option(name: str) -> Act:
+    """Return what a field does with a value of an option of the session."""
+    return lambda value: lambda controller: controller.session.change_options(**{name: value})
+
+
 def as_rgb(colour: NDArray[np.uint8]) -> tuple[int, int, int]:
     """Return a colour (3,), 0 to 255, as a tuple."""
     red, green, blue = colour.tolist()

@@ -6,20 +6,7 @@ from collections.abc import Sequence
 
 from vtk_segdeform.pictures import FIXED, rgb
 
-from ..editor import (
-    Action,
-    Controller,
-    DeformEditor,
-    Mode,
-    choosing_handle,
-    converting,
-    hiding_handle,
-    locking_handle,
-    painting,
-    renaming,
-    reset_pivot,
-    toggle_local_axes,
-)
+from ..editor import Action, Controller, DeformEditor, Mode, actions
 from ..region_selector import Paint
 from ..scene import handle_colour
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
@@ -46,9 +33,9 @@ def handles_section(editor: DeformEditor) -> Section:
                 "A locked handle cannot be grabbed, nor can a hidden one in mode 4",
                 acts={
                     "select": _choosing,
-                    "rename": lambda key, name: renaming(_name(key), name.strip()),
-                    "show": lambda key, on: hiding_handle(_name(key), not on),
-                    "lock": lambda key, on: locking_handle(_name(key), on),
+                    "rename": _renaming,
+                    "show": _showing,
+                    "lock": lambda key, on: lambda c: c.widgets.dragger.set_locked(_name(key), on),
                 },
             ),
             (
@@ -81,7 +68,7 @@ def handles_section(editor: DeformEditor) -> Section:
                     "local_axes",
                     value=widgets.dragger.local,
                     visible=mode is Mode.DEFORM,
-                    act=lambda _: toggle_local_axes,
+                    act=lambda _: actions.toggle_local_axes,
                 ),
                 Field(
                     "handles.pivot",
@@ -92,7 +79,7 @@ def handles_section(editor: DeformEditor) -> Section:
                     "pivot",
                     enabled=handle in session.state.pivots,
                     visible=mode is Mode.DEFORM,
-                    act=lambda _: reset_pivot,
+                    act=lambda _: actions.reset_pivot,
                 ),
             ),
         ),
@@ -135,19 +122,46 @@ def _selected(editor: DeformEditor | Controller) -> str | None:
 
 def _choosing(keys: Sequence[str]) -> Action:
     def choose(controller: Controller) -> None:
+        widgets, is_painted = controller.widgets, controller.mode is Mode.HANDLES
         for key in keys:
             if key.startswith(_HANDLE):
-                choosing_handle(_name(key))(controller)
-            elif key == _FIXED and controller.mode is Mode.HANDLES:
-                painting(Paint.FIXED)(controller)
+                widgets.selector.handle = widgets.dragger.handle = _name(key)
+                if is_painted:
+                    widgets.selector.paints = Paint.HANDLE
+            elif key == _FIXED and is_painted:
+                widgets.selector.paints = Paint.FIXED
 
     return choose
+
+
+def _renaming(key: str, new_name: str) -> Action:
+    name, new_name = _name(key), new_name.strip()
+
+    def rename(controller: Controller) -> None:
+        session, selector = controller.session, controller.widgets.selector
+        was_pull = name in session.state.pulls
+        session.handles.rename(name, new_name)
+        if selector.handle == name:
+            selector.handle = new_name
+        is_handle = was_pull and new_name not in session.state.pulls
+        remark = ", which is now a handle" if is_handle else ""
+        controller.say(f"Renamed {name} to {new_name}{remark}")
+
+    return rename
+
+
+def _showing(key: str, on: bool) -> Action:
+    def show(controller: Controller) -> None:
+        controller.widgets.dragger.set_hidden(_name(key), not on)
+        controller.widgets.show(controller.mode)
+
+    return show
 
 
 def _convert(controller: Controller) -> None:
     name = _selected(controller)
     if name is not None:
-        converting(name)(controller)
+        actions.converting(name)(controller)
 
 
 def _name(key: str) -> str:

@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-from ..editor import (
-    DeformEditor,
-    finishing_after_drags,
-    fitting_with,
-    setting,
-    setting_colour_range,
-    toggle_cages,
-    toggle_overlay,
-)
-from .fields import Field, Section, key_button
+from ..editor import Action, Controller, DeformEditor, actions
+from .fields import Field, Section, key_button, option
 from .pulling import preserve_toggle, reset_button, volume_label
 
-_MOST = 100_000
-_EACH, _MOST_DETAIL = 12, 800  # cage vertices: fewest for each region, and most of the slider
+_MOST_VERTICES = 100_000
+_FEWEST_EACH, _MOST_ON_SLIDER = 12, 800  # cage vertices: of a region, and of the slider
 _LIDS = {"auto": None, "lids": True, "off": False}
 _LIDS_LABELS = (("Auto", "auto"), ("Under lids", "lids"), ("Off", "off"))
 
@@ -28,7 +20,7 @@ def cages_section(editor: DeformEditor) -> Section:
     wanted = options.n_cage_vertices
     if wanted == type(options)().n_cage_vertices:
         wanted = widgets.n_cage_vertices  # the default follows the regions
-    least = _EACH * max(1, widgets.n_regions)
+    least = _FEWEST_EACH * max(1, widgets.n_regions)
     largest, decimals = _readable(0.2 * session.mesh.diagonal)
     return Section(
         "cages",
@@ -42,10 +34,10 @@ def cages_section(editor: DeformEditor) -> Section:
                 value=widgets.n_cage_vertices,
                 enabled=has_regions,
                 minimum=least,
-                maximum=max(least, _MOST_DETAIL),
+                maximum=max(least, _MOST_ON_SLIDER),
                 page=50.0,
                 on_release=True,
-                act=fitting_with,
+                act=lambda n: lambda controller: actions.fit_cages(controller, n),
             ),
             Field(
                 "cages.total",
@@ -54,10 +46,10 @@ def cages_section(editor: DeformEditor) -> Section:
                 "Total vertices of all cages (used at next fit)",
                 value=wanted,
                 minimum=8,
-                maximum=_MOST,
+                maximum=_MOST_VERTICES,
                 step=10,
                 unit=f"({fitted} fitted)" if fitted not in (0, wanted) else "",
-                act=lambda n: setting(n_cage_vertices=n),
+                act=option("n_cage_vertices"),
             ),
             Field(
                 "cages.offset",
@@ -69,7 +61,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 step=10.0**-decimals,
                 decimals=decimals,
                 special="Auto",
-                act=lambda x: setting(offset=x),
+                act=option("offset"),
             ),
             key_button(
                 editor.keys,
@@ -86,7 +78,7 @@ def cages_section(editor: DeformEditor) -> Section:
                 "show_cages",
                 value=widgets.cages_wanted,
                 enabled=bool(session.cages),
-                act=lambda _: toggle_cages,
+                act=lambda _: actions.toggle_cages,
             ),
         ),
     )
@@ -111,7 +103,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "Preserve the volume of each region as well",
                     value=options.preserve_region_volumes and has_volume,
                     enabled=has_volume,
-                    act=lambda on: setting(preserve_region_volumes=on),
+                    act=option("preserve_region_volumes"),
                 ),
             ),
             Field(
@@ -121,7 +113,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 "Colour the mesh by its local volume change",
                 "show_volume_change",
                 value=widgets.overlay_wanted,
-                act=lambda _: toggle_overlay,
+                act=lambda _: actions.toggle_overlay,
             ),
             Field(
                 "deform.lids",
@@ -131,7 +123,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 value=next(name for name, lids in _LIDS.items() if lids is options.lids),
                 enabled=not session.mesh.is_closed,
                 choices=_LIDS_LABELS,
-                act=lambda name: setting(lids=_LIDS[name]),
+                act=lambda name: option("lids")(_LIDS[name]),
             ),
             Field(
                 "deform.range",
@@ -146,7 +138,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 prefix="±",
                 unit="%",
                 special="Auto",
-                act=lambda x: setting_colour_range(None if x is None else 0.01 * x),
+                act=_with_range,
             ),
             Field(
                 "deform.stretch",
@@ -157,7 +149,7 @@ def deform_section(editor: DeformEditor) -> Section:
                 value=options.stretch,
                 maximum=1e6,
                 decimals=2,
-                act=lambda x: setting(stretch=x),
+                act=option("stretch"),
             ),
             Field(
                 "deform.clusters",
@@ -165,10 +157,10 @@ def deform_section(editor: DeformEditor) -> Section:
                 "Rotation clusters",
                 "Rotation clusters: fewer is faster, less accurate",
                 value=options.rotation_groups,
-                maximum=_MOST,
+                maximum=_MOST_VERTICES,
                 step=50,
                 minimum=1,
-                act=lambda n: setting(rotation_groups=n),
+                act=option("rotation_groups"),
             ),
             (
                 Field(
@@ -177,7 +169,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "Avoid contact",
                     "Keep parts of the surface from crossing each other",
                     value=options.avoid_contact,
-                    act=lambda on: setting(avoid_contact=on),
+                    act=option("avoid_contact"),
                 ),
                 Field(
                     "deform.finishes",
@@ -185,7 +177,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "Finish on the mesh",
                     "After each drag of a handle, reduce the distortion of the mesh itself",
                     value=editor.controller.finishing.is_wanted,
-                    act=finishing_after_drags,
+                    act=_finishing_after_drags,
                 ),
             ),
             (
@@ -200,6 +192,23 @@ def deform_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
+
+
+def _with_range(percentage: float | None) -> Action:
+    """Return the action that sets the colour range of the overlay; None is automatic."""
+    share = None if percentage is None else 0.01 * percentage
+    return actions.assigning(lambda c: c.widgets.overlay, "wanted_range", share)
+
+
+def _finishing_after_drags(wanted: bool) -> Action:
+    """Return the action that finishes poses on the mesh after each drag, or no longer."""
+
+    def change(controller: Controller) -> None:
+        controller.finishing.is_wanted = wanted
+        if wanted:
+            controller.finishing.rest()
+
+    return change
 
 
 def _readable(largest: float) -> tuple[float, int]:

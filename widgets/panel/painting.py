@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import math
 
-from ..editor import DeformEditor, Mode, selecting_through, with_radius
+from ..editor import TOOLS, DeformEditor, Mode, actions
 from ..region_selector import Tool
 from .fields import Field, Section, key_button
-
-_TOOLS = {
-    Tool.BRUSH: "brush",
-    Tool.LASSO: "lasso",
-    Tool.RECTANGLE: "rectangle",
-    Tool.COMPONENT: "connected_part",
-    Tool.REGION: "whole_region",
-}
 
 
 def painting_section(editor: DeformEditor) -> Section:
@@ -24,7 +16,7 @@ def painting_section(editor: DeformEditor) -> Section:
     decimals = max(0, 4 - math.floor(math.log10(diagonal)))
     tools = tuple(
         key_button(keys, f"paint.{action}", action, value=selector.tool is tool, group="tools")
-        for tool, action in _TOOLS.items()
+        for tool, action in TOOLS.items()
     )
     return Section(
         "paint",
@@ -43,7 +35,7 @@ def painting_section(editor: DeformEditor) -> Section:
                 maximum=round(2.0 * diagonal, decimals),
                 step=0.01 * diagonal,
                 decimals=decimals,
-                act=with_radius,
+                act=lambda radius: actions.assigning(actions.selector_of, "radius", radius),
             ),
             Field(
                 "paint.through",
@@ -52,7 +44,7 @@ def painting_section(editor: DeformEditor) -> Section:
                 "Paint hidden vertices as well",
                 "select_through",
                 value=selector.through,
-                act=selecting_through,
+                act=lambda on: actions.assigning(actions.selector_of, "through", on),
             ),
             (
                 key_button(keys, "paint.grow", "grow", "Grow"),

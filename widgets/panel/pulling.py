@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..editor import Action, Controller, DeformEditor, preserving_volume, pulling_with
+from ..editor import Action, Controller, DeformEditor, actions
 from ..volume_overlay import percent
 from .fields import Field, Section, key_button
 
@@ -36,7 +36,7 @@ def pull_section(editor: DeformEditor) -> Section:
                 value=round(100.0 * puller.effective_locality),
                 maximum=100.0,
                 unit="%",
-                act=lambda share: pulling_with(locality=0.01 * share),
+                act=lambda share: _with_locality(0.01 * share),
             ),
             volume_label(editor, "pull.volume"),
             (
@@ -47,7 +47,7 @@ def pull_section(editor: DeformEditor) -> Section:
                     "0 between three pins or fixed vertices, otherwise mostly free",
                     "auto_locality",
                     value=puller.locality is None,
-                    act=lambda on: _auto if on else _not_auto,
+                    act=lambda on: _with_locality(None) if on else _not_auto,
                 ),
                 preserve_toggle(editor, "pull.preserve"),
             ),
@@ -78,7 +78,7 @@ def preserve_toggle(editor: DeformEditor, name: str) -> Field:
         "preserve_volume",
         value=editor.session.options.preserve_volume and has_volume,
         enabled=has_volume,
-        act=preserving_volume,
+        act=lambda _: actions.toggle_volume,
     )
 
 
@@ -90,15 +90,15 @@ def reset_button(editor: DeformEditor, name: str) -> Field:
 
 def _with_radius(percentage: float) -> Action:
     def resize(controller: Controller) -> None:
-        radius = 0.01 * percentage * controller.session.mesh.diagonal
-        pulling_with(radius=radius)(controller)
+        controller.widgets.puller.radius = 0.01 * percentage * controller.session.mesh.diagonal
 
     return resize
 
 
-def _auto(controller: Controller) -> None:
-    pulling_with(locality=None)(controller)
+def _with_locality(locality: float | None) -> Action:
+    return actions.assigning(lambda c: c.widgets.puller, "locality", locality)
 
 
 def _not_auto(controller: Controller) -> None:
-    pulling_with(locality=controller.widgets.puller.effective_locality)(controller)
+    puller = controller.widgets.puller
+    puller.locality = puller.effective_locality

@@ -2,25 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from vtk_segdeform.pictures import of_region
 
-from ..editor import (
-    Action,
-    DeformEditor,
-    Mode,
-    choosing_regions,
-    merging,
-    naming_region,
-    segmenting,
-    showing_cage,
-    split_region,
-)
+from ..editor import Action, Controller, DeformEditor, Mode, actions
 from ..volume_overlay import in_tenths
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
 
-_MOST = 20  # regions of a segmentation
+_MOST_REGIONS = 20  # regions of a segmentation
 _COLUMNS = (
     Column("cage", "Cage", "Number of cage vertices. Tick: show the cage"),
     Column("volume", "Volume"),
@@ -42,12 +30,12 @@ def regions_section(editor: DeformEditor) -> Section:
                 "slider",
                 "Number",
                 "Number of regions: release to segment again, which resets the pose",
-                value=min(max(1, widgets.n_regions), _MOST),
+                value=min(max(1, widgets.n_regions), _MOST_REGIONS),
                 visible=painting,
                 minimum=1,
-                maximum=_MOST,
+                maximum=_MOST_REGIONS,
                 on_release=True,
-                act=segmenting,
+                act=lambda n: lambda controller: actions.segment(controller, n),
             ),
             Table(
                 "regions.list",
@@ -58,9 +46,9 @@ def regions_section(editor: DeformEditor) -> Section:
                 n_rows=7,
                 multiple=True,
                 acts={
-                    "select": _choosing,
-                    "rename": lambda key, name: naming_region(int(key), name),
-                    "cage": lambda key, on: showing_cage(int(key), on),
+                    "select": lambda keys: lambda c: c.widgets.choose_regions([*map(int, keys)]),
+                    "rename": _renaming,
+                    "cage": lambda key, on: lambda c: c.widgets.cages.set_visible(int(key), on),
                 },
             ),
             (
@@ -72,7 +60,7 @@ def regions_section(editor: DeformEditor) -> Section:
                     "Merge the selected regions",
                     enabled=len(existing) > 1,
                     visible=painting,
-                    act=lambda _: merging(existing),
+                    act=lambda _: actions.merging(existing),
                 ),
                 Field(
                     "regions.split",
@@ -82,15 +70,23 @@ def regions_section(editor: DeformEditor) -> Section:
                     "split_region",
                     enabled=len(existing) == 1,
                     visible=painting,
-                    act=lambda _: split_region,
+                    act=lambda _: actions.split_region,
                 ),
             ),
         ),
     )
 
 
-def _choosing(keys: Sequence[str]) -> Action:
-    return choosing_regions([int(key) for key in keys])
+def _renaming(key: str, name: str) -> Action:
+    """Return the action that renames a region; "" restores its default name."""
+
+    def rename(controller: Controller) -> None:
+        session, region = controller.session, int(key)
+        before = session.region_name(region)
+        session.painting.rename(region, name)
+        controller.say(f"Renamed {before} to {session.region_name(region)}")
+
+    return rename
 
 
 def _rows(editor: DeformEditor) -> tuple[Row, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..editor import DeformEditor, Keys, Mode, key_cap, position_of, states_of
+from ..editor import DeformEditor, Keys, Mode, key_cap, states_of
 from ..volume_overlay import percent
 from .fields import Card, Entry, Field, Status, Word
 
@@ -74,7 +74,7 @@ def words_of(hint: str, keys: Keys, mode: Mode) -> tuple[Word, ...]:
 
 def history(editor: DeformEditor) -> tuple[Entry, ...]:
     """Return the states of the session by name, the oldest first."""
-    here = position_of(editor.controller)
+    here = editor.controller.history.position
     return tuple(
         Entry(name, is_current=place == here, is_undone=place > here)
         for place, name in enumerate(states_of(editor.controller))

@@ -5,16 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..editor import (
-    DeformEditor,
-    Mode,
-    keys_of,
-    looking_from,
-    show_pose,
-    show_rest,
-    toggle_cube,
-    with_up,
-)
+import numpy as np
+
+from ..editor import Controller, DeformEditor, Mode, actions, keys_of
 from .fields import Act, Field, key_button
 
 _Test = Callable[[DeformEditor], bool]
@@ -48,8 +41,8 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
                 Field("save.mesh_as", "file", "Save mesh as ..."),
             ),
         ),
-        _step("undo", controller.undo_label, is_free=is_free),
-        _step("redo", controller.redo_label, is_free=is_free),
+        _step("undo", controller.history.undo_label, is_free=is_free),
+        _step("redo", controller.history.redo_label, is_free=is_free),
     ]
     modes = [
         key_button(
@@ -73,7 +66,7 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
             "before_after",
             value=controller.shows_rest,
             enabled=is_free and editor.session.state.pose is not None,
-            act=lambda on: show_rest if on else show_pose,
+            act=lambda on: actions.show_rest if on else lambda c: c.show_instead(None),
         ),
         Field("view", "menu", "View", "What is shown", enabled=is_free, items=view_entries(editor)),
         Field("help", "button", "Keys", "Show keys", "help", while_busy=True),
@@ -89,7 +82,7 @@ def view_entries(editor: DeformEditor | None) -> tuple[Field | None, ...]:
     """Return the entries of the menu about the view; without an editor, all are disabled."""
     views = [_camera(editor, each, each.capitalize(), f"view_{each}") for each in _VIEWS]
     views.append(_camera(editor, "home", "Three-quarter", "view_home"))
-    views.append(_camera(editor, "iso", "Isometric", act=lambda _: looking_from("iso")))
+    views.append(_camera(editor, "iso", "Isometric", act=lambda _: actions.looking_from("iso")))
     ups = [
         _camera(editor, f"up_{name.lower()}", name, act=_upright(axis), shows=_is_up(axis))
         for axis, name in enumerate("XYZ")
@@ -112,7 +105,7 @@ def view_entries(editor: DeformEditor | None) -> tuple[Field | None, ...]:
             editor,
             "cube",
             "Orientation cube",
-            act=lambda _: toggle_cube,
+            act=lambda _: _toggle_cube,
             shows=lambda e: e.show_cube,
         ),
     )
@@ -156,7 +149,22 @@ def _camera(
 
 
 def _upright(axis: int) -> Act:
-    return lambda _: with_up(axis)
+    """Return what makes an axis the up axis, and shows the model upright."""
+
+    def turn_up(controller: Controller) -> None:
+        controller.camera.viewpoint.up = np.eye(3)[axis]
+        controller.camera.viewpoint.look_from("home")
+        controller.say(f"Up: {'XYZ'[axis]}")
+
+    return lambda _: turn_up
+
+
+def _toggle_cube(controller: Controller) -> None:
+    cube = controller.camera.cube
+    if cube.is_shown:
+        cube.hide()
+    else:
+        cube.show()
 
 
 def _is_up(axis: int) -> _Test:

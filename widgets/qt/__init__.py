@@ -6,14 +6,14 @@ The files, in reading order:
     panel       the panel beside the view, which draws `widgets.panel`
     toolbar sections tables status history
                 the parts of the panel
-    first_steps three cards for the first run
+    first_steps a box with the first steps for the first run
     view_menu   menu entries for the camera
     keys_dialog the keys of all actions
     controls    buttons, fields and layouts of the parts
     icons       the icons of the toolbar
 """
 
-from .controls import check_box, shortcut
+from .controls import check_box, shortcut, stopper
 from .keys_dialog import menu_keys
 from .view_menu import add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
@@ -26,4 +26,5 @@ __all__ = [
     "menu_keys",
     "name_keys",
     "shortcut",
+    "stopper",
 ]

@@ -178,6 +178,17 @@ def shortcut(keys: Any, parent: Any, do: Callable[[], object], *, alone: bool = 
     return key
 
 
+def stopper(*lists: list[Callable[[], None]]) -> Callable[..., None]:
+    """Return a function that calls and removes all callbacks in *lists*."""
+
+    def stop_all(*_: object) -> None:
+        for stops in lists:
+            while stops:
+                stops.pop()()
+
+    return stop_all
+
+
 class _CheckBox(QtWidgets.QCheckBox):
     def paintEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Draw the box with a visible frame."""

@@ -21,7 +21,7 @@ from vtk_segdeform.session import Change
 
 from ..editor import DeformEditor, Keys, key_cap
 from ..panel import all_sections, sections
-from .controls import shortcut, using
+from .controls import shortcut, stopper, using
 from .history import HistoryPart
 from .sections import SectionBox
 from .status import StatusPart
@@ -91,7 +91,7 @@ class DeformPanel(QtWidgets.QWidget):
         self._stop_session: list[Callable[[], None]] = []
         self._follow()
         # Unsubscribe before Qt deletes the widgets.
-        self.destroyed.connect(_stopper(self._stops, self._stop_session))
+        self.destroyed.connect(stopper(self._stops, self._stop_session))
         self.refresh()
 
     @property
@@ -117,14 +117,10 @@ class DeformPanel(QtWidgets.QWidget):
             box.setVisible(name in shown)
             if name in shown:
                 box.draw(shown[name], editor.keys)
-        if (
-            editor.widgets.dragger.is_refining or editor.widgets.puller.is_refining
-        ):  # refinement ends without a message
-            self._delay.start()
 
     def stop(self) -> None:
         """Unsubscribe from the editor and disable the panel, permanently."""
-        _stopper(self._stops, self._stop_session)()
+        stopper(self._stops, self._stop_session)()
         self._delay.stop()
         for each in (self, self.toolbar, self.status):
             each.setEnabled(False)
@@ -226,14 +222,3 @@ class DeformPanel(QtWidgets.QWidget):
             self.deformed.emit()
         if change & (Change.REGIONS | Change.NAMES):
             self.regions_changed.emit()
-
-
-def _stopper(*lists: list[Callable[[], None]]) -> Callable[..., None]:
-    """Return a function that calls and removes all callbacks in *lists*."""
-
-    def stop_all(*_: object) -> None:
-        for stops in lists:
-            while stops:
-                stops.pop()()
-
-    return stop_all

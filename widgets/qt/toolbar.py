@@ -13,15 +13,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import (
-    MESH_FILES,
-    READABLE_FILES,
-    DeformEditor,
-    exporting,
-    opening,
-    save,
-    saving,
-)
+from ..editor import MESH_FILES, READABLE_FILES, DeformEditor, actions
 from ..panel import Field, toolbar, tooltip
 from .controls import Press, highlighted, tool_button
 from .icons import icon
@@ -119,7 +111,7 @@ class Toolbar(QtWidgets.QWidget):
             button.clicked.connect(self._asker(name))
         elif field.kind == "hold":
             button.pressed.connect(lambda: self._hold(name))
-            button.released.connect(lambda: self._let_go(name))
+            button.released.connect(lambda: self._release(name))
             highlighted(button)
         else:
             button.clicked.connect(lambda: press(name))
@@ -133,7 +125,7 @@ class Toolbar(QtWidgets.QWidget):
         self._since.start()
         self._press(name, True)
 
-    def _let_go(self, name: str) -> None:
+    def _release(self, name: str) -> None:
         if self._was_held or self._since.elapsed() > _CLICK:
             self._press(name, False)
         self.refresh()
@@ -180,10 +172,10 @@ class Toolbar(QtWidgets.QWidget):
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
         path, _ = QtWidgets.QFileDialog.getOpenFileName(
-            self, "Open", self._folder(), READABLE_FILES
+            self, "Open", str(self._editor.path.parent), READABLE_FILES
         )
         if path and self.may_discard():
-            self._editor.do(opening(Path(path)))
+            self._editor.do(actions.opening(Path(path)))
 
     def may_discard(self) -> bool:
         """Return whether the session may be closed; ask if it has unsaved changes."""
@@ -199,7 +191,7 @@ class Toolbar(QtWidgets.QWidget):
     def save_session(self) -> None:
         """Save to the session's file; ask before another existing file is replaced."""
         if self._editor.controller.file.may_overwrite:
-            self._editor.do(save)
+            self._editor.do(actions.save)
         else:
             self.ask_and_save()
 
@@ -207,21 +199,18 @@ class Toolbar(QtWidgets.QWidget):
         """Ask for a file and save the session there."""
         path = self._path_to_write("Save session", str(self._editor.path), _SESSIONS)
         if path is not None:
-            self._editor.do(saving(path if path.suffix else path.with_suffix(".segdeform")))
+            self._editor.do(actions.saving(path if path.suffix else path.with_suffix(".segdeform")))
 
     def ask_and_export(self) -> None:
         """Ask for a file and write the posed mesh there."""
         proposed = str(self._editor.path.with_suffix(".ply"))
         path = self._path_to_write("Save mesh", proposed, MESH_FILES)
         if path is not None:
-            self._editor.do(exporting(path if path.suffix else path.with_suffix(".ply")))
+            self._editor.do(actions.exporting(path if path.suffix else path.with_suffix(".ply")))
 
     def _path_to_write(self, title: str, proposed: str, kinds: str) -> Path | None:
         path, _ = QtWidgets.QFileDialog.getSaveFileName(self, title, proposed, kinds)
         return Path(path) if path else None
-
-    def _folder(self) -> Any:
-        return str(self._editor.path.parent)
 
 
 def _group(buttons: list[Any]) -> Any:

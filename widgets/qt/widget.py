@@ -43,8 +43,8 @@ class DeformWidget(QtWidgets.QWidget):
     parent : QWidget, optional
         The parent widget.
     first_run : QSettings, optional
-        Show three cards with the first steps to users who have not seen them yet, which is stored
-        there; by default they are not shown.
+        Show the first steps to users who have not seen them yet, which is stored there; by default
+        they are not shown.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class DeformWidget(QtWidgets.QWidget):
     panel : DeformPanel
         The panel beside it.
     first_steps : FirstSteps
-        The cards; ``first_steps.show()`` shows them again.
+        The box with them; ``first_steps.show()`` shows it again.
     taken_keys : callable
         Returns the keys that no action can have, with labels; the application's menus have them.
     keys_changed : signal

@@ -12,7 +12,6 @@ import logging
 import secrets
 import signal
 import sys
-import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -23,13 +22,12 @@ from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.models import cactus
 from vtk_segdeform.session import Session
 
-from ..editor import About, Autosaves, SessionFile, Slot, is_mesh, read_session
+from ..editor import About, Autosaver, Autosaves, Slot, is_mesh, read_session
 from .web_editor import WebEditor
 
 if sys.platform != "win32":
     import resource
 
-_PAUSE = 1.0  # seconds after a change; changes meanwhile are saved with it
 _MOST_FILES = 65_536  # that the process may open, connections included
 _ENDINGS = ("SIGINT", "SIGTERM", "SIGHUP")
 
@@ -44,62 +42,6 @@ logging.getLogger("aiohttp.server").addFilter(_is_own_fault)
 
 Started = Callable[[int, str, str], object]
 """``started(port, secret, once)``, once the page can be opened at ``/SECRET/``, or at ``/ONCE``."""
-
-
-class Autosaver:
-    """Saves the unsaved work on *web* in another thread, from `start` on."""
-
-    def __init__(
-        self, web: WebEditor, autosaves: Autosaves, about: About, slot: Slot | None = None
-    ) -> None:
-        self._web, self._autosaves, self._about, self._slot = web, autosaves, about, slot
-        self._session, self._saved = web.session, web.session.state
-        self._saving: asyncio.Task[None] | None = None
-        self._lock = threading.Lock()
-
-    def start(self) -> None:
-        """Save after each change from now on, in the running event loop."""
-        self._loop = asyncio.get_running_loop()
-        self._web.editor.controller.messages.on_change(self._changed)
-
-    def save(self) -> None:
-        """Save now, if anything has changed; an error is shown in the page."""
-        with self._lock:
-            self._save()
-
-    def _save(self) -> None:
-        session, controller = self._web.session, self._web.editor.controller
-        state = session.state
-        if session is not self._session:  # the page has opened another file
-            self.discard()
-            self._session, self._about = session, About(self._web.model.name)
-        elif state is self._saved:
-            return
-        self._saved = state  # after an error, tried again after the next change
-        if not controller.file.is_modified(session):
-            self.discard()
-            return
-        try:
-            self._slot = self._slot or self._autosaves.new(self._about)
-            self._slot.write(session, controller.camera.settings(controller.mode))
-        except SegDeformError as error:
-            self._loop.call_soon_threadsafe(controller.messages.report_error, error)
-
-    def discard(self) -> None:
-        """Delete what was saved."""
-        slot, self._slot = self._slot, None
-        if slot is not None:
-            slot.remove()
-
-    def _changed(self) -> None:
-        is_saving = self._saving is not None and not self._saving.done()
-        if not is_saving and self._web.session.state is not self._saved:
-            self._saving = self._loop.create_task(self._save_soon())
-
-    async def _save_soon(self) -> None:
-        await asyncio.sleep(_PAUSE)
-        await self._loop.run_in_executor(None, self.save)
-        self._loop.call_soon(self._changed)
 
 
 def recoverable(autosaves: Autosaves, file: Path | None) -> Slot | None:
@@ -159,9 +101,15 @@ def serve_until_stopped(
     if session is None:
         session = Session(cactus()) if file is None else read_session(file, lambda *_: None)
     web = WebEditor(session, name=about.name, upload_limit=upload_limit)
-    if slot is not None:
-        web.editor.controller.file = SessionFile(web.editor.path, Session(session.mesh))
-    autosaver, is_kept = Autosaver(web, autosaves, about, slot), False
+    controller, given = web.editor.controller, web.session
+    controller.file.is_new = slot is not None
+    autosaver = Autosaver(
+        controller,
+        autosaves,
+        lambda: about if web.session is given else About(web.model.name),
+        slot=slot,
+    )
+    is_kept = False
     try:
         is_kept = asyncio.run(_serve(web, autosaver, host, port, started))
     except Exception:
@@ -207,13 +155,15 @@ async def _serve(
             loop.remove_signal_handler(getattr(signal, each))
         ended.set()
 
-    def ready(port: int) -> None:
-        autosaver.start()
-        started(port, secret, once)
-
     for name in _ENDINGS if sys.platform != "win32" else ():  # there, Ctrl+C is an exception
         loop.add_signal_handler(getattr(signal, name), end, name)
     await web.serve_until(
-        ended, host=host, port=port, secret=secret, once=once, ready=ready, last=autosaver.save
+        ended,
+        host=host,
+        port=port,
+        secret=secret,
+        once=once,
+        ready=lambda port: started(port, secret, once),
+        last=autosaver.save,
     )
     return came != ["SIGINT"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 import pyvista as pv
@@ -52,3 +53,15 @@ QVTKRenderWindowInteractor.paintGL = _painted_if_wanted
 def poses_are_not_finished(monkeypatch):
     """Leave poses as they are after a drag: a later change would be saved once more."""
     monkeypatch.setattr(finishing, "MOST_VERTICES", 0)
+
+
+@pytest.fixture
+def boxes() -> Iterator[Any]:
+    """Yield a user who answers dialogs, with every answer that the test has prepared."""
+    from app_hands import Boxes, application  # which skips the tests where there is no screen
+
+    application()
+    made = Boxes()
+    yield made
+    assert made.unexpected == []
+    assert made.answers == []

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from app_hands import (
     AppHand,
-    Boxes,
     Window,
     delete,
     digest,
@@ -76,15 +75,6 @@ def bent(arm):
 
 
 @pytest.fixture
-def boxes():
-    application()
-    made = Boxes()
-    yield made
-    assert made.unexpected == []
-    assert made.answers == []
-
-
-@pytest.fixture
 def start(tmp_path, boxes):
     """Yield a function that starts the program, with the settings and autosaves of earlier runs."""
     made = []
@@ -142,7 +132,7 @@ def test_kernels_are_loaded_while_the_start_page_waits(
     start, ball_file, monkeypatch, is_file_given
 ):
     loads = []
-    monkeypatch.setattr(window, "expect_session", lambda: loads.append(None))
+    monkeypatch.setattr(window, "load_early", lambda: loads.append(None))
     monkeypatch.setattr(window, "_PAUSE", 50)
     hand = start(ball_file if is_file_given else None)
     times = []
@@ -452,26 +442,6 @@ def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     assert "no folder" in boxes.seen[-1]
 
 
-@pytest.mark.campaign
-def test_the_buttons_of_the_panel_call_the_functions_of_the_menus(
-    start, ball_file, tmp_path, monkeypatch
-):
-    hand = start(ball_file)
-    head = hand.window.editor_widget.panel.toolbar
-    change(hand)
-    choose_file(monkeypatch, tmp_path / "knob.segdeform")
-    head.buttons["save"].menu().actions()[1].trigger()
-    assert hand.title == "knob.segdeform - segdeform"
-    head.buttons["save"].menu().actions()[0].trigger()
-    choose_file(monkeypatch, ball_file)
-    hand.click(head.buttons["open"])
-    hand.settle()
-    assert hand.title == "ball.vtp - segdeform"
-    choose_file(monkeypatch, tmp_path / "again.vtp")
-    hand.window.editor_widget.panel.toolbar.buttons["save"].menu().actions()[2].trigger()
-    assert "height" in convert.read_polydata(tmp_path / "again.vtp").point_data
-
-
 # Drops and invalid files.
 
 
@@ -520,37 +490,6 @@ def test_an_invalid_file_is_reported_in_plain_words_and_the_window_stays(start, 
 
 
 # View and help.
-
-
-@pytest.mark.campaign
-def test_the_view_menu_shows_hides_and_ticks(start, arm_file):
-    hand = start(arm_file)
-    hand.view_hand()
-    for name, is_shown in (
-        ("Show cages in all modes", lambda: hand.window.editor.widgets.cages.is_shown),
-        ("Show local volume change", lambda: hand.window.editor.widgets.overlay.is_shown),
-    ):
-        assert hand.reads("View")[name] == (True, False)
-        hand.choose("View", name)
-        hand.settle()
-        assert is_shown()
-        assert hand.reads("View")[name] == (True, True)
-        hand.choose("View", name)
-        hand.settle()
-        assert not is_shown()
-    cards = hand.window.editor_widget.first_steps
-    cards.hide()
-    hand.choose("Help", "First steps")
-    assert cards.isVisible()
-    plotter = hand.window.editor_widget.plotter
-    plotter.camera.zoom(5.0)
-    hand.choose("View", "Fit to view")
-
-    def is_framed():
-        places = hand.window.editor.view.to_display(hand.window.session.vertices)[:, :2]
-        return (places > 0).all() and (places < plotter.window_size).all()
-
-    until(is_framed, "the mesh in the view")
 
 
 @BLANK
@@ -634,21 +573,6 @@ def test_a_picture_shows_the_view_without_status_line_and_gizmo(
 # Autosave.
 
 
-@pytest.mark.campaign
-def test_after_a_drag_its_pose_is_autosaved_until_the_session_is_saved(start, arm_file, tmp_path):
-    hand = start(arm_file)
-    mouse = hand.view_hand()
-    mouse.drag(hand.way())
-    hand.settle()
-    (path,) = slots(tmp_path)
-    assert digest(load_session(path)) == digest(hand.window.session)
-    assert hand.window.session.state.pose is not None
-    hand.choose("File", "Save session")
-    hand.settle()
-    assert slots(tmp_path) == []
-    assert digest(load_session(arm_file)) == digest(hand.window.session)
-
-
 def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     start, arm_file, tmp_path, monkeypatch
 ):
@@ -673,7 +597,8 @@ def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
     assert hand.window.session.is_dragging
     mouse.release(place)
     assert threading.main_thread() not in threads
-    assert views[-1] == hand.window.editor.controller.view_settings
+    controller = hand.window.editor.controller
+    assert views[-1] == controller.camera.settings(controller.mode)
 
 
 @BLANK
@@ -720,24 +645,6 @@ def test_recovering_work_later_or_never(start, bent, ball_file, tmp_path, boxes)
     assert slots(tmp_path) == []
 
 
-@pytest.mark.campaign
-def test_recovering_one_of_several_autosaves_keeps_the_others(start, ball_file, tmp_path, boxes):
-    for name in "abc":
-        left(tmp_path, Session(BALL), About(name))
-    boxes.answers += ["Later", "Recover"]
-    hand = start(ball_file)
-    other = hand.window._other  # which has the file of the command line
-    until(lambda: other.has_mesh, "the file")
-    assert other.document.name == "ball.vtp"
-    delete(other)
-    assert [text.split(" from")[0][-1] for text in boxes.seen] == ["c", "b"]
-    assert hand.title == "b* - segdeform"
-    assert len(slots(tmp_path)) == 3
-    boxes.answers += ["Discard", "Discard"]
-    start()  # another program: locked autosaves are not offered
-    assert slots(tmp_path) == [hand.window.autosaver._slot.path]
-
-
 @BLANK
 def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     path = left(tmp_path, Session(BALL), About("ball.vtp"))
@@ -754,11 +661,13 @@ def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
 @BLANK
 def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
     (tmp_path / "unsaved").write_text("in the way")
-    hand, told = start(ball_file, interval=0.05), []
-    hand.window.autosaver.failed.connect(told.append)
-    change(hand)
+    hand = start(ball_file, interval=0.05)
+    window, told = hand.window, []
+    say = window.editor.controller.say
+    window.editor.controller.say = lambda text: told.append(text) or say(text)
+    window.session.handles.add([40, 41], "knob")
     until(lambda: told, "the word")
-    assert "Could not autosave" in hand.window.editor.status
+    assert "Could not autosave" in window.editor.status
     (tmp_path / "unsaved").unlink()
     until(lambda: slots(tmp_path), "another attempt")
     assert len(told) == 1

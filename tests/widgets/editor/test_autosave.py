@@ -293,10 +293,11 @@ def ask(folder):
             slot.release()
 
 
-@pytest.mark.parametrize("name", ["photos", SLOT, "notes.txt", "8f31"])
 @pytest.mark.parametrize(
-    "inside", [["a.txt"], ["lock"], ["lock", "about.json"], [], ["lock", "x/y"]]
-)
+    ("name", "inside"),
+    [("photos", ["a.txt", "lock"]), ("8f31", ["lock", "about.json"]), (SLOT, ["a.txt", "x/y"]),
+     (SLOT, [])],
+)  # fmt: skip
 def test_a_foreign_folder_is_unchanged(folder, name, inside):
     for each in inside:
         path = folder / name / each

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import every
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, picture, plain_view
 from vtkmodules.vtkInteractionStyle import (
     vtkInteractorStyleJoystickCamera,
     vtkInteractorStyleTerrain,
@@ -15,7 +15,7 @@ from vtkmodules.vtkInteractionStyle import (
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor import show_rest
+from vtk_segdeform.widgets.editor.actions import show_rest
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -131,17 +131,32 @@ def test_the_camera_never_turns_upside_down(bench):
         assert abs(bench.camera[2] @ bench.view.view_direction) < 1e-6
 
 
+FACES = {
+    "kp_1": (0, 1, 0), "ctrl+kp_1": (0, -1, 0), "kp_end": (0, 1, 0),
+    "kp_3": (-1, 0, 0), "ctrl+kp_3": (1, 0, 0), "kp_7": (0, 0, -1), "ctrl+kp_7": (0, 0, 1),
+}  # fmt: skip
+
+
 def test_keys_of_the_keypad_show_the_model_and_change_no_mode(bench):
-    mode, seen = bench.editor.mode, set()
-    for key in ("KP_1", "KP_End", "KP_3", "KP_7", "KP_5", "KP_0", "period", "comma"):
-        bench.hand.key(key)
-        seen.add(tuple(np.round(bench.view.view_direction, 6)))
+    mode = bench.editor.mode
+
+    def looks(key):
+        *held, name = key.split("+")
+        bench.hand.key(name.upper() if "kp" in name else name, control="ctrl" in held)
         shown = bench.view.to_display(bench.mesh.vertices)[:, :2]
         assert shown.min() > 0.0
         assert shown.max() < 400.0
-    assert seen >= {(0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, -1.0)}
+        return bench.view.view_direction
+
+    for key, direction in FACES.items():
+        assert np.allclose(looks(key), direction, atol=1e-6), key
+    assert np.abs(looks("kp_0")).min() > 0.1  # from none of the sides
+    for is_parallel in (True, False):
+        looks("kp_5")
+        assert bench.view.camera.GetParallelProjection() == is_parallel
+    for key in ("period", "comma"):
+        looks(key)
     assert bench.editor.mode is mode
-    assert bench.view.camera.GetParallelProjection()
 
 
 def test_a_double_click_frames_and_a_click_on_the_cube_turns():
@@ -165,6 +180,10 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.history.undo_label is None
     assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
+    with_cube = picture(bench.view)
+    bench.editor.show_cube = False
+    assert not bench.editor.show_cube
+    assert (picture(bench.view) != with_cube).any()
     count = bench.view.window.GetRenderers().GetNumberOfItems()
     bench.editor.remove()
     assert bench.view.window.GetRenderers().GetNumberOfItems() < count

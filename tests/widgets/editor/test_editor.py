@@ -9,7 +9,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import pyvista as pv
 from hands import Hand, draw_seldom, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
@@ -17,13 +16,12 @@ from scipy.spatial.transform import Rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, load_session, models, save_session
+from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor import actions, controller
-from vtk_segdeform.widgets.editor import panel_actions as actions_of_panel
-from vtk_segdeform.widgets.editor.bindings import BINDINGS
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.editor.job import _Shared
+from vtk_segdeform.widgets.editor.queue import _Shared
 from vtk_segdeform.widgets.editor.session_file import read_session
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
@@ -75,19 +73,6 @@ class Bench:
         return [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
 
 
-@pytest.fixture(params=["plain", pytest.param("pyvista", marks=pytest.mark.campaign)])
-def any_view(request):
-    """Yield a view with pyvista, and one without."""
-    if request.param == "plain":
-        yield plain_view((400, 400))
-        return
-    plotter = pv.Plotter(off_screen=True, window_size=(400, 400))
-    plotter.disable_anti_aliasing()
-    plotter.show(auto_close=False, interactive=False)
-    yield View.of(plotter)
-    plotter.close()
-
-
 @pytest.fixture(scope="module")
 def ready():
     """Return the state of a small session, complete except for a pose."""
@@ -122,11 +107,11 @@ def pull_handle(bench, shift=(20, 30), moves=2):
     bench.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
 
 
-def test_the_whole_story(any_view, tmp_path):
+def test_the_whole_story(tmp_path):
     mesh = models.cactus(500)
     coarse = Session(mesh)
     coarse.change_options(n_cage_vertices=60)
-    bench = Bench(any_view, Session(mesh, state=coarse.state))  # without a history
+    bench = Bench(plain_view((400, 400)), Session(mesh, state=coarse.state))  # without a history
     del bench.view.render  # drawn at every event
     hand, z = bench.hand, mesh.vertices[:, 2]
     volume = signed_volume(mesh.vertices, mesh.faces)
@@ -136,7 +121,7 @@ def test_the_whole_story(any_view, tmp_path):
         points = bench.editor.widgets.surface.points
         drawn.append(abs(signed_volume(points, mesh.faces) / volume - 1.0))
 
-    any_view.renderer.AddObserver("EndEvent", check_frame)
+    bench.view.renderer.AddObserver("EndEvent", check_frame)
 
     bench.type("g")
     assert bench.session.regions.n_regions >= 2
@@ -334,16 +319,6 @@ def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
         assert np.mean(np.any(seen[k][1] != seen[k - 1][1], axis=2)) > 0.02
 
 
-@pytest.mark.parametrize("mode", [Mode.PULL, Mode.DEFORM])
-def test_painted_handles_are_coloured_where_they_hold_the_surface(bench, mode):
-    (name,) = bench.session.handles
-    bench.editor.mode = mode
-    shown = picture(bench.view)
-    bench.editor.do(actions_of_panel.hiding_handle(name, True))
-    hidden = picture(bench.view)
-    assert np.any(shown != hidden, axis=2).sum() > 100
-
-
 def test_a_refit_is_one_step_and_keeps_the_pose(bench):
     session = bench.session
     up = np.eye(4)
@@ -351,7 +326,7 @@ def test_a_refit_is_one_step_and_keeps_the_pose(bench):
     session.move_handle(next(iter(session.handles)), up)
     session.commit()
     before, count = session.vertices, len(session.history.labels)
-    bench.editor.do(actions_of_panel.fitting_with(60))
+    bench.editor.do(lambda controller: actions.fit_cages(controller, 60))
     bench.settle()
     assert sum(cage.n_vertices for cage in session.cages) == 60
     assert len(session.history.labels) == count + 1
@@ -481,6 +456,11 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
     assert selector.region == 0  # only one region is left
 
 
+def test_all_vertices_are_selected_for_a_region(bench):
+    bench.type("ctrl+a")
+    assert bench.session.regions.membership[0].all()
+
+
 def test_handles_are_selected_and_removed(bench):
     bench.type("3", "d", "a", "t")
     x = bench.session.mesh.vertices[:, 0]
@@ -493,9 +473,50 @@ def test_handles_are_selected_and_removed(bench):
     assert {first, bench.editor.widgets.dragger.handle} == {"handle 1", "handle 2"}
     gone = bench.editor.widgets.dragger.handle
     bench.type("Delete")
-    assert list(bench.session.handles) == [
-        name for name in ("handle 1", "handle 2") if name != gone
-    ]
+    assert {*bench.session.handles, gone} == {"handle 1", "handle 2"}
+    assert len(bench.session.handles) == 1
+    assert f"Removed {gone}" in bench.editor.status
+
+
+def test_keys_make_a_pull_more_or_less_local(bench):
+    puller = bench.editor.widgets.puller
+    bench.type("0", "plus")
+    assert puller.locality == pytest.approx(LOCALITY + 0.1)
+    bench.type("minus", "minus")
+    assert puller.locality == pytest.approx(LOCALITY - 0.1)
+    assert f"Locality: {100 * (LOCALITY - 0.1):.0f} %" in bench.editor.status
+    bench.type(*["minus"] * 11)
+    assert puller.locality == 0.0
+    bench.type("a")
+    assert puller.locality is None
+    assert "Locality: auto" in bench.editor.status
+
+
+SAID = [
+    ("c", "Cages shown"), ("c", "Cages hidden"), ("shift+g", "Regions shown"),
+    ("shift+g", "Regions hidden"), ("w", "Shaded with edges"), ("w", "Wireframe"), ("w", "Shaded"),
+    ("KP_5", "Orthographic"), ("KP_5", "Perspective"), ("p", "Volume preservation off"),
+    ("p", "Volume preservation on from the next move"), ("z", "Undo: volume preservation on"),
+    ("y", "Redo: volume preservation on"), ("v", "Brush: paint region 1 (X-ray)"),
+    ("i", "The mesh is closed and exactly as given: nothing to show"),
+    ("v", "Visible surface only"), ("x", "Split region 1"), ("4", "No cages yet. Press F"),
+    ("l", "Axes: local"), ("l", "Axes: global"), ("Home", "Pose reset"),
+    ("0", "Drag the surface. Shift-click pins. Shift+wheel: radius (5 %)"),
+]  # fmt: skip
+
+
+def test_each_key_says_what_it_has_done(bench):
+    bench.editor.widgets.puller.radius = 0.05 * bench.session.mesh.diagonal
+    for key, said in SAID:
+        bench.type(key)
+        assert bench.editor.status.startswith(said), key
+    bench.hand.wheel(1, bench.hand.at([0.0, 0.0, 0.0]), shift=True)
+    share = 100.0 * bench.editor.widgets.puller.radius / bench.session.mesh.diagonal
+    assert f"radius ({share:.1f} %)" in bench.editor.status
+    bench.hand.click(bench.hand.at([0.0, 0.0, 0.0]), shift=True)
+    bench.type("u")
+    assert "Removed 1 point" in bench.editor.status
+    assert list(bench.session.handles) == ["handle 1"]
 
 
 def test_keys_for_axes_the_pivot_and_pins(bench):
@@ -582,12 +603,6 @@ def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
     bench.hand.release((x + 20, y + 30))
     bench.type("z")
     assert not bench.session.state.changes(before)
-
-
-def test_no_key_has_two_bindings_in_one_mode():
-    taken = [(key, mode) for b in BINDINGS if b.action for key in b.keys for mode in b.modes]
-    assert len(taken) == len(set(taken))
-    assert "q" not in {key for key, _ in taken}
 
 
 def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
@@ -682,7 +697,7 @@ def test_do_returns_the_error_of_an_action_or_none(bench):
     bench.editor.controller.start("Counting", lambda _: time.sleep(0.05), lambda _: None)
     refusal = bench.editor.do(actions.undo)
     assert str(refusal).startswith("Busy. Counting")
-    assert bench.editor.do(actions.toggle_help, while_busy=True) is None
+    assert bench.editor.do(lambda controller: controller.show_keys(), while_busy=True) is None
     bench.settle()
     bench.hand.failures.clear()
 
@@ -836,10 +851,15 @@ def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end
     assert bare.hand.failures == []
 
 
-def test_the_progress_of_binding_leaves_room_for_the_overlay_that_follows(bench):
-    told = []
-    bench.editor.widgets.bind(lambda fraction, _: told.append(fraction))
-    assert max(told) == 0.75  # measured: the overlay takes 20 to 28 % of the time
+def test_a_posed_session_is_bound_as_it_is_read_and_not_by_the_first_drag(bench, tmp_path):
+    bench.type("4")
+    pull_handle(bench)
+    bench.editor.save(tmp_path / "posed.segdeform")
+    stages = []
+    read = read_session(tmp_path / "posed.segdeform", lambda _, stage: stages.append(stage))
+    assert read.is_bound
+    assert stages  # which the window shows
+    assert_array_equal(read.vertices, bench.session.vertices)
 
 
 def test_another_session_can_be_opened_and_edited(bench, tmp_path):
@@ -960,8 +980,8 @@ def test_a_session_of_another_mesh_is_framed_by_the_camera(bench, tmp_path):
 # Removing and switching off.
 
 
-def test_removing_the_editor_restores_the_view(any_view):
-    heard = []
+def test_removing_the_editor_restores_the_view():
+    any_view, heard = plain_view((400, 400)), []
     interactor, style = any_view.interactor, any_view.interactor.GetInteractorStyle()
     interactor.AddObserver("KeyPressEvent", lambda *_: heard.append(interactor.GetKeySym()), 0.5)
     blank = picture(any_view)

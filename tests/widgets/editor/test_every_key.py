@@ -1,12 +1,9 @@
-"""Every key of the editor in mid-drag, while a pose converges, and during a job; see `key_moments`.
-
-In plain VTK and in a plotter; `test_qt_every_key` repeats them in Qt.
-"""
+"""Every key of the editor in mid-drag, while a pose converges, and during a job."""
 
 from __future__ import annotations
 
 import pytest
-from key_moments import plain_stand, pyvista_stand, slow_down, table
+from key_moments import plain_stand, slow_down, table
 
 from vtk_segdeform.widgets import Mode
 
@@ -48,11 +45,6 @@ def plain(tmp_path_factory):
     yield from stand_of(plain_stand, tmp_path_factory.mktemp("plain"))
 
 
-@pytest.fixture(scope="module")
-def plotter(tmp_path_factory):
-    yield from stand_of(pyvista_stand, tmp_path_factory.mktemp("plotter"))
-
-
 @pytest.mark.parametrize(("mode", "key"), mid_drags())
 def test_in_mid_drag(plain, mode, key):
     plain.during(mode, key)
@@ -71,30 +63,6 @@ def test_while_the_pose_converges(plain, mode, key, times):
 @pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, Mode.REGIONS, Mode.PULL))
 def test_during_a_job(plain, mode, key):
     plain.in_a_job(mode, key)
-
-
-KEYS_OF_PYVISTA = {"c", "f", "p", "r", "s", "w", "escape"}
-
-
-@pytest.mark.parametrize(
-    ("mode", "key"),
-    [
-        *table(Mode.REGIONS, Mode.PULL, daily=KEYS_OF_PYVISTA),
-        *table(Mode.DEFORM, daily=()),
-    ],
-)
-def test_in_mid_drag_in_a_plotter(plotter, mode, key):
-    plotter.during(mode, key)
-
-
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily={"w"}))
-def test_while_the_pose_converges_in_a_plotter(plotter, mode, key):
-    plotter.just_after(mode, key)
-
-
-@pytest.mark.parametrize(("mode", "key"), table(Mode.DEFORM, daily={"w"}))
-def test_during_a_job_in_a_plotter(plotter, mode, key):
-    plotter.in_a_job(mode, key)
 
 
 @pytest.mark.parametrize("during", [True, False])

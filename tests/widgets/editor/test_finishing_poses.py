@@ -23,7 +23,6 @@ from vtk_segdeform.widgets.editor import (
     Mode,
     exporting,
     finishing,
-    finishing_after_drags,
     opening,
     queue,
     saving,
@@ -98,7 +97,7 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
     bench.type("z")
     assert running.fraction is None
     pull_handle(bench, (5, 8))
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.hand.tick()
     assert running.fraction is None
 
@@ -131,7 +130,7 @@ def settling(bench, monkeypatch):  # noqa: F811
     """Yield what settles after a drag whose pose has not converged; the timer has not fired yet."""
     monkeypatch.setattr(queue, "_SHOWN_AFTER", 0.0)
     monkeypatch.setattr("vtk_segdeform.widgets.handle_dragger.live_solve.STEPS", 3)
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4")
     pull_handle(bench, (-40, 90))
     assert bench.session.solution.status is Status.STEP_LIMIT
@@ -387,7 +386,7 @@ def test_another_mode_during_a_finish_does_not_stop_it(bench):  # noqa: F811
 
 
 def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4", "shift+f")
     assert "no pose to finish" in bench.editor.status.lower()
     bench.hand.failures.clear()
@@ -401,7 +400,7 @@ def test_a_key_finishes_the_pose_on_request(bench):  # noqa: F811
 
 
 def test_the_status_line_tells_what_holds_of_a_finished_pose(bench):  # noqa: F811
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4")
     pull_handle(bench)
     bench.type("shift+f")
@@ -448,7 +447,7 @@ def test_a_part_that_no_handle_moves_is_named_once():
     session.handles.add(scene.handle)
     session.bind()
     made = Bench(plain_view((400, 320)), session, Mode.DEFORM)
-    made.editor.do(finishing_after_drags(False))
+    made.editor.controller.finishing.is_wanted = False
     said = f"Part 2 ({n} vertices) has no handle and no fixed vertices: it stays where it is"
     for is_said in (True, False):
         pull_handle(made)

@@ -11,7 +11,6 @@ from test_editor import Bench, pull_handle
 from test_finishing_poses import grabbed
 
 from vtk_segdeform import sizes
-from vtk_segdeform.widgets.editor import finishing_after_drags
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -30,7 +29,7 @@ def test_every_frame_of_a_drag_has_the_exact_volume(monkeypatch, kept_by, mode):
     session = SCENE.session()
     session.bind()
     bench, shown, changes = Bench(plain_view((400, 320)), session), [], []
-    bench.editor.do(finishing_after_drags(False))
+    bench.editor.controller.finishing.is_wanted = False
     bench.type("4" if mode == "deform" else "0")
 
     def frame(*_):

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, plain_view
 from scenes import sausage
 
+from vtk_segdeform import models, save_session
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.widgets import DeformEditor, Mode
-from vtk_segdeform.widgets.editor.actions import redo, undo
-from vtk_segdeform.widgets.editor.history import (
+from vtk_segdeform.widgets.editor import (
+    Controller,
+    SessionFile,
     jumping_to,
-    position_of,
     preview,
     states_of,
 )
-from vtk_segdeform.widgets.editor.neighbours import Neighbour
 
 pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 UP = np.eye(4)
@@ -42,59 +45,107 @@ def editor():
     return editor
 
 
-def test_states_are_named_and_a_jump_reaches_even_the_one_before_the_session(editor):
-    controller, session, undone = editor.controller, editor.session, []
+def test_states_are_named_and_a_jump_reaches_each(editor):
+    controller = editor.controller
     assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
-    editor.do(jumping_to(1))
-    assert editor.status.startswith("History: Set tip")
-    assert (position_of(controller), len(states_of(controller))) == (1, 3)
-
-    def enter(position, message):
-        undone.append((session.history.position, position, message))
-
-    controller.neighbours.before = Neighbour("repair", ("Opened", "Pull"), enter)
-    assert states_of(controller) == ("Opened", "Pull", "Repair", "Set tip", "Drag tip")
-    editor.do(jumping_to(4))
-    assert (session.history.position, position_of(controller), undone) == (2, 4, [])
-    editor.do(jumping_to(0))
-    assert undone == [(0, 0, "History: Opened")]
-    assert controller.undo_label == "repair"
-    editor.do(undo)
-    assert undone[1:] == [(0, 1, "Undo: repair")]
-
-
-def test_the_states_of_a_session_that_followed_are_in_the_history_until_a_step_replaces_them(
-    editor,
-):
-    controller, session, entered = editor.controller, editor.session, []
-    session.history.jump(1)
-
-    def enter(position, message):
-        entered.append((session.history.position, position, message))
-
-    after = Neighbour("repair", ("Pull",), enter)
-    controller.neighbours.follow(session, 1, after)
-    assert states_of(controller) == ("Opened", "Set tip", "Repair", "Pull")
-    assert controller.redo_label == "repair"
-    session.history.jump(0)
-    assert controller.redo_label == "set tip"
-    assert states_of(controller)[2:] == ("Repair", "Pull")
-    for position in (2, 3):
-        session.history.jump(0)
+    for position in (1, 0, 2):
         editor.do(jumping_to(position))
-    session.history.jump(1)
-    editor.do(redo)
-    assert entered == [
-        (1, 2, "History: Repair"),
-        (1, 3, "History: Pull"),
-        (1, 2, "Redo: repair"),
-    ]
-    preview(controller, 2)
-    assert editor.widgets.surface.instead is None  # that pose is of another mesh
-    session.set_fixed([250])
-    assert states_of(controller) == ("Opened", "Set tip", "Set fixed vertices")
-    session.undo()
-    assert controller.redo_label == "set fixed vertices"
+        assert editor.status.startswith(f"History: {states_of(controller)[position]}")
+        assert editor.session.history.position == controller.history.position == position
+
+
+FIXED = "Set fixed vertices"
+WHOLE = "Opened", "Set tip", "Repair", FIXED, "Repair", FIXED
+PLACES = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)]  # sessions, and positions in them
+
+
+class Repaired:
+    """An editor whose mesh was repaired twice, and each copy edited."""
+
+    def __init__(self, editor):
+        self.editor, self.sessions = editor, [editor.session]
+        editor.run("undo")  # the repair takes the place of the drag
+        for n in (300, 500):
+            copy = Session(models.sphere(n))
+            file = SessionFile(Path(f"{n}.segdeform"), copy)
+            assert editor.do(partial(Controller.open_repaired, session=copy, file=file)) is None
+            copy.set_fixed([7])
+            self.sessions.append(copy)
+
+    def check(self, position):
+        """Check that the editor shows the state at *position*, with the file of its session."""
+        editor, history = self.editor, self.editor.controller.history
+        number, own = PLACES[position]
+        assert editor.session is self.sessions[number]
+        assert editor.session.history.position == own
+        assert (history.position, states_of(editor.controller)) == (position, WHOLE)
+        assert editor.path.name == ("session.segdeform", "300.segdeform", "500.segdeform")[number]
+
+
+@pytest.fixture
+def repaired(editor):
+    """Return the editor after two repairs, at its last state."""
+    return Repaired(editor)
+
+
+def test_a_repair_is_a_step_that_is_undone_and_redone_as_any_other(editor, repaired):
+    history, camera = editor.controller.history, editor.view.camera.GetPosition()
+    repaired.check(5)
+    for verb, way in (("undo", range(4, -1, -1)), ("redo", range(1, 6))):
+        for position in way:
+            label = history.undo_label if verb == "undo" else history.redo_label
+            assert editor.run(verb) is None
+            assert editor.status.startswith(f"{verb.capitalize()}: {label}")
+            repaired.check(position)
+        editor.run(verb)
+        assert editor.status.startswith(f"Nothing to {verb}")
+    assert editor.view.camera.GetPosition() == camera
+
+
+def test_a_jump_leads_to_a_state_of_any_session(editor, repaired):
+    for position in (0, 5, 1, 2, 0, 3, 4, 1, 5, 2):
+        editor.do(jumping_to(position))
+        assert editor.status.startswith(f"History: {WHOLE[position]}")
+        repaired.check(position)
+    preview(editor.controller, 3)
+    assert editor.widgets.surface.instead is not None
+    preview(editor.controller, 1)
+    assert editor.widgets.surface.instead is None  # a pose of another mesh
+
+
+def test_another_step_in_place_of_a_repair_replaces_the_copies(editor, repaired):
+    controller = editor.controller
+    editor.do(jumping_to(1))
+    editor.session.move_handle("tip", UP, max_steps=1)
+    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
+    assert controller.history.redo_label is None
+    editor.session.revert()
+    repaired.check(1)
+    editor.do(jumping_to(2))
+    repaired.sessions[1].set_fixed([3])  # instead of fixing 7, and of the second repair
+    assert states_of(controller) == WHOLE[:4]
+    editor.do(jumping_to(0))
+    assert states_of(controller) == WHOLE[:4]
+    editor.session.set_fixed([3])
+    assert states_of(controller) == ("Opened", FIXED)
+    editor.run("undo")
+    assert controller.history.redo_label == "set fixed vertices"
+
+
+def test_each_session_has_unsaved_changes_of_its_own(editor, repaired):
+    is_modified = []
+    for position in (5, 4, 2, 3):
+        editor.do(jumping_to(position))
+        is_modified.append(editor.controller.is_modified)
+    assert is_modified == [True, False, False, True]
+
+
+def test_a_file_that_is_opened_begins_another_history(editor, repaired, tmp_path):
+    save_session(tmp_path / "other.segdeform", Session(models.sphere(300)))
+    editor.load(tmp_path / "other.segdeform")
+    assert states_of(editor.controller) == ("Opened",)
+    assert editor.session not in repaired.sessions
+    assert editor.controller.history.undo_label is None
 
 
 def test_a_preview_shows_another_state_until_anything_happens(editor):
@@ -125,9 +176,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
     controller.start("Waiting", lambda _: None, lambda _: None)
     assert not shows_rest(0)  # during a job
     editor.wait()
-    controller.neighbours.before = Neighbour("repair", ("Opened",), lambda *_: None)
-    assert not shows_rest(0)  # the pose before the session is not known
-    assert shows_rest(1)
+    assert shows_rest(0)
 
 
 def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):

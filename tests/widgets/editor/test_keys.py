@@ -41,6 +41,48 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
             assert [key_name(key_cap(key)) for key in b.keys] == [*b.keys]
 
 
+KNOWN = """
+pull 0, regions 1, cages 2, handles 3, deform 4, segment g, fit_cages f, undo z ctrl+z,
+redo y ctrl+y ctrl+shift+z, reset_pose home, finish shift+f, show_cages c, preserve_volume p,
+show_holes i, save ctrl+s, open ctrl+o, help h f1 question, cancel escape, brush b, lasso l,
+rectangle t, connected_part k, whole_region r, more_local plus equal, less_local minus,
+auto_locality a, remove_pins u, select_through v, grow plus equal, shrink minus,
+select_all ctrl+a, select_none ctrl+shift+a, invert ctrl+i, next_region n tab, new_region a,
+merge_region m, split_region x, paint_fixed s, paint_handle d, new_handle a, next_handle n tab,
+remove_handle delete backspace, convert_handle m, local_axes l, pivot v, show_volume_change o,
+style w, show_regions shift+g, before_after backslash, view_front kp_1, view_back ctrl+kp_1,
+view_right kp_3, view_left ctrl+kp_3, view_top kp_7, view_bottom ctrl+kp_7, view_home kp_0,
+projection kp_5, frame_selection period, frame_all comma
+"""
+
+
+def test_names_that_settings_and_scripts_contain_and_keys_that_hands_know_remain():
+    known = {name: tuple(keys) for name, *keys in map(str.split, KNOWN.split(","))}
+    assert {b.name: b.keys for b in keys_of("pyvista").bindings if b.name} == known
+
+
+def test_caps_of_keys_that_have_names_of_their_own():
+    marks = {
+        "question": "?", "bracketleft": "[", "bracketright": "]", "plus": "+", "minus": "-",
+        "backslash": "\\", "period": ".", "comma": ",", "equal": "=", "semicolon": ";",
+        "apostrophe": "'", "grave": "`", "slash": "/",
+    }  # fmt: skip
+    words = {
+        "page_up": "PgUp", "page_down": "PgDown", "insert": "Ins", "delete": "Del",
+        "escape": "Esc", "return": "Enter", "ctrl+shift+a": "Ctrl+Shift+A", "kp_1": "Num 1",
+    }  # fmt: skip
+    for name, cap in (marks | words).items():
+        assert key_cap(name) == cap
+        assert key_name(cap) == name
+    symbols = {
+        "Prior": "page_up", "Next": "page_down", "quoteright": "apostrophe", "quoteleft": "grave",
+        "KP_Add": "plus", "KP_Subtract": "minus", "KP_Decimal": "period", "ISO_Left_Tab": "tab",
+        "KP_Home": "kp_7", "KP_Insert": "kp_0", "KP_Begin": "kp_5",
+    }  # fmt: skip
+    for symbol, name in symbols.items():
+        assert event_key(symbol, control=False, alt=False, shift=False) == name
+
+
 class Nameless:
     """Has no text."""
 

@@ -172,6 +172,7 @@ def test_another_file_has_its_own_notices_and_marks(open_editor, tmp_path):
     assert scene.notices.text == "Open sheet: no volume to preserve"
     assert scene.notices.is_open
     assert not scene.notices.are_marked
+    assert not scene.editor.controller.is_modified
     assert not scene.shade(LOOP_RGB).any()
     Surface(polydata(*icosphere(2))).given.save(tmp_path / "ball.ply")
     scene.editor.load(tmp_path / "ball.ply")
@@ -204,6 +205,16 @@ def test_the_first_edit_closes_the_line_and_later_ones_do_not(open_editor):
     assert scene.notices.are_marked
 
 
+def test_the_line_and_the_marks_follow_the_option_of_lids(open_editor):
+    session = Session(Surface(bottle(2)))
+    scene = open_editor(session)
+    scene.click("Show")
+    before = scene.notices.text
+    session.change_options(lids=False)
+    assert scene.notices.text != before
+    assert scene.notices.are_marked
+
+
 def test_a_clean_view_has_no_line_and_no_marks(open_editor):
     scene = open_editor(Session(Surface(bottle())))
     scene.click("Show")
@@ -218,7 +229,7 @@ def test_a_clean_view_has_no_line_and_no_marks(open_editor):
 )
 def test_the_line_covers_neither_the_status_line_nor_most_of_the_window(open_editor, size):
     scene = open_editor(Session(Surface(two_parts())), size)
-    scene.notices.offer("Repair ...", lambda: None)
+    scene.notices.offer("Repair ...", lambda: None, lambda _: True)
     View.render(scene.view)
     x, y, wide, high = scene.notices._line.box
     assert y >= scene.editor.controller.messages.height > 0
@@ -230,9 +241,14 @@ def test_the_line_covers_neither_the_status_line_nor_most_of_the_window(open_edi
 
 def test_a_button_that_is_offered_calls_its_function(open_editor):
     scene, calls = open_editor(Session(Surface(sheet()))), []
-    scene.notices.offer("Repair ...", lambda: calls.append(1))
+    session = scene.editor.session
+    scene.notices.offer("Repair ...", lambda: calls.append(1), lambda each: each is session)
     scene.click("Repair ...")
     assert calls == [1]
+    scene.notices.follow(Session(Surface(sheet())))
+    View.render(scene.view)
+    with pytest.raises(StopIteration):
+        scene.notices._line.centre_of("Repair ...")
 
 
 def test_a_press_beside_the_buttons_does_not_reach_the_camera(open_editor):
@@ -250,18 +266,6 @@ def test_for_a_sheet_the_volume_is_not_0_per_cent(open_editor):
     scene.hand.types("p")
     assert "no volume" in scene.editor.status.lower()
     assert scene.editor.session.options.preserve_volume is Options().preserve_volume
-
-
-def test_the_back_of_a_sheet_is_lit_as_its_front(open_editor):
-    shades = []
-    for side in (1.0, -1.0):
-        scene = open_editor(Session(Surface(sheet())), (200, 200))
-        scene.view.camera.SetPosition(0.0, -1.0, 8.0 * side)
-        scene.view.renderer.ResetCamera()
-        with scene.editor.controller.clean_view():
-            shades.append(picture(scene.view)[100, 100].astype(int))
-    assert np.abs(shades[0] - shades[1]).max() < 12
-    assert shades[1].min() > 100
 
 
 def test_a_mesh_without_a_surface_has_notices_of_its_borders():

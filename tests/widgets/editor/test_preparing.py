@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
+import weakref
 from types import SimpleNamespace
 
 import numpy as np
@@ -334,6 +336,27 @@ def test_jobs_load_the_kernels_if_the_mesh_is_large(bench, monkeypatch):
     bench.editor.controller.start("counting", lambda _: asked.append("work"), lambda _: None)
     bench.until(lambda: not bench.editor.is_busy)
     assert asked == [bench.session.mesh.n_vertices, "work"]
+
+
+def test_a_thread_that_has_not_ended_keeps_no_widget(prepared, monkeypatch):
+    """Widgets that it kept last would be deleted in that thread."""
+    mesh, result = prepared
+    has_begun, may_end = threading.Event(), threading.Event()
+
+    def preparation(*_):
+        has_begun.set()
+        return may_end.wait(20.0) and result
+
+    monkeypatch.setattr(Session, "preparation", preparation)
+    editor = DeformEditor(plain_view((100, 100)), Session(mesh))
+    editor.On()
+    assert has_begun.wait(20.0)
+    gone = [weakref.ref(each) for each in (editor, editor.controller, editor.widgets)]
+    editor.remove()
+    del editor
+    gc.collect()
+    assert [each() for each in gone] == [None] * 3
+    may_end.set()
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from hands import Hand, plain_view
 
-from vtk_segdeform.errors import CageError, SessionError
+from vtk_segdeform.errors import CageError, Cancelled, SessionError
 from vtk_segdeform.widgets.editor import queue as queue_module
 from vtk_segdeform.widgets.editor.queue import Kind, Queue, Task
 
@@ -95,6 +95,7 @@ def test_a_job_begins_beside_the_worker_and_another_one_is_refused(bench):
     assert bench.heard == ["begin prepare", "begin Counting"]
     with pytest.raises(SessionError, match="Counting: wait"):
         bench.add(Kind.JOB, "Measuring")
+    assert bench.queue.text.startswith("Counting")
     bench.queue.refuse()
     assert bench.queue.text.startswith("Busy. Counting")
     bench.gates["Counting"].set()
@@ -126,7 +127,10 @@ def test_no_result_is_delivered_while_the_hand_is_active_but_the_worker_is_free(
     bench.add(Kind.PREPARE, "prepare", may_end=lambda: is_free)
     bench.add(Kind.FINISH, "finish")
     bench.gates["prepare"].set()
+    assert bench.hand.view.is_sparing
     bench.open("finish")
+    bench.hand.tick()
+    assert not bench.hand.view.is_sparing  # for nothing is computed
     assert "prepare" not in bench.heard
     is_free = True
     bench.until(lambda: "prepare" in bench.heard)
@@ -147,6 +151,116 @@ def test_a_task_begins_after_a_rest_and_hurries_if_told(bench, monkeypatch):
     bench.queue.hurry(Kind.SAVE)
     bench.hand.tick()
     assert bench.heard == ["loaded", "saved"]
+
+
+def test_work_runs_in_another_thread_and_everything_else_in_this_one(bench):
+    threads = []
+
+    def here(*_):
+        threads.append(threading.get_ident())
+
+    def begin():
+        here()
+        return here
+
+    bench.queue = Queue(bench.hand.view, here)
+    bench.queue.add(Task(kind=Kind.JOB, begin=begin, done=here))
+    bench.until(lambda: bench.queue.job is None)
+    assert len(threads) == 5  # begin, changed, work, changed, done
+    assert [each for each in threads if each != threads[0]] in ([threads[1]], [threads[2]])
+    assert threads[0] == threads[-1] == threading.get_ident()
+
+
+@pytest.mark.parametrize("kind", [Kind.JOB, Kind.DOCUMENT, Kind.AUTOSAVE])
+def test_a_cancelled_task_stops_at_its_next_report(bench, kind):
+    stopped = threading.Event()
+
+    def work(progress):
+        try:
+            while True:
+                progress(0.5, "on and on")
+                time.sleep(0.001)
+        except Cancelled:
+            stopped.set()
+            raise
+
+    bench.queue.add(Task(kind=kind, begin=lambda: work, done=bench.heard.append))
+    bench.hand.tick(2)
+    assert bench.queue.cancel(kind)
+    assert (bench.queue.task(kind) is None) == (kind is Kind.DOCUMENT)  # nobody waits for that
+    bench.until(stopped.is_set)
+    bench.until(lambda: bench.queue.task(kind) is None)
+    assert bench.heard == bench.hand.failures == []
+
+
+@pytest.mark.parametrize("error", [CageError("no cage fits"), None])
+def test_an_error_after_the_cancellation_is_only_logged(bench, caplog, error):
+    caplog.set_level("INFO", queue_module.__name__)
+    bench.add(Kind.JOB, "told", error=error, failed=bench.heard.append)
+    bench.until(lambda: bench.queue.job.fraction)  # the last report
+    bench.queue.cancel(Kind.JOB)
+    bench.gates["told"].set()
+    bench.until(lambda: bench.queue.job is None)
+    assert [record.exc_info[1] for record in caplog.records] == ([error] if error else [])
+    assert "told" not in bench.heard
+    assert bench.hand.failures == []
+
+
+def test_an_error_reaches_failed_if_it_is_given_and_otherwise_whoever_waits(bench):
+    error = CageError("no cage fits")
+    bench.add(Kind.JOB, "told", error=error, failed=bench.heard.append)
+    bench.gates["told"].set()
+    bench.until(lambda: error in bench.heard)
+    bench.add(Kind.JOB, "raised", error=error)
+    bench.gates["raised"].set()
+    with pytest.raises(CageError, match="no cage fits"):
+        bench.queue.wait(Kind.JOB)
+    bench.queue.wait(Kind.JOB)
+    assert bench.hand.failures == []
+
+
+def test_the_result_is_delivered_once_even_if_the_listener_raises(bench):
+    def changed():
+        if bench.queue.job is None:
+            raise RuntimeError("a listener without hands")
+
+    bench.queue = Queue(bench.hand.view, changed)
+    bench.queue.add(Task(kind=Kind.JOB, begin=lambda: lambda _: 0, done=lambda n: 1 // n))
+    bench.until(lambda: bench.hand.failures)
+    bench.hand.tick(3)
+    (failure,) = bench.hand.failures
+    assert isinstance(failure, ZeroDivisionError)
+    assert isinstance(failure.__context__, RuntimeError)
+
+
+def test_a_computing_thread_makes_progress_while_the_window_is_idle(bench):
+    # Each tick waits for the worker; otherwise 200 ticks would pass immediately.
+    def work(progress):
+        for k in range(20_000):
+            progress(k / 20_000, "counting")
+            sum(range(200))
+        return "counted"
+
+    bench.queue.add(Task(kind=Kind.JOB, begin=lambda: work, done=bench.heard.append))
+    for _ in range(200):
+        if bench.queue.job is not None:
+            bench.hand.tick()
+    assert bench.heard == ["counted"]
+
+
+def test_the_timer_is_slow_while_no_thread_runs(bench, monkeypatch):
+    """All timers of a view have the shortest period, also that of a pose that converges."""
+    periods, view = [], bench.hand.view
+    monkeypatch.setattr(view, "every", lambda period, _: periods.append(period) or periods.pop)
+    bench.queue.add(Task(kind=Kind.SETTLE, begin=bench.heard.clear, may_begin=lambda: False))
+    assert periods == [100]
+    bench.add(Kind.CHECK, "check")
+    assert periods == [20]
+    bench.gates["check"].set()
+    bench.queue.wait(Kind.CHECK)
+    assert periods == [100]
+    bench.queue.cancel(Kind.SETTLE)
+    assert periods == []
 
 
 def test_without_tasks_there_is_no_timer(bench):

@@ -14,7 +14,7 @@ from vtk_segdeform import Mesh, Session, Surface, models
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io import meshlab, read_polydata, stored, to_polydata, triangles_of
 from vtk_segdeform.widgets import DeformEditor
-from vtk_segdeform.widgets.editor import Job, exporting, write_posed
+from vtk_segdeform.widgets.editor import Task, exporting, write_posed
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 UTM = np.array([500_000.0, 5_400_000.0, 100.0])
@@ -163,7 +163,7 @@ def test_a_later_file_is_told_of_instead(edited, view, gate, tmp_path):
 
 def test_a_removed_editor_is_told_nothing(edited, view, gate, tmp_path, monkeypatch):
     delivered = []
-    monkeypatch.setattr(Job, "deliver", lambda job: delivered.append(job))
+    monkeypatch.setattr(Task, "hand_over", lambda task: delivered.append(task))
     for is_there in (False, True):
         editor = edited(FAR)
         editor.do(exporting(tmp_path / "far.stl"))

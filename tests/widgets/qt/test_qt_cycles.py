@@ -1,9 +1,7 @@
 """Cycles of opening, using and closing the editor release everything.
 
-Threads, timers, files, VTK windows and memory return to their earlier values in every host: a
-`DeformWidget`, a dock over an existing pyvistaqt view, a dock over a window of plain VTK.  The last
-one draws into an X window, which is impossible in a process that uses EGL, so it is tested in a
-separate process.
+Threads, timers, files, VTK windows and memory return to their earlier values in a `DeformWidget`
+and in a dock over an existing pyvistaqt view.
 """
 
 from __future__ import annotations
@@ -11,8 +9,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import os
-import subprocess
-import sys
 import threading
 import weakref
 from pathlib import Path
@@ -21,17 +17,16 @@ import numpy as np
 import pytest
 from campaign import every
 from qt_hands import (
-    ONE_SCREEN,
     Qt,
     QtCore,
     QtHand,
     QtTest,
     QtWidgets,
     application,
-    new_screen,
     small,
     until,
 )
+from qt_moments import delete_now
 from vtkmodules.vtkCommonCore import vtkWeakReference
 
 import pyvistaqt  # isort: skip
@@ -42,9 +37,8 @@ from vtk_segdeform.widgets.qt.widget import DeformWidget, deform_dock
 
 WARM = 1  # cycles until caches, fonts and shaders are loaded
 # Memory is stable after a dozen cycles.  A leak per cycle would be 0.45 MiB for a bound session,
-# 0.8 for the actors of the mesh, 4 for an editor; allocators vary by a few MiB in all.  A window of
-# plain VTK with a sphere loses 0.3 by itself.
-SETTLED, MORE, SLACK, OF_PLAIN_VTK = 12, 0.2, 4.0, 0.35  # cycles; MiB a cycle, in all, a cycle
+# 0.8 for the actors of the mesh, 4 for an editor; allocators vary by a few MiB in all.
+SETTLED, MORE, SLACK = 12, 0.2, 4.0  # cycles; MiB a cycle, in all
 
 
 class Widget:
@@ -73,43 +67,6 @@ class Dock:
 
     def end(self):
         self.plotter.close()
-        self.window.close()
-
-
-class PlainDock:
-    """A dock over a window of plain VTK, without pyvista."""
-
-    def __init__(self, session):
-        from vtkmodules.qt.QVTKRenderWindowInteractor import QVTKRenderWindowInteractor
-        from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
-        from vtkmodules.vtkRenderingCore import vtkRenderer
-
-        self.window = QtWidgets.QMainWindow()
-        self.drawn_on = QVTKRenderWindowInteractor(self.window)
-        self.window.setCentralWidget(self.drawn_on)
-        renderer, window = vtkRenderer(), self.drawn_on.GetRenderWindow()
-        window.SetMultiSamples(0)  # as conftest does for the other windows
-        window.AddRenderer(renderer)
-        interactor = window.GetInteractor()
-        interactor.SetInteractorStyle(vtkInteractorStyleTrackballCamera())
-        show(self.window)  # drawn while empty, as many applications do
-        interactor.Initialize()
-        dock = deform_dock((renderer, interactor), session, self.window)
-        self.window.addDockWidget(Qt.RightDockWidgetArea, dock)
-        self.editor, self.panel = dock.editor, dock.panel
-        seen = self.editor.view.to_display(session.mesh.vertices)[:, :2] / renderer.GetSize()
-        assert 0.0 < seen.min() < seen.max() < 1.0  # the editor has set the camera
-
-    def end(self):
-        self.editor.remove()
-        self.window.close()
-
-
-class Forgetful(PlainDock):
-    """The same for an application that closes its window without removing the editor."""
-
-    def end(self):
-        self.drawn_on.Finalize()
         self.window.close()
 
 
@@ -187,19 +144,12 @@ def one_cycle(kind, *, in_a_job):
     del window, each, parts
     host.end()
     host.window.deleteLater()
-    assert kind is Forgetful or not host.editor.is_busy
+    assert not host.editor.is_busy
     del host
     delete_now()
     listeners = session.history._listeners._listeners
-    assert kind is Forgetful or listeners == {}
+    assert listeners == {}
     return [*gone, weakref.ref(session)]
-
-
-def delete_now():
-    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
-    for _ in range(2):
-        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-        application().processEvents()
 
 
 def mebibytes():
@@ -215,7 +165,7 @@ def watch_cycles(kind, times):
     memory = []
 
     def cycle(number):
-        gone = one_cycle(kind, in_a_job=number % 4 == 1 and kind is not Forgetful)
+        gone = one_cycle(kind, in_a_job=number % 4 == 1)
         gc.collect()
         delete_now()
         assert [each() for each in gone] == [None] * len(gone)
@@ -235,56 +185,8 @@ def watch_cycles(kind, times):
     assert [each for each in application().topLevelWidgets() if each not in windows] == []
     if times > SETTLED:
         grown = min(memory[-3:]) - min(memory[SETTLED - 3 : SETTLED])
-        each = MORE + OF_PLAIN_VTK * issubclass(kind, PlainDock)
-        bound = SLACK + each * (len(memory) - SETTLED)
+        bound = SLACK + MORE * (len(memory) - SETTLED)
         assert grown < bound, f"{grown:.1f} MiB more: {np.round(memory, 1)}"
-
-
-DELETED = """
-import shiboken6
-from qtpy import QtWidgets
-from vtk_segdeform import models
-from vtk_segdeform.widgets.qt import DeformWidget
-
-application, mesh = QtWidgets.QApplication([]), models.cactus(700)
-
-def shown(window):
-    window.resize(500, 400)
-    window.show()
-    let_run()
-    return window
-
-def let_run():
-    end = time.monotonic() + 0.4
-    while time.monotonic() < end:
-        application.processEvents()
-
-other = shown(DeformWidget(mesh))
-for _ in range(4):
-    third = shown(DeformWidget(mesh))
-    window, widget = QtWidgets.QMainWindow(), DeformWidget(mesh)
-    window.setCentralWidget(widget)
-    shown(window)
-    shiboken6.delete(window)
-    let_run()
-    other.editor.view.request_render()
-    let_run()
-    other.editor.view.render()
-print("all drawn", flush=True)
-"""
-
-
-@pytest.mark.campaign
-def test_a_window_that_qt_deletes_without_closing_it_leaves_the_others_as_they_are():
-    pytest.importorskip("shiboken6")
-    application()  # or skip
-    own = {"DISPLAY": new_screen(), "PYVISTA_OFF_SCREEN": "false", "QT_XCB_GL_INTEGRATION": ""}
-    environment = {**os.environ, **own}
-    environment.pop("VTK_DEFAULT_OPENGL_WINDOW", None)
-    done = subprocess.run(
-        [sys.executable, "-c", DELETED], capture_output=True, text=True, env=environment
-    )
-    assert "all drawn" in done.stdout, done.stderr[-2000:]  # it may crash at its own end
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs Linux's /proc")
@@ -293,23 +195,3 @@ def test_a_window_that_qt_deletes_without_closing_it_leaves_the_others_as_they_a
 )
 def test_nothing_is_left(kind, times):
     watch_cycles(kind, times)
-
-
-@pytest.mark.skipif(ONE_SCREEN not in os.environ, reason="run by the test below")
-@pytest.mark.parametrize(("kind", "times"), [(PlainDock, 1), fifty(PlainDock), fifty(Forgetful)])
-def test_nothing_is_left_in_plain_vtk(kind, times):
-    watch_cycles(kind, times)
-
-
-@pytest.mark.skipif(ONE_SCREEN in os.environ, reason="runs the test above")
-@pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="needs Linux's /proc")
-@pytest.mark.campaign
-@pytest.mark.parametrize("times", [1, 50])
-def test_a_dock_over_plain_vtk_works_and_leaves_nothing(times):
-    application()  # or skip
-    chosen = ["-k", f"plain_vtk and -{times}", "-m", "campaign or not campaign"]
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", __file__, *chosen],
-        env={**os.environ, ONE_SCREEN: "yes"}, capture_output=True, text=True,
-    )  # fmt: skip
-    assert f"{1 if times == 1 else 2} passed" in done.stdout, done.stdout + done.stderr

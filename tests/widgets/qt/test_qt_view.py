@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import functools
-import gc
-import os
 import runpy
-import subprocess
 import sys
 import time
-import weakref
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from qt_hands import Qt, QtCore, QtHand, QtWidgets, application, new_screen, until
+from qt_hands import Qt, QtCore, QtHand, QtWidgets, application, until
 from qt_moments import delete_now
 
 import pyvistaqt  # isort: skip
 import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt ignores pyvista's entry points
 from vtk_segdeform import Regions, models
 from vtk_segdeform.widgets.editor import actions
-from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
-from vtk_segdeform.widgets.scene.view import View
+from vtk_segdeform.widgets.editor.editor import Mode
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 MESH = models.cactus(700)
@@ -50,13 +45,6 @@ def in_the_background():
     return plotter, plotter.app_window
 
 
-# A BackgroundPlotter is a QtInteractor in a window of its own.
-HOSTS = [
-    pytest.param(in_a_window, id="QtInteractor"),
-    pytest.param(in_the_background, id="BackgroundPlotter", marks=pytest.mark.campaign),
-]
-
-
 @contextmanager
 def shown(host):
     """Yield a plotter with the editor in it, the editor, a hand and the window."""
@@ -78,24 +66,18 @@ def shown(host):
     delete_now()
 
 
-@pytest.fixture(params=HOSTS)
-def qt(request):
-    """Yield a plotter with the editor in it, the editor, a hand and the window, for one test."""
-    with shown(request.param) as view:
-        yield view
-
-
-@pytest.fixture(scope="module", params=HOSTS)
-def shared(request, unprepared):
-    """Yield the same for several tests."""
-    with shown(request.param) as view:
+@pytest.fixture(scope="module")
+def shared(unprepared):
+    """Yield a plotter with the editor in it, the editor, a hand and the window."""
+    with shown(in_a_window) as view:
         yield view
 
 
 @pytest.fixture
 def again(shared):
     """Return the shared view as it was at first, after the tests that close theirs."""
-    plotter, editor, hand, _ = shared
+    plotter, editor, hand, window = shared
+    window.raise_()  # others may cover it, and Qt draws no covered one
     while editor.session.undo() is not None:
         pass
     editor.On()
@@ -114,116 +96,13 @@ def around(editor, mask):
     return seen.min(axis=0) - 4.0, seen.max(axis=0) + 4.0
 
 
-@pytest.mark.campaign
-def test_the_whole_story_in_qt(qt):
-    _, editor, hand, _ = qt
-    session, height = editor.session, MESH.vertices[:, 2]
-    changes, said = [], set()
-    session.on_change(lambda _: changes.append(session.volume_change))
-
-    def is_done():
-        said.add(editor.status)
-        return not editor.is_busy
-
-    hand.key("g")
-    until(lambda: is_done() and session.regions is not None, "regions")
-    hand.key("f")
-    until(lambda: is_done() and session.cages, "cages")
-    assert sum("%" in text for text in said) > 2  # it reported its progress
-    assert len(session.cages) == session.regions.n_regions
-
-    for key in "3tvs":
-        hand.key(key)
-    hand.drag(around(editor, height < 0.08))
-    hand.key("d")
-    hand.drag(around(editor, height > 0.92))
-    assert len(session.fixed) > 5
-    assert set(session.fixed) <= set(np.flatnonzero(height < 0.12))
-    (name,) = session.handles
-    assert set(session.handles[name]) <= set(np.flatnonzero(height > 0.88))
-
-    hand.key("4")
-    until(is_done, "binding")
-    assert editor.mode is Mode.DEFORM
-    start = np.array(hand.at(editor.widgets.dragger.gizmo.centre))
-    changes.clear()
-    hand.drag(start + t * np.array([80.0, -25.0]) for t in np.linspace(0.0, 1.0, 12))
-    moved = np.array(hand.at(editor.widgets.dragger.gizmo.centre)) - start
-    assert moved == pytest.approx([80.0, -25.0], abs=3.0)  # y is up, in pixels
-    until(lambda: not editor.widgets.dragger.is_refining, "refinement, by timers of Qt")
-    assert len(changes) >= 12
-    assert max(map(abs, changes)) < 1e-12
-    bent = session.vertices
-    hand.key("z")
-    assert np.array_equal(session.vertices, MESH.vertices)
-    hand.key("y")
-    assert np.array_equal(session.vertices, bent)
-    assert abs(session.volume_change) < 1e-12
-
-
-@pytest.mark.parametrize("qt", [in_the_background], ids=["BackgroundPlotter"], indirect=True)
-def test_closing_a_window_removes_the_editor(qt):
-    """`test_qt_widget` closes a QtInteractor with a dock."""
-    plotter, editor, hand, window = qt
-    hand.key("g")  # during a job
-    plotter.close()
-    window.close()
-    assert not editor.is_busy
-    assert not editor.GetEnabled()
-
-
-# The example of an application.
-
-
-def is_drawn(picture):
-    """Return whether a picture shows the cactus, and not only the status line, which is 0.04."""
-    grey = np.array(Image.open(picture).convert("L"))
-    return 0.1 < (grey < 215).mean() < 0.5
-
-
-def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
-    app, later = application(), QtCore.QTimer.singleShot
-    monkeypatch.setattr(models, "cactus", lambda _: MESH)
-    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
-    soon = functools.partial(later, 50)  # instead of a second
-    # Windows of other tests may be open, so that closing this one would not end the loop.
-    ended = lambda do: soon(lambda: (do(), app.quit()))  # noqa: E731
-    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
-    limit = QtCore.QTimer()
-    limit.setSingleShot(True)
-    limit.timeout.connect(app.quit)
-    limit.start(60_000)
-    window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
-    assert limit.isActive()  # it has ended by itself
-    assert is_drawn(tmp_path / "window.png")
-    assert not window.editor.editor.GetEnabled()
-    window.deleteLater()
-    delete_now()
-
-
-@pytest.mark.campaign
-def test_the_example_runs_in_its_own_process(tmp_path):
-    application()  # or skip
-    root = str(EXAMPLE.parents[1])
-    screen = {"DISPLAY": new_screen(), "QT_QPA_PLATFORM": "xcb", "PYTHONPATH": root}
-    subprocess.run(
-        [sys.executable, EXAMPLE, "--picture", tmp_path / "window.png"],
-        env={**os.environ, **screen}, check=True, timeout=100,
-    )  # fmt: skip
-    assert is_drawn(tmp_path / "window.png")
-
-
-@pytest.mark.campaign
-def test_the_story_on_a_high_resolution_screen():
-    application()  # or skip
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", __file__, "-k", "whole_story and QtInteractor"],
-        env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
-    )  # fmt: skip
-    assert "1 passed" in done.stdout, done.stdout + done.stderr
-
-
-# Several tests share a view.
+def test_closing_a_background_plotter_removes_the_editor():
+    with shown(in_the_background) as (plotter, editor, hand, window):
+        hand.key("g")  # during a job
+        plotter.close()
+        window.close()
+        assert not editor.is_busy
+        assert not editor.GetEnabled()
 
 
 def test_a_job_is_stopped_by_escape_while_qt_runs(again, monkeypatch):
@@ -284,18 +163,6 @@ def test_alt_the_keypad_and_ctrl_i_arrive_while_the_editor_is_on(again):
     hand.release(middle, Qt.AltModifier)
 
 
-def test_an_editor_that_was_removed_leaves_nothing_alive(again):
-    plotter, *_ = again
-    view = View.of(plotter)
-    editor = DeformEditor(view, MESH)
-    editor.On()
-    editor.remove()
-    gone = weakref.ref(editor)
-    del editor
-    gc.collect()
-    assert gone() is None
-
-
 def test_each_change_is_drawn_once(again):
     _, editor, _, _ = again
     editor.mode = Mode.HANDLES
@@ -320,3 +187,32 @@ def test_each_change_is_drawn_once(again):
         rest()
     window.RemoveObserver(observer)
     assert drawn == [3, 5]
+
+
+# The example of an application.
+
+
+def is_drawn(picture):
+    """Return whether a picture shows the cactus, and not only the status line, which is 0.04."""
+    grey = np.array(Image.open(picture).convert("L"))
+    return 0.1 < (grey < 215).mean() < 0.5
+
+
+def test_the_example_of_an_application_runs(tmp_path, monkeypatch):
+    app, later = application(), QtCore.QTimer.singleShot
+    monkeypatch.setattr(models, "cactus", lambda _: MESH)
+    monkeypatch.setattr(sys, "argv", [str(EXAMPLE), "--picture", str(tmp_path / "window.png")])
+    soon = functools.partial(later, 50)  # instead of a second
+    # `quit` would close the windows of other tests, too.
+    ended = lambda do: soon(lambda: (do(), app.exit()))  # noqa: E731
+    monkeypatch.setattr(QtCore.QTimer, "singleShot", lambda _, do: ended(do))
+    limit = QtCore.QTimer()
+    limit.setSingleShot(True)
+    limit.timeout.connect(app.exit)
+    limit.start(60_000)
+    window = runpy.run_path(str(EXAMPLE), run_name="__main__")["window"]
+    assert limit.isActive()  # it has ended by itself
+    assert is_drawn(tmp_path / "window.png")
+    assert not window.editor.editor.GetEnabled()
+    window.deleteLater()
+    delete_now()

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import threading
 from itertools import pairwise
 
@@ -12,7 +9,6 @@ import numpy as np
 import pytest
 from bad_values import BAD
 from campaign import every
-from given_surfaces import GIVEN, require_only_moved
 from hands import plain_view
 from numpy.testing import assert_array_equal
 from PIL import Image
@@ -26,14 +22,13 @@ from qt_hands import (
     small,
     until,
 )
+from qt_moments import delete_now
 from qtpy import QtGui
 
 import pyvistaqt  # isort: skip
-from vtk_segdeform import Regions, Session, models
+from vtk_segdeform import Session, models
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.io.convert import read_polydata, to_polydata
 from vtk_segdeform.io.surface import read_mesh
-from vtk_segdeform.pictures.palette import HANDLE
 from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.editor import keys_of
@@ -95,7 +90,7 @@ class Seen:
         panel, controller = self.panel, self.editor.controller
         window, plotter = self.widget.window(), self.widget.plotter
         return (
-            self.session, self.session.state, self.editor.path,
+            self.session, self.session.state, self.editor.path, self.editor.keys.changes,
             controller.file.is_modified(self.session), controller.notices.text,
             controller.camera.viewpoint.settings(),
             window.isVisible(), window.isActiveWindow(), window.size(), plotter.hasFocus(),
@@ -217,13 +212,6 @@ def seen(state, last):
     return new
 
 
-def delete_now():
-    """Let Qt process deferred deletes, and then collect the wrappers of PyQt."""
-    for _ in range(2):
-        application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-        application().processEvents()
-
-
 def rows(tree):
     return [
         tuple(tree.topLevelItem(k).text(c) for c in range(tree.columnCount()))
@@ -272,6 +260,8 @@ def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     until(lambda: not seen.editor.widgets.dragger.is_refining, "refinement")
     assert len(seen.deformed) >= 7
     assert max(map(abs, seen.deformed)) < 1e-12
+    finishing = seen.editor.controller.finishing
+    until(lambda: not (finishing.is_pending or finishing.glide.is_running), "the finish")
     bent = seen.session.vertices
     seen.settle()
     volumes = [text for _, _, text in rows(panel.controls["regions.list"])]
@@ -324,90 +314,6 @@ def rename(tree, name):
     QtTest.QTest.keyClick(field, Qt.Key_Return)
 
 
-@pytest.mark.campaign
-def test_regions_are_renamed_in_the_list_and_shown_by_name_everywhere(seen):
-    tree, session = seen.panel.controls["regions.list"], seen.session
-    assert [name for name, *_ in rows(tree)] == ["region 1", "region 2"]
-    seen.click_row(tree, 1, column=2)  # beside the name
-    rename(tree, " the left arm\N{WHITE SMILING FACE} ")
-    seen.settle()
-    assert session.region_names == ("region 1", "the left arm\N{WHITE SMILING FACE}")
-    assert rows(tree)[1][0] == session.region_names[1]
-    assert seen.panel.status.words.text().startswith("Renamed region 2 to the left arm")
-    assert len(seen.regions) == 1
-    rename(tree, "region 1")
-    seen.settle()
-    assert "another name" in seen.errors.pop()
-    assert rows(tree)[1][0] == session.region_names[1]
-    rename(tree, "arm")
-    seen.settle()
-    assert "Brush: paint arm." in seen.editor.status
-    seen.click(seen.panel.controls["regions.split"])
-    assert [name for name, *_ in rows(tree)] == ["region 1", "arm", "arm 2"]
-    seen.click_row(tree, 2, held=Qt.ControlModifier)
-    seen.click(seen.panel.controls["regions.merge"])
-    assert "Merged arm and arm 2" in seen.panel.status.words.text()
-    box = tree.visualItemRect(tree.topLevelItem(0))
-    QtTest.QTest.mouseDClick(tree.viewport(), Qt.LeftButton, Qt.NoModifier, box.center())
-    QtTest.QTest.keyClick(tree.viewport().findChild(QtWidgets.QLineEdit), Qt.Key_Escape)
-    seen.settle()
-    assert session.region_names == ("region 1", "arm")
-    assert seen.errors == []
-
-
-def test_a_tick_shows_one_cage_and_hides_it(seen):
-    seen.mode(Mode.CAGES)
-    cages = seen.editor.widgets.cages
-    assert cages.is_shown
-    seen.click_row(seen.panel.controls["regions.list"], 1, column=1)
-    assert [cages.is_visible(region) for region in (0, 1)] == [True, False]
-    seen.click_row(seen.panel.controls["regions.list"], 1, column=1)
-    assert cages.is_visible(1)
-
-
-def test_a_pin_is_made_a_handle_in_the_list_of_mode_pull(seen):
-    panel, session = seen.panel, seen.session
-    session.handles.remove(*session.handles)
-    seen.mode(Mode.PULL)
-    assert not panel.boxes["handles"].isVisible()
-    session.handles.pin(int(np.setdiff1d(np.arange(session.mesh.n_vertices), session.fixed)[0]))
-    seen.settle()
-    seen.click_row(panel.controls["handles.list"], 0)
-    assert panel.controls["handles.convert"].text() == "Make handle"
-    seen.click(panel.controls["handles.convert"])
-    assert rows(panel.controls["handles.list"])[0][0] == "handle 1"
-    seen.mode(Mode.DEFORM)
-    seen.click(panel.controls["handles.local_axes"])
-    assert seen.editor.widgets.dragger.local
-    assert not panel.controls["handles.pivot"].isEnabled()
-    session.handles.set_pivot("handle 1", session.mesh.vertices[0])
-    seen.settle()
-    seen.click(panel.controls["handles.pivot"])
-    assert session.history.undo_label == "reset the pivot of handle 1"
-    assert panel.controls["handles.convert"].text() == "Make pin"
-    seen.click(panel.controls["handles.convert"])
-    assert list(session.handles) == ["pin 1"]
-
-
-@pytest.mark.campaign
-def test_handles_are_renamed_selected_and_removed_in_the_list(seen):
-    seen.mode(Mode.HANDLES)
-    tree = seen.panel.controls["handles.list"]
-    seen.click_row(tree, 1)
-    rename(tree, "tail")
-    seen.settle()
-    assert list(seen.session.handles) == ["tail"]
-    assert rows(tree)[1][0] == "tail"
-    assert seen.editor.widgets.selector.handle == "tail"
-    seen.click_row(tree, 0)
-    assert seen.editor.widgets.selector.paints is Paint.FIXED
-    seen.click_row(tree, 1)
-    assert seen.editor.widgets.selector.paints is Paint.HANDLE
-    seen.click(seen.panel.controls["handles.remove"])
-    assert not seen.session.handles
-    assert [name for name, *_ in rows(tree)] == ["Fixed", "New handle (not painted yet)"]
-
-
 def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     seen.session.handles.rename(next(iter(seen.session.handles)), "Fixed")
     seen.mode(Mode.HANDLES)
@@ -422,60 +328,17 @@ def test_a_handle_called_fixed_is_not_mistaken_for_the_fixed_vertices(seen):
     assert not seen.session.handles
 
 
-@pytest.mark.parametrize("name", ["pull.preserve", "deform.preserve"])
-def test_turning_volume_preservation_off_and_on_is_told(make, name):
-    seen = make(models.sphere(300))
-    seen.mode(Mode.PULL if name == "pull.preserve" else Mode.DEFORM)
-    seen.click(seen.panel.controls[name])
-    assert not seen.session.options.preserve_volume
-    seen.click(seen.panel.controls[name])
-    assert seen.session.options.preserve_volume
-    assert "Volume preservation on from the next move" in seen.editor.status
-
-
-@pytest.mark.campaign
-def test_options_are_steps_and_are_shown_when_they_are_undone(make):
-    seen = make(models.sphere(300))
-    seen.mode(Mode.CAGES)
-    seen.type_number(seen.panel.controls["cages.total"], 90)
-    seen.type_number(seen.panel.controls["cages.offset"], 0.5)
-    seen.mode(Mode.DEFORM)
-    part, options = seen.panel.controls, lambda: seen.session.options
-    seen.type_number(part["deform.stretch"], 3.0)
-    seen.type_number(part["deform.clusters"], 250)
-    seen.click(part["deform.preserve"])
-    seen.click(part["deform.per_region"])
-    assert (options().n_cage_vertices, options().offset) == (90, 0.5)
-    assert (options().stretch, options().rotation_groups) == (3.0, 250)
-    assert (options().preserve_volume, options().preserve_region_volumes) == (False, True)
-    for _ in range(6):
-        seen.click(seen.panel.toolbar.buttons["undo"])
-    assert seen.panel.controls["deform.stretch"].value() == 1.0
-    assert seen.panel.controls["deform.clusters"].value() == 300
-    assert seen.panel.controls["deform.preserve"].isChecked()
-    assert not seen.panel.controls["deform.per_region"].isChecked()
-    seen.mode(Mode.CAGES)
-    assert seen.panel.controls["cages.total"].value() == 155
-    assert seen.panel.controls["cages.offset"].text() == "Auto"
-    assert seen.panel.toolbar.buttons["undo"].toolTip() == "Nothing to undo"
-
-
-def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen):
-    session, before = seen.session, seen.session.cages
+def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_when_released(seen):
+    session, before, part = seen.session, seen.session.cages, seen.panel.controls
     seen.mode(Mode.REGIONS)
-    up = np.eye(4)
-    up[2, 3] = 0.1
-    session.move_handle(next(iter(session.handles)), up)
-    session.commit()
-    seen.panel.controls["regions.count"].setValue(3)
+    bend(seen, 0.1)
+    part["regions.count"].setValue(3)
     seen.settle()
     assert "3 regions found. The pose was reset; Z brings it back" in seen.editor.status
-    seen.panel.controls["regions.count"].valueChanged.emit(3)
-    seen.settle()
-    assert "The pose was reset" not in seen.editor.status
-    assert session.regions.n_regions == seen.panel.controls["regions.count"].value() == 3
+    assert session.regions.n_regions == part["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
-    slider = seen.panel.controls["cages.detail"]
+    slider = part["cages.detail"]
+    assert slider.minimum() == 3 * 12  # for each region
     slider.setSliderDown(True)
     slider.setSliderPosition(40)
     seen.panel.refresh()
@@ -484,31 +347,18 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_at_once(seen)
     assert session.cages == ()
     slider.setSliderDown(False)
     seen.settle()
-    assert sum(cage.n_vertices for cage in session.cages) == 40
-    assert (
-        seen.panel.controls["cages.detail"].value()
-        == seen.panel.controls["cages.total"].value()
-        == 40
-    )
-    assert seen.panel.controls["cages.total"].text() == "40"
-    assert seen.panel.controls["cages.detail"].minimum() == 3 * 12  # for each region
+    assert sum(cage.n_vertices for cage in session.cages) == slider.value() == 40
+    assert part["cages.total"].text() == "40"
     assert "40 vertices in total" in seen.editor.status
-    assert "The pose was reset" not in seen.editor.status  # there was none
     for _ in range(2):  # the cages with their number, the regions
         seen.click(seen.panel.toolbar.buttons["undo"])
+    count = sum(cage.n_vertices for cage in before)
     assert session.cages == before
     assert session.state.pose is not None
-    assert seen.panel.controls["regions.count"].value() == session.regions.n_regions == 2
-    count = sum(cage.n_vertices for cage in before)
-    assert seen.panel.controls["cages.detail"].value() == count
-    assert slider.figure.text() == str(count)
-    assert slider.figure.isVisible()
-    assert seen.panel.controls["cages.total"].text() == str(count)  # that of the default
+    assert slider.figure.text() == part["cages.total"].text() == str(count)
     session.change_options(n_cage_vertices=90)
     seen.settle()
-    assert seen.panel.controls["cages.total"].text() == f"90 ({count} fitted)"
-    assert not seen.panel.controls["regions.count"].figure.isVisible()
-    assert seen.panel.controls["pull.local"].figure.text().endswith(" %")
+    assert part["cages.total"].text() == f"90 ({count} fitted)"
 
 
 def test_the_panel_follows_keys_and_the_wheel(seen):
@@ -651,20 +501,16 @@ def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, sta
     assert not cards.isVisible()
 
     def press() -> None:
-        camera, corner = seen.editor.view.camera, QtCore.QPoint(9, 9)
-        place, start = camera.GetPosition(), cards.mapTo(plotter, corner)
-        QtTest.QTest.mousePress(cards, Qt.LeftButton, Qt.NoModifier, corner)
+        camera, start = seen.editor.view.camera, cards.geometry().topLeft() + QtCore.QPoint(9, 9)
+        place = camera.GetPosition()
+        QtTest.QTest.mousePress(plotter, Qt.LeftButton, Qt.NoModifier, start)
         QtTest.QTest.mouseMove(plotter, start + QtCore.QPoint(60, 90))
         until(lambda: camera.GetPosition() != place, "the view to be pressed")
         QtTest.QTest.mouseRelease(plotter, Qt.LeftButton, Qt.NoModifier, start)
 
-    around = [(1400, 500), (500, 700)]  # the cards are side by side, and below each other
-    for dismiss, sizes in ((press, around), (lambda: bend(seen), [])):
+    for dismiss in (press, lambda: bend(seen)):
         cards.show()
-        for size in sizes:
-            seen.widget.resize(*size)
-            until(lambda size=size: seen.widget.width() == size[0], "the size")
-            assert plotter.rect().contains(cards.geometry())
+        assert plotter.rect().contains(cards.geometry())
         assert seen.session.state is before
         dismiss()
         assert not cards.isVisible()
@@ -725,27 +571,6 @@ def test_the_dialog_with_the_keys_resets_them_to_a_preset_and_can_be_cancelled(s
     assert dialog.keys.changes == keys_of("Blender").changes
     dialog.reject()
     assert editor.keys.changes == {}
-
-
-@pytest.mark.campaign
-def test_the_colour_range_is_typed_and_kept_for_the_next_session(seen, tmp_path):
-    seen.mode(Mode.DEFORM)
-    part, overlay = seen.panel.controls, lambda: seen.editor.widgets.overlay
-    assert not part["deform.range"].isEnabled()
-    seen.click(part["deform.overlay"])
-    bend(seen)
-    assert overlay().half_range == 0.5
-    seen.type_number(part["deform.range"], 37.5)
-    assert overlay().half_range == 0.375
-    assert seen.session.history.undo_label == "drag handle 1"  # the range is not an undo step
-    seen.editor.save(tmp_path / "a.segdeform")
-    seen.editor.load(tmp_path / "a.segdeform")
-    seen.settle()
-    assert overlay().half_range == 0.375
-    assert part["deform.range"].value() == 37.5
-    seen.type_number(part["deform.range"], 0)
-    assert part["deform.range"].text() == "Auto"
-    assert overlay().half_range == 0.05  # automatic
 
 
 def test_an_error_is_shown_emitted_and_then_cleared(seen):
@@ -813,86 +638,6 @@ def test_the_deformed_mesh_is_written(seen, tmp_path, monkeypatch):
     answer(monkeypatch, tmp_path / "nowhere" / "bent.ply")
     seen.panel.toolbar.ask_and_export()
     assert len(seen.errors) == 1
-
-
-def with_arrays():
-    """Return an ellipsoid with every kind of data that a surface can have."""
-    mesh, _ = small()
-    surface = to_polydata(mesh)
-    rng = np.random.default_rng(1)
-    surface.point_data["heat"] = rng.random(surface.n_points)
-    surface.point_data["RGB"] = rng.integers(0, 255, (surface.n_points, 3), dtype=np.uint8)
-    surface.point_data["flow"] = rng.random((surface.n_points, 3))
-    surface.point_data["uv"] = rng.random((surface.n_points, 2))
-    surface.point_data.active_texture_coordinates_name = "uv"
-    surface.cell_data["part"] = np.arange(surface.n_cells)
-    surface.field_data["unit"] = ["mm"]
-    return surface
-
-
-@pytest.mark.campaign
-def test_a_surface_is_written_back_with_all_its_arrays(make, tmp_path, monkeypatch):
-    surface, (mesh, state) = with_arrays(), small()
-    seen = make(surface)
-    seen.session.set_regions(state.regions)
-    seen.session.set_cages(state.cages)
-    seen.session.handles.add(state.handle)
-    bend(seen)
-    now = seen.widget.deformed_polydata()
-    assert_array_equal(now.points, seen.session.vertices)
-    assert_array_equal(surface.points, mesh.vertices)
-    surface.point_data.clear()  # the widget has its own copy
-    everything = {"heat", "RGB", "flow", "uv"}
-    for name, holds in {
-        "a.vtp": everything, "a.vtk": everything, "a.vtkhdf": everything, "a.ply": {"heat", "RGB"},
-    }.items():  # fmt: skip
-        answer(monkeypatch, tmp_path / name)
-        seen.panel.toolbar.ask_and_export()
-        read = read_polydata(tmp_path / name)
-        assert_array_equal(read.points, seen.session.vertices)
-        assert holds <= set(read.point_data.keys())
-        for each in holds:
-            assert_array_equal(read.point_data[each], now.point_data[each])
-        assert_array_equal(read.cell_data["part"], np.arange(mesh.n_faces))
-        assert_array_equal(read.active_texture_coordinates, now.point_data["uv"])
-    assert seen.errors == []
-
-    # The same from a file, and from a session file.
-    answer(monkeypatch, tmp_path / "a.vtp")
-    seen.editor.save(tmp_path / "a.segdeform")
-    seen.click(seen.panel.toolbar.buttons["open"])
-    assert_array_equal(seen.session.mesh.vertices, now.points)
-    again = seen.widget.deformed_polydata()
-    assert set(again.point_data.keys()) == everything
-    seen.editor.save(tmp_path / "b.segdeform")
-    seen.editor.load(tmp_path / "b.segdeform")
-    assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
-    seen.editor.load(tmp_path / "a.segdeform")  # with another mesh
-    assert set(seen.widget.deformed_polydata().point_data.keys()) == everything
-    assert_array_equal(seen.widget.deformed_polydata().points, seen.session.vertices)
-
-
-@pytest.mark.parametrize("name", every(2, ["soup", "holed"]))
-def test_any_surface_is_edited_and_given_back_only_moved(make, name, tmp_path, monkeypatch):
-    given = GIVEN[name]()
-    seen = make(given)
-    session = seen.session
-    session.change_options(n_cage_vertices=40)
-    session.set_regions(Regions.single(session.mesh))
-    session.fit_cages()
-    session.set_fixed(session.mesh.vertices[:, 2] < 0.3)
-    session.handles.add(session.mesh.vertices[:, 2] > 2.7)
-    up = np.eye(4)
-    up[0, 3] = 0.2
-    session.move_handle("handle 1", up)
-    session.commit()
-    now = seen.widget.deformed_polydata()
-    require_only_moved(given, now)
-    assert np.abs(now.points - given.points).max() > 0.15
-    answer(monkeypatch, tmp_path / "a.vtp")
-    seen.panel.toolbar.ask_and_export()
-    require_only_moved(now, read_polydata(tmp_path / "a.vtp"))
-    assert seen.errors == []
 
 
 # Hosts.
@@ -1036,22 +781,6 @@ def test_enter_presses_the_focused_button_and_words_of_the_hint_run_keys(seen):
     assert not seen.editor.controller.shows_rest
 
 
-def test_handles_are_hidden_and_locked_in_the_list_which_has_their_colours(seen):
-    seen.mode(Mode.DEFORM)
-    tree, dragger = seen.panel.controls["handles.list"], seen.editor.widgets.dragger
-    (name,) = seen.session.handles
-    row = [cells[0] for cells in rows(tree)].index(name)
-    image = tree.topLevelItem(row).icon(0).pixmap(16, 16).toImage()
-    middle = image.pixelColor(image.width() // 2, image.height() // 2)
-    assert middle.name().upper() == HANDLE
-    seen.click_row(tree, row, 2)
-    seen.click_row(tree, row, 3)
-    assert (dragger.hidden, dragger.locked) == ({name}, {name})
-    seen.click_row(tree, row, 2)
-    seen.click_row(tree, row, 3)
-    assert (dragger.hidden, dragger.locked) == (set(), set())
-
-
 def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_path):
     before = application().palette()
     application().setPalette(QtGui.QPalette(QtGui.QColor("#3a3a3a"), QtGui.QColor("#2b2b2b")))
@@ -1076,14 +805,13 @@ def test_in_a_dark_palette_the_panel_is_dark_and_its_text_is_light(seen, tmp_pat
         application().setPalette(before)
 
 
-@pytest.mark.campaign
-def test_it_works_where_pixels_are_smaller_than_points():
-    application()  # or skip
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", __file__, "-k", "a_tick"],
-        env={**os.environ, "QT_SCALE_FACTOR": "1.5"}, capture_output=True, text=True,
-    )  # fmt: skip
-    assert "1 passed" in done.stdout, done.stdout + done.stderr
+def test_a_dock_is_made_for_a_view_of_plain_vtk():
+    view = plain_view((200, 150))
+    dock = deform_dock((view.renderer, view.interactor), MESH)
+    assert dock.editor.GetEnabled()
+    assert dock.panel.isEnabled()
+    dock.editor.remove()
+    dock.deleteLater()
 
 
 def test_a_bad_argument_is_one_of_our_errors_before_anything_is_created():

@@ -136,7 +136,7 @@ def test_killed_in_a_drag_it_offers_the_last_saved_pose_or_a_later_one(programs,
     if rests:
         time.sleep(random.Random(seed).uniform(0.0, 0.4))
         program.kill()
-        assert recovered(folder) == finished == program.poses[-1]
+        assert recovered(folder) in later(program.poses, finished)  # which may be finished
         return
     program.wait_for("kept", times=2 + seed % 3)
     time.sleep(random.Random(seed).uniform(0.0, 0.4))

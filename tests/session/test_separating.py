@@ -1,0 +1,120 @@
+"""Followers in a session: they are dragged along until they have handles of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from bodies import Scene, bent, off_carrier, rod, tube
+from numpy.testing import assert_allclose, assert_array_equal
+
+from vtk_segdeform.errors import SessionError
+from vtk_segdeform.session import Session, load_session, save_session
+
+
+@pytest.fixture
+def scene() -> Scene:
+    return bent(rod(0.5, 0.0, 4.0, n=20, step=0.16), tube(0.55, 0.62, 1.0, 3.0, n=24, step=0.16))
+
+
+@pytest.fixture
+def session(scene: Scene) -> Session:
+    """Return a session of an arm in a sleeve with a handle on the arm, segmented before that."""
+    made = Session(scene.mesh)
+    made.segment()
+    made.fit_cages()
+    made.set_fixed(scene.fixed)
+    made.handles.add(scene.handle, "hand")
+    return made
+
+
+def ends_of_sleeve(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    z, own = scene.mesh.vertices[:, 2], scene.mesh.components == 1
+    return np.flatnonzero(own & (z < 1.2)), np.flatnonzero(own & (z > 2.8))
+
+
+def test_the_sleeve_is_dragged_along_with_the_arm(scene, session):
+    for angle in range(6, 61, 6):
+        session.drag({"hand": scene.targets(angle)}, max_steps=8)
+    session.commit()
+    for _ in ("as dragged", "finished"):
+        off, gap = off_carrier(scene, session.vertices, 1, 0)
+        assert (off < 2.0 * gap + 0.05 * scene.mesh.diagonal).all()
+        assert len(session.solution.crossings()) == 0
+        session.finish()
+    assert session.regions.n_regions == 1
+
+
+def test_a_sleeve_with_handles_of_its_own_is_separated_in_the_same_step(scene, session):
+    low, high = ends_of_sleeve(scene)
+    session.set_fixed(np.append(scene.fixed, low))
+    assert session.regions.n_regions == len(session.cages) == 2
+    assert_array_equal(session.regions.components, np.eye(2, dtype=bool))
+    session.handles.add(high, "cuff")
+    session.drag({"cuff": scene.mesh.vertices[high] + [0.2, 0.0, 0.0]})
+    session.commit()
+    moved = np.linalg.norm(session.vertices - scene.mesh.vertices, axis=1)
+    assert moved[scene.mesh.components == 0].max() < 1e-4 * scene.mesh.diagonal
+    assert moved[high].min() > 0.19
+    for _ in range(3):
+        session.undo()
+    assert session.regions.n_regions == len(session.cages) == 1
+
+
+def test_a_pose_remains_when_a_sleeve_is_separated(scene, session):
+    session.drag({"hand": scene.targets(40.0)})
+    session.commit()
+    before, (_, high) = session.vertices, ends_of_sleeve(scene)
+    session.handles.add(high, "cuff")
+    assert session.regions.n_regions == 2
+    away = np.linalg.norm(session.vertices - before, axis=1)
+    assert away.max() < 0.03 * scene.mesh.diagonal
+    assert_allclose(session.targets["hand"], scene.targets(40.0))
+    session.undo()
+    assert_array_equal(session.vertices, before)
+
+
+def test_pins_and_pulls_separate_nothing(scene, session):
+    _, high = ends_of_sleeve(scene)
+    session.handles.pin(int(high[0]))
+    session.pull(int(high[-1]), scene.mesh.vertices[high[-1]] + [0.1, 0.0, 0.0])
+    session.commit()
+    assert session.regions.n_regions == 1
+
+
+def test_the_body_inside_follows_if_only_the_sleeve_is_held(scene):
+    session, (low, high) = Session(scene.mesh), ends_of_sleeve(scene)
+    session.segment()
+    session.fit_cages()
+    session.set_fixed(low)
+    session.handles.add(high, "cuff")
+    assert session.regions.n_regions == 1
+    session.drag({"cuff": scene._replace(handle=high).targets(30.0)})
+    session.commit()
+    session.finish()
+    assert len(session.solution.crossings()) == 0
+    assert np.linalg.norm(session.vertices - scene.mesh.vertices, axis=1)[scene.handle].min() > 0.3
+
+
+def test_attachments_are_an_option_that_is_undone_and_kept_in_files(scene, session, tmp_path):
+    session.change_options(attach={1: "free"})
+    assert session.history.labels[-1] == "change attached components"
+    session.segment()
+    assert session.regions.n_regions == 2
+    session.fit_cages()
+    save_session(tmp_path / "free.segdeform", session)
+    loaded = load_session(tmp_path / "free.segdeform")
+    assert loaded.options == session.options
+    assert loaded.options.attach == ((1, "free"),)
+    for _ in range(3):
+        session.undo()
+    assert session.options.attach == ()
+    save_session(tmp_path / "follows.segdeform", session)
+    loaded = load_session(tmp_path / "follows.segdeform")
+    assert_array_equal(loaded.regions.carrier, [0, 0])
+    assert_array_equal(loaded.regions.weights, session.regions.weights)
+
+
+@pytest.mark.parametrize("attach", [{1: "loose"}, {1: 1}, {-1: 0}, 7, [[1, 2, 3]]])
+def test_attachments_of_a_session_are_checked(session, attach):
+    with pytest.raises(SessionError, match="attach must map"):
+        session.change_options(attach=attach)

@@ -1,0 +1,148 @@
+"""Slides: vertices that move along a plane, a line or their own surface at rest, but not off it.
+
+The base of a print stays on its plate while the statue is pulled; a bearing stays on its axis.  The
+cages keep them there by a term of the objective (`solver.sliding`), to about 1e-4 of the diagonal;
+a finish places them on it exactly, where they are nearest to the pose of the cages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
+
+from ..arrays import FloatArray, IntArray, as_ids
+from ..checks import require, shown
+from ..errors import ConstraintError
+from ..mesh import Mesh, nearest_on_triangles, ragged_arange
+from ..solver import Track
+
+_MOST_POINTS = (
+    500  # vertices of one slide in the objective: they depend on a few dozen cage vertices
+)
+_NEIGHBOURS = 3  # vertices whose triangles are searched for the nearest point of a surface
+_KINDS = "plane", "line", "surface"
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """Vertices that slide.
+
+    Parameters
+    ----------
+    vertices : (k,) int or (n,) bool
+        Of the mesh.
+    along : str
+        "plane" or "line": each vertex in a plane, or along a line, through where it is at rest, all
+        parallel; "surface": along the surface at rest.
+    direction : (3,) float, optional
+        The normal of the planes, or the direction of the lines; by default those of the plane, or
+        the line, that is nearest to the vertices.
+    """
+
+    vertices: ArrayLike
+    along: str = "plane"
+    direction: ArrayLike | None = None
+
+
+class Guide(NamedTuple):
+    """A checked slide, or some of its vertices."""
+
+    vertices: IntArray
+    """(k,)."""
+    track: Track
+    """Of these, in their order."""
+
+
+def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
+    """Return *slides* with their vertices as numbers; ConstraintError if they are none."""
+    if slides is None:
+        return ()
+    if not isinstance(slides, Iterable):
+        raise ConstraintError(f"slides must be a sequence of Slide; got {shown(slides)}")
+    found = []
+    for each in slides:
+        slide = require(each, Slide, "slides")
+        if slide.along not in _KINDS:
+            raise ConstraintError(
+                f"a slide must be along a plane, line or surface; got {shown(slide.along)}"
+            )
+        try:
+            ids = as_ids(slide.vertices, mesh.n_vertices, "vertices of a slide")
+        except ValueError as fault:
+            raise ConstraintError(str(fault)) from None
+        direction = None
+        if slide.direction is not None:
+            direction = np.array(slide.direction, dtype=np.float64)
+            length = np.linalg.norm(direction)
+            if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
+                raise ConstraintError(
+                    f"the direction of a slide must be a vector (3,), not zero; "
+                    f"got {shown(slide.direction)}"
+                )
+        if len(ids):
+            found.append(Slide(ids, slide.along, None if direction is None else direction.tolist()))
+    return tuple(found)
+
+
+def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[Guide, ...]:
+    """Return checked *slides* along tracks of *mesh* at rest; of some hundred vertices if *few*."""
+    found = []
+    for each in slides:
+        ids = np.asarray(each.vertices)
+        some = ids[:: 1 + len(ids) // _MOST_POINTS] if few else ids
+        found.append(Guide(some, _track(each, mesh, some)))
+    return tuple(found)
+
+
+def _track(slide: Slide, mesh: Mesh, some: IntArray) -> Track:
+    if slide.along == "surface":
+        return _Surface(mesh)
+    points = mesh.vertices[np.asarray(slide.vertices)]
+    axes = np.linalg.svd(points - points.mean(axis=0))[2]
+    nearest = axes[2] if slide.along == "plane" else axes[0]
+    direction = nearest if slide.direction is None else np.asarray(slide.direction)
+    direction = direction / np.linalg.norm(direction)
+    along = np.outer(direction, direction)
+    return _Flat(mesh.vertices[some], along if slide.along == "plane" else np.eye(3) - along)
+
+
+@dataclass(frozen=True, eq=False)
+class _Flat:
+    """Parallel planes or lines through points: their normals are the same everywhere."""
+
+    points: FloatArray  # (k, 3)
+    normal: FloatArray  # N, (3, 3)
+
+    def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return x - (x - self.points) @ self.normal, np.broadcast_to(self.normal, (len(x), 3, 3))
+
+
+class _Surface:
+    """A triangle mesh."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self._corners = mesh.vertices[mesh.faces]
+        self._tree = cKDTree(mesh.vertices)
+        order = np.argsort(mesh.faces.ravel(), kind="stable")
+        self._faces_at = order // 3
+        self._counts = np.bincount(mesh.faces.ravel(), minlength=mesh.n_vertices)
+        self._starts = np.cumsum(self._counts) - self._counts
+
+    def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        near = self._tree.query(x, k=_NEIGHBOURS)[1].ravel()  # a mesh has three vertices at least
+        each, k = ragged_arange(self._counts[near])
+        faces, point = self._faces_at[self._starts[near][each] + k], each // _NEIGHBOURS
+        corners = self._corners[faces]
+        shares, away = nearest_on_triangles(corners, x[point])
+        order = np.lexsort((away, point))
+        best = order[np.diff(point[order], prepend=-1) != 0]
+        nearest = np.einsum("kc,kcj->kj", shares[best], corners[best])
+        a, b, c = np.swapaxes(corners[best], 0, 1)
+        normals = np.cross(b - a, c - a)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+        return nearest, normals[:, :, None] * normals[:, None]
