@@ -186,6 +186,17 @@ def pipeline() -> None:
     write("pipeline", [body(parts["mesh"], pose) for pose in poses], np.concatenate(poses))
 
 
+def followers() -> None:
+    """Draw a sleeve and a bead that follow an arm, at rest, bent, and free."""
+    sys.argv[1:] = []  # or the example would write its own pictures
+    names = runpy.run_path(str(EXAMPLES / "an_arm_in_a_sleeve.py"))
+    mesh, bent = names["mesh"], [each.vertices for each in names["solutions"].values()]
+    owner = mesh.components[mesh.faces[:, 0]]
+    colours = np.array([rgb("#f0d9b5"), rgb("#3d6b8f"), rgb("#d55e00")])[owner]
+    poses = [mesh.vertices, *bent]
+    write("followers", [body(mesh, x, colours) for x in poses], np.concatenate(poses))
+
+
 def ventricle() -> None:
     """Draw the ventricle of the example at rest and contracted, cut open."""
     sys.argv[1:] = []  # an example writes its pictures to the folder that is named there
@@ -215,17 +226,6 @@ def organs() -> None:
     write("organs", [cut(x), cut(bent)], np.concatenate([x, bent]))
 
 
-def followers() -> None:
-    """Draw a sleeve and a bead that follow an arm, at rest, bent, and free."""
-    sys.argv[1:] = []  # or the example would write its own pictures
-    names = runpy.run_path(str(EXAMPLES / "an_arm_in_a_sleeve.py"))
-    mesh, bent = names["mesh"], [each.vertices for each in names["solutions"].values()]
-    owner = mesh.components[mesh.faces[:, 0]]
-    colours = np.array([rgb("#f0d9b5"), rgb("#3d6b8f"), rgb("#d55e00")])[owner]
-    poses = [mesh.vertices, *bent]
-    write("followers", [body(mesh, x, colours) for x in poses], np.concatenate(poses))
-
-
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -236,9 +236,9 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "several": (several, 3),
     "local_volume": (local_volume, 0),
     "pipeline": (pipeline, 3),
+    "followers": (followers, 3),
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
-    "followers": (followers, 3),
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }

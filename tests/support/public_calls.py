@@ -327,12 +327,12 @@ def _plotter() -> pv.Plotter:
 
 # Classes that callers construct; others are only returned.
 MADE_BY_HAND = {
-    sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options,
+    sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
 }  # fmt: skip
 EXTRA = {
     "Session.change_options": (
         "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-        "rotation_groups", "lids",
+        "rotation_groups", "lids", "volumes", "symmetry",
     ),
 }  # fmt: skip
 
@@ -351,14 +351,19 @@ def _file(name: str) -> Path:
 
 
 ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "along": lambda: "plane",
     "arrays": lambda: (),
+    "attach": dict,
     "avoid_contact": lambda: True,
     "blend": lambda: regions().weights,
     "cage_faces": lambda: cages()[0].faces,
     "cage_vertices": lambda: [cage.vertices for cage in cages()],
     "cages": cages,
+    "carrier": lambda: None,
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
+    "direction": lambda: (0.0, 0.0, 1.0),
+    "displacement": lambda: "moved",
     "divisions": lambda: (2, 2, 4),
     "event": lambda: "ModifiedEvent",
     "events": lambda: 1000,
@@ -370,9 +375,12 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "folder": Path,
     "fps": lambda: 20.0,
     "frames": lambda: [None],
+    "goal": lambda: "keep",
     "handle": _right,
+    "held": _left,
     "history": lambda: 5,
     "interactor": lambda: view().interactor,
+    "join": lambda: False,
     "keys": lambda: "",
     "label": lambda: "a step",
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
@@ -397,6 +405,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "offset": lambda: 0.2,
     "options": sd.Options,
     "overlap": lambda: 1,
+    "parts": lambda: {"end": _right()},
     "path": lambda: Path("written.segdeform"),
     "point": lambda: np.array([0.1, 0.2, 0.3]),
     "pins": lambda: [0],
@@ -423,14 +432,20 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "seed": lambda: 3,
     "session": session,
     "size": lambda: (0.2, 0.2, 1.0),
+    "slides": lambda: [sd.Slide(_left())],
     "smoothness": lambda: 1.0,
     "spread": lambda: 0.3,
     "state": lambda: _worked_on().state,
+    "stiffness": lambda: np.linspace(1.0, 3.0, mesh().n_vertices),
     "stretch": lambda: 10.0,
     "subtract": lambda: False,
     "surface": surface,
+    "symmetry": lambda: None,
     "targets": _targets,
     "through": lambda: [_targets()],
+    "turn": lambda: (),
+    "push": lambda: (),
+    "volumes": lambda: {"whole": "keep"},
     "to": lambda: mesh().vertices[100] + [0.0, 0.0, 0.1],
     "tolerance": lambda: 1e-6,
     "vertex": lambda: 100,
@@ -473,6 +488,11 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
 
 SPECIAL: dict[str, Callable[[], Any]] = {
     "Cage.faces": lambda: cages()[0].faces,
+    "Deformer.volume.name": lambda: "whole",
+    "Session.volume.name": lambda: "whole",
+    "Session.set_volume.name": lambda: "whole",
+    "Session.forget_volume.name": lambda: "whole",
+    "Slide.vertices": _left,
     "Cage.vertices": lambda: cages()[0].vertices,
     "CageDisplay.opacity.value": lambda: 0.5,
     "DeformEditor.keys.value": lambda: "Blender",

@@ -96,7 +96,7 @@ class Solution(Described):
     unfinished: FloatArray | None = None
     """(n, 3) float: the mesh before it was finished by `Deformer.finish`, if it was."""
     held_volumes: Callable[[FloatArray], HeldVolumes] = field(
-        default=lambda _: HeldVolumes(), repr=False
+        default_factory=lambda: lambda _: HeldVolumes(), repr=False
     )
     """Computes `volumes`, `volume_changes` and `volume_error`."""
     unmoved: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))

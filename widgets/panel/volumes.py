@@ -15,7 +15,7 @@ _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
 _LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
 _DEFAULT, _KEEP, _FREE, _SET = "default", "keep", "free", "set"
 _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set", _SET))
-_SYMMETRY = (("None", ""), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
+_SYMMETRY = (("None", "none"), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
 _chosen: WeakKeyDictionary[Controller, str] = WeakKeyDictionary()
 
 
@@ -38,9 +38,9 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "choice",
                 "Volume of",
                 "A volume of the mesh: of the whole, a body, a cavity, a wall or a region",
-                value=name,
+                value=name or "-",
                 enabled=len(names) > 1,
-                choices=tuple((_label(session, each), each) for each in names) or (("-", ""),),
+                choices=tuple((_label(session, each), each) for each in names) or (("-", "-"),),
                 act=_choosing,
             ),
             Field(
@@ -78,9 +78,9 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "choice",
                 "Symmetry",
                 "Mirrors motions on the other side of the plane with this normal",
-                value=session.options.symmetry or "",
+                value=session.options.symmetry or "none",
                 choices=_SYMMETRY,
-                act=lambda axis: option("symmetry")(axis or None),
+                act=lambda axis: option("symmetry")(None if axis == "none" else axis),
             ),
         ),
     )
