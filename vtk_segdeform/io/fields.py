@@ -11,7 +11,7 @@ xx, yy, zz, xy, yz, xz, as in VTK.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ _UNIQUE = [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]
 
 
 def follow(
-    moved: pv.PolyData, rest: pv.PolyData, *, turn: Iterable[str] = (), push: Iterable[str] = ()
+    moved: pv.PolyData, rest: pv.PolyData, *, turn: Sequence[str] = (), push: Sequence[str] = ()
 ) -> None:
     """Let the arrays *turn* and *push* of *moved* follow its deformation from *rest*.
 

@@ -10,7 +10,7 @@ some.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -193,8 +193,8 @@ class Surface(Described):
         self,
         vertices: ArrayLike,
         *,
-        turn: Iterable[str] = (),
-        push: Iterable[str] = (),
+        turn: Sequence[str] = (),
+        push: Sequence[str] = (),
         displacement: str | None = None,
     ) -> pv.PolyData:
         """Return what was given for the mesh at *vertices* (n, 3): coordinates and normals differ.
