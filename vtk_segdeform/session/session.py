@@ -37,7 +37,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, is_whole, plain
 from ..cages import Cage
-from ..checks import Described, as_text, require, require_sequence, shown
+from ..checks import Described, as_flag, as_text, require, require_sequence, shown
 from ..deformer import (
     Deformer,
     Slide,
@@ -459,6 +459,20 @@ class Session(Described):
         """
         owned = owned_slides(self.mesh, slides)
         self.history.step("set slides", replace(self.state, slides=owned))
+
+    def slide_fixed(self, slides: bool) -> None:
+        """Let the fixed vertices slide in the plane nearest to them; or fix those that slide."""
+        if as_flag(slides, "slides"):
+            own = [Slide(self.fixed)] if len(self.fixed) else []
+            fixed: ArrayLike = ()
+        else:
+            own, ids = [], [np.asarray(each.vertices) for each in self.state.slides]
+            fixed = np.setdiff1d(np.concatenate([self.fixed, *ids]), self.state.handle)
+        label = "let fixed vertices slide" if slides else "fix sliding vertices"
+        after = replace(self.state, slides=owned_slides(self.mesh, own))
+        places, _ = checked_constraints(self.mesh, fixed, self.state.handle)
+        after = handles.with_fixed(self.mesh, after, places, self.vertices)
+        self.history.step(label, separated(self.poses, after))
 
     def drag(
         self,

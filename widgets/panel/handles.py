@@ -59,6 +59,16 @@ def handles_section(editor: DeformEditor) -> Section:
                     act=lambda _: _convert,
                 ),
             ),
+            Field(
+                "handles.slide",
+                "toggle",
+                "Fixed part slides in its plane",
+                "Fixed vertices may move along the plane nearest to them, as a base on a plate",
+                value=bool(session.state.slides),
+                enabled=bool(session.state.slides) or len(session.fixed) > 0,
+                visible=mode is not Mode.PULL,
+                act=lambda on: lambda controller: controller.session.slide_fixed(on),
+            ),
             (
                 Field(
                     "handles.local_axes",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from vtk_segdeform.pictures import of_region
 
 from ..editor import Action, Controller, DeformEditor, Mode, actions
@@ -9,6 +11,7 @@ from ..volume_overlay import in_tenths
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
 
 _MOST_REGIONS = 20  # regions of a segmentation
+_STIFFNESS = (("Usual", "1"), ("3 times", "3"), ("10 times", "10"), ("Rigid", "inf"))
 _COLUMNS = (
     Column("cage", "Cage", "Number of cage vertices. Tick: show the cage"),
     Column("volume", "Volume"),
@@ -51,6 +54,16 @@ def regions_section(editor: DeformEditor) -> Section:
                     "cage": lambda key, on: lambda c: c.widgets.cages.set_visible(int(key), on),
                 },
             ),
+            Field(
+                "regions.stiffness",
+                "choice",
+                "Stiffness",
+                "How much stiffer the selected regions are; rigid ones keep their shape",
+                value=_stiffness(editor, existing),
+                enabled=bool(existing),
+                choices=_STIFFNESS,
+                act=lambda times: _stiffening(existing, times),
+            ),
             (
                 key_button(keys, "regions.new", "new_region", "New", visible=painting),
                 Field(
@@ -75,6 +88,33 @@ def regions_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
+
+
+def _stiffness(editor: DeformEditor, chosen: list[int]) -> str:
+    """Return the choice that fits the stiffness of the *chosen* regions best."""
+    stiffness, regions = editor.session.state.stiffness, editor.session.regions
+    if stiffness is None or regions is None or not chosen:
+        return _STIFFNESS[0][1]
+    median = float(np.median(stiffness[np.isin(regions.labels, chosen)]))
+    return min(
+        (times for _, times in _STIFFNESS),
+        key=lambda times: 0.0 if float(times) == median else abs(float(times) - median),
+    )
+
+
+def _stiffening(chosen: list[int], times: str) -> Action:
+    """Return the action that makes the *chosen* regions so many *times* as stiff as others."""
+
+    def stiffen(controller: Controller) -> None:
+        session = controller.session
+        before, regions = session.state.stiffness, session.regions
+        assert regions is not None
+        stiffness = np.ones(session.mesh.n_vertices) if before is None else before.copy()
+        stiffness[np.isin(regions.labels, chosen)] = float(times)
+        session.set_stiffness(None if (stiffness == 1.0).all() else stiffness)
+        controller.say("Stiffness counts from the next move")
+
+    return stiffen
 
 
 def _renaming(key: str, name: str) -> Action:
