@@ -112,9 +112,8 @@ def _control(field: Field, press: Callable[..., object]) -> Any:
         control = check_box(field.label)
         control.clicked.connect(lambda on: press(on))
     elif field.kind == "choice":
-        values = [value for _, value in field.choices]
-        control = choice_box([label for label, _ in field.choices])
-        control.activated.connect(lambda place: press(values[place]))
+        control = choice_box([])
+        control.activated.connect(lambda place: press(control.itemData(place)))
     elif field.kind == "label":
         control = QtWidgets.QLabel()
     else:
@@ -131,6 +130,12 @@ def _set_up(control: Any, field: Field, before: Field | None) -> None:
     """Show all of *field* but its value; it differs from *before*, which is shown."""
     if isinstance(control, QtWidgets.QAbstractButton):
         control.setText(field.label)
+    elif field.kind == "choice" and (before is None or field.choices != before.choices):
+        quiet = QtCore.QSignalBlocker(control)
+        control.clear()
+        for label, value in field.choices:
+            control.addItem(label, value)
+        quiet.unblock()
     elif field.kind in _NUMBERS and (before is None or _frame_of(field) != _frame_of(before)):
         quiet = QtCore.QSignalBlocker(control)
         whole = int if field.kind != "number" else float

@@ -106,6 +106,22 @@ def test_the_visible_controls_are_those_of_the_models_and_say_the_same(widget, m
         assert button.isChecked() is bool(field.kind == "button" and field.value)
 
 
+def test_the_volumes_to_choose_from_follow_the_session(widget):
+    panel, editor = widget.panel, widget.editor
+    editor.mode = Mode.DEFORM
+    for _ in range(2):  # without a bound deformer there are none, then those of its regions
+        settle(widget)
+        fields = [f for each in sections(editor) for f in each.fields if f.name == "volumes.name"]
+        (labels,) = ([label for label, _ in field.choices] for field in fields)
+        box = panel.controls["volumes.name"]
+        assert [box.itemText(k) for k in range(box.count())] == labels
+        assert said(box) == expected(fields[0])
+        editor.session.bind()
+        editor.session.change_options(stretch=2.0)
+        editor.session.bind()
+    assert len(labels) > 1
+
+
 def compare(tree, table: Table):
     """Check that a list shows the rows of *table*."""
     assert tree.topLevelItemCount() == len(table.rows)
@@ -159,6 +175,9 @@ def use(control, field):
         control.click()
     elif isinstance(control, QtWidgets.QAbstractSpinBox):
         control.stepBy(-1 if control.value() == control.maximum() else 1)
+    elif isinstance(control, QtWidgets.QComboBox):
+        is_last = control.currentIndex() == control.count() - 1
+        QtTest.QTest.keyClick(control, Qt.Key_Up if is_last else Qt.Key_Down)
     else:
         key = Qt.Key_Left if control.value() == control.maximum() else Qt.Key_Right
         QtTest.QTest.keyClick(control, key)
