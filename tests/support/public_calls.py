@@ -490,6 +490,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Cage.faces": lambda: cages()[0].faces,
     "Deformer.volume.name": lambda: "whole",
     "Session.volume.name": lambda: "whole",
+    "Session.slide_fixed.slides": lambda: True,
     "Session.set_volume.name": lambda: "whole",
     "Session.forget_volume.name": lambda: "whole",
     "Slide.vertices": _left,

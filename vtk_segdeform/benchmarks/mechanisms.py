@@ -151,7 +151,7 @@ MECHANISMS = (
     ),
     Mechanism(
         "inside of the body", "rotations of points inside are in the energy",
-        "deformer.binding", "_with_interior", lambda _, energy: energy, _SHAPE, binds=True,
+        "deformer.binding", "with_interior", lambda energy, *_: energy, _SHAPE, binds=True,
     ),
     Mechanism(
         "cage stiffness", "the edges of the cages are in the energy",

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import FloatArray, IntArray, plain
 from ..checks import shown
 from ..errors import ConstraintError
 from ..geometry import principal_axes
@@ -67,7 +67,7 @@ class Mirror:
         if isinstance(symmetry, str) and symmetry in _AXES:
             normal = np.eye(3)[_AXES[symmetry]]
             planes = [_settled(mesh, normal, turns=False)]
-        elif symmetry == "auto":
+        elif isinstance(symmetry, str) and symmetry == "auto":
             axes = [*np.eye(3), *principal_axes(mesh.vertices)]
             planes = [_settled(mesh, axis, turns=True) for axis in axes]
         else:
@@ -144,12 +144,11 @@ class Mirror:
 
 def _given(symmetry: object) -> tuple[FloatArray, FloatArray]:
     """Return the point and the normal of a plane that is given as both."""
-    try:
-        point, normal = (np.array(each, dtype=np.float64) for each in symmetry)  # type: ignore[attr-defined]
-        length = float(np.linalg.norm(normal))
-    except (TypeError, ValueError):
-        point, normal, length = np.zeros(0), np.zeros(0), 0.0
-    if point.shape != (3,) or normal.shape != (3,) or not (0.0 < length < np.inf):
+    plane = plain(symmetry, "symmetry")  # type: ignore[arg-type]
+    is_pair = plane.shape == (2, 3) and plane.dtype.kind in "fiu"
+    point, normal = plane * 1.0 if is_pair else np.zeros((2, 3))
+    length = float(np.linalg.norm(normal))
+    if not (np.isfinite(point).all() and 0.0 < length < np.inf):
         raise ConstraintError(
             f"symmetry must be 'x', 'y', 'z', 'auto', or a point and a normal of the plane; "
             f"got {shown(symmetry)}"

@@ -38,8 +38,8 @@ class Chambers(NamedTuple):
     inside: tuple[IntArray, ...]
     """(k, 3) each: the faces around each chamber, turned outward, in the order of first faces."""
     hulls: tuple[IntArray, ...]
-    """(k, 3) each: the faces that the outside touches, turned towards it, one array for each
-    connected part of the surface."""
+    """(k, 3) each: the faces around all chambers of a connected part of the surface together: those
+    that are around one only.  So their volume is the sum of that of the chambers."""
 
 
 NO_CHAMBERS = Chambers((), ())
@@ -78,10 +78,27 @@ def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
     own = np.flatnonzero(crowded[half_edges.shells])
     part = _closed(_apart(around, borders, sides), half_edges, patch)
     every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
-    volumes = [signed_volume(vertices - vertices[each[0, 0]], each) for each in every]
-    inside = [each for each, volume in zip(every, volumes, strict=True) if volume > 0.0]
-    outside = [each for each, volume in zip(every, volumes, strict=True) if volume < 0.0]
-    return Chambers(tuple(inside), tuple(each[:, [0, 2, 1]] for each in outside))
+    inside, shells = [], []
+    for first, each in every:
+        if signed_volume(vertices - vertices[each[0, 0]], each) > 0.0:
+            inside.append(each)
+            shells.append(half_edges.shells[first])
+    together = [
+        np.concatenate([each for each, of in zip(inside, shells, strict=True) if of == shell])
+        for shell in dict.fromkeys(shells)
+    ]
+    return Chambers(tuple(inside), tuple(_without_walls(each) for each in together))
+
+
+def _without_walls(faces: IntArray) -> IntArray:
+    """Return *faces* (k, 3) without those that are there in both orientations."""
+    a, b, c = faces.T
+    sign = np.sign(b - a) * np.sign(c - b) * np.sign(c - a)
+    _, first, same = np.unique(
+        np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True
+    )
+    total = np.bincount(same.ravel(), sign)
+    return np.asarray(faces[np.sort(first[total != 0.0])])
 
 
 def _apart(around: list[IntArray], borders: IntArray, sides: int) -> IntArray:
@@ -137,10 +154,10 @@ def _joined(around: list[IntArray], borders: IntArray, sides: int) -> tuple[IntA
     return np.array(parent), failed
 
 
-def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[IntArray]:
-    """Return the faces around each part of space, turned outward, in the order of first faces.
+def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[tuple[int, IntArray]]:
+    """Return the faces around each part of space, turned outward, and the number of the first one.
 
-    *part* (k, 2) is that of the front and of the back of the faces *own* (k,).
+    In the order of these.  *part* (k, 2) is that of the front and the back of the faces *own* (k,).
     """
     is_wall = part[:, 0] != part[:, 1]
     own, (front, back) = own[is_wall], part[is_wall].T
@@ -148,7 +165,7 @@ def _around_parts(faces: IntArray, own: IntArray, part: IntArray) -> list[IntArr
     number, face = np.concatenate([back, front]), np.concatenate([own, own])
     order = np.lexsort((face, number))
     pieces = np.split(order, np.flatnonzero(np.diff(number[order])) + 1) if len(order) else []
-    return [turned[piece] for piece in sorted(pieces, key=lambda piece: int(face[piece[0]]))]
+    return sorted(((int(face[p[0]]), turned[p]) for p in pieces), key=lambda each: each[0])
 
 
 def _closed(part: IntArray, half_edges: HalfEdges, patch: IntArray) -> IntArray:

@@ -723,6 +723,8 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
 @pytest.mark.parametrize("mode", every(2, Mode))
 def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     seen.mode(mode)
+    size = seen.widget.size()
+    seen.widget.resize(size.width(), 1600)  # so that nothing scrolls
     kinds = (QtWidgets.QAbstractButton, QtWidgets.QAbstractSpinBox, QtWidgets.QTreeWidget)
     wanted = {
         each
@@ -748,6 +750,7 @@ def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     assert {each for each in wanted if each.focusPolicy() != Qt.NoFocus} <= reached
     exclusive = {each for each in wanted - reached if each.group() is not None}
     assert wanted - reached == exclusive  # reached by the arrow keys
+    seen.widget.resize(size)
     here = seen.panel.toolbar.buttons[f"mode.{mode.name.lower()}"]
     here.setFocus()
     QtTest.QTest.keyClick(here, Qt.Key_Left if mode is Mode.DEFORM else Qt.Key_Right)
