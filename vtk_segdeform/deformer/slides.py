@@ -7,7 +7,7 @@ a finish places them on it exactly, where they are nearest to the pose of the ca
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from ..checks import require, shown
 from ..errors import ConstraintError
 from ..mesh import Mesh, nearest_on_triangles, ragged_arange
 from ..solver import Track
+from .symmetry import Mirror
 
 _MOST_POINTS = (
     500  # vertices of one slide in the objective: they depend on a few dozen cage vertices
@@ -89,6 +90,19 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
     return tuple(found)
 
 
+def with_mirrored(slides: Sequence[Slide], mesh: Mesh, mirror: Mirror) -> tuple[Slide, ...]:
+    """Return checked *slides* and their mirror images, of vertices that do not slide yet."""
+    found = list(slides)
+    for each in slides:
+        taken = np.concatenate([np.asarray(other.vertices) for other in found])
+        own = np.asarray(each.vertices)
+        mates = mirror.with_mates(own, taken)[0][len(own) :]
+        if len(mates):
+            direction = mirror.reflected(_direction(each, mesh)[None])[0]
+            found.append(Slide(mates, each.along, direction.tolist()))
+    return tuple(found)
+
+
 def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[Guide, ...]:
     """Return checked *slides* along tracks of *mesh* at rest; of some hundred vertices if *few*."""
     found = []
@@ -102,13 +116,20 @@ def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[G
 def _track(slide: Slide, mesh: Mesh, some: IntArray) -> Track:
     if slide.along == "surface":
         return _Surface(mesh)
-    points = mesh.vertices[np.asarray(slide.vertices)]
-    axes = np.linalg.svd(points - points.mean(axis=0))[2]
-    nearest = axes[2] if slide.along == "plane" else axes[0]
-    direction = nearest if slide.direction is None else np.asarray(slide.direction)
-    direction = direction / np.linalg.norm(direction)
+    direction = _direction(slide, mesh)
     along = np.outer(direction, direction)
     return _Flat(mesh.vertices[some], along if slide.along == "plane" else np.eye(3) - along)
+
+
+def _direction(slide: Slide, mesh: Mesh) -> FloatArray:
+    """Return the unit normal of the planes, or the direction of the lines, (3,)."""
+    if slide.direction is not None:
+        direction = np.asarray(slide.direction)
+        return np.asarray(direction / np.linalg.norm(direction))
+    points = mesh.vertices[np.asarray(slide.vertices)]
+    points = points - points.mean(axis=0)
+    axes = np.linalg.eigh(points.T @ points)[1].T  # shortest first
+    return np.asarray(axes[2] if slide.along == "line" else axes[0])
 
 
 @dataclass(frozen=True, eq=False)
