@@ -15,16 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray, as_ids
+from ..arrays import FloatArray, IntArray, as_ids, plain
 from ..checks import require, shown
 from ..errors import ConstraintError
 from ..mesh import Mesh, nearest_on_triangles, ragged_arange
 from ..solver import Track
 from .symmetry import Mirror
 
-_MOST_POINTS = (
-    500  # vertices of one slide in the objective: they depend on a few dozen cage vertices
-)
+_MOST_POINTS = 500  # vertices of one slide in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for the nearest point of a surface
 _KINDS = "plane", "line", "surface"
 
@@ -68,7 +66,7 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
     found = []
     for each in slides:
         slide = require(each, Slide, "slides")
-        if slide.along not in _KINDS:
+        if not isinstance(slide.along, str) or slide.along not in _KINDS:
             raise ConstraintError(
                 f"a slide must be along a plane, line or surface; got {shown(slide.along)}"
             )
@@ -78,15 +76,16 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
             raise ConstraintError(str(fault)) from None
         direction = None
         if slide.direction is not None:
-            direction = np.array(slide.direction, dtype=np.float64)
-            length = np.linalg.norm(direction)
-            if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
+            given = plain(slide.direction, "the direction of a slide")
+            is_vector = given.shape == (3,) and given.dtype.kind in "fiu"
+            if not is_vector or not 0.0 < np.linalg.norm(given) < np.inf:
                 raise ConstraintError(
                     f"the direction of a slide must be a vector (3,), not zero; "
                     f"got {shown(slide.direction)}"
                 )
+            direction = given.astype(np.float64).tolist()
         if len(ids):
-            found.append(Slide(ids, slide.along, None if direction is None else direction.tolist()))
+            found.append(Slide(ids, slide.along, direction))
     return tuple(found)
 
 

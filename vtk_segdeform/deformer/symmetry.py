@@ -36,9 +36,9 @@ Symmetry: TypeAlias = str | tuple[ArrayLike, ArrayLike] | None
 
 _AXES = {"x": 0, "y": 1, "z": 2}
 _SAME = 1e-6  # diagonals, between a mirror image and a vertex that is its mate
-# Diagonals: a mesh whose mirror image is farther off is not symmetric.  Those of models, noisy scans
-# and a body with one arm raised are off by at most 4e-3, those of a dog in seven poses by 1e-4 to
-# 2.3e-2, those of bodies with random limbs by at least 1.4e-2.
+# Diagonals: a mesh whose mirror image is farther off is not symmetric.  Those of models, scans
+# and a body with one arm raised are off by at most 4e-3, of a dog in seven poses by 1e-4 to 2.3e-2,
+# and of bodies with random limbs by at least 1.4e-2.
 _FARTHEST = 0.01
 _ROUNDS, _POINTS = 20, 2_000  # of the search for the plane
 _TERM_POINTS = 400  # vertices in the objective
