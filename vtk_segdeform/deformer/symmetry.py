@@ -17,7 +17,8 @@ and a finish makes the pose symmetric: to rounding, if the mesh is.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from itertools import combinations
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +27,6 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray
 from ..checks import shown
 from ..errors import ConstraintError
-from ..geometry import principal_axes
 from ..mesh import Mesh, SurfacePoint, nearest_on_triangles, ragged_arange
 from ..solver import MirrorTerm
 from ..subspace import Subspace
@@ -40,7 +40,7 @@ _SAME = 1e-6  # diagonals, between a mirror image and a vertex that is its mate
 # and a body with one arm raised are off by at most 4e-3, of a dog in seven poses by 1e-4 to 2.3e-2,
 # and of bodies with random limbs by at least 1.4e-2.
 _FARTHEST = 0.01
-_ROUNDS, _POINTS = 20, 2_000  # of the search for the plane
+_ROUNDS, _POINTS, _FEW_POINTS = 20, 2_000, 300  # of the search for the plane
 _TERM_POINTS = 400  # vertices in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for a mate
 
@@ -68,15 +68,13 @@ class Mirror:
         if symmetry is None:
             return None
         if isinstance(symmetry, str) and symmetry in _AXES:
-            normal = np.eye(3)[_AXES[symmetry]]
-            planes = [_settled(mesh, normal, turns=False)]
-        elif symmetry == "auto":
-            axes = [*np.eye(3), *principal_axes(mesh.vertices)]
-            planes = [_settled(mesh, axis, turns=True) for axis in axes]
+            axis = np.eye(3)[_AXES[symmetry]]
+            plane = _settled(mesh, mesh.bounds.mean(axis=0), axis, turns=False)
+        elif isinstance(symmetry, str) and symmetry == "auto":
+            plane = _found(mesh)
         else:
-            planes = [_given(symmetry)]
-        found = [_with_mates(mesh, *plane) for plane in planes]
-        best = min(found, key=lambda each: each.error)
+            plane = _given(symmetry)
+        best = _with_mates(mesh, plane.point, plane.normal)
         if best.error > _FARTHEST:
             raise ConstraintError(
                 f"the mesh is not symmetric about this plane: its mirror image is off by "
@@ -148,41 +146,66 @@ class Mirror:
         )
 
 
-def _given(symmetry: object) -> tuple[FloatArray, FloatArray]:
-    """Return the point and the normal of a plane that is given as both."""
+class _Plane(NamedTuple):
+    point: FloatArray  # (3,)
+    normal: FloatArray  # (3,)
+    off: float = 0.0  # mean distance between mirror images of vertices and the nearest vertices
+
+
+def _given(symmetry: object) -> _Plane:
+    """Return the plane that is given by a point and its normal."""
     try:
         point, normal = (np.array(each, dtype=np.float64) for each in symmetry)  # type: ignore[attr-defined]
     except (TypeError, ValueError):
         point = normal = np.zeros(0)
+    is_point = point.shape == normal.shape == (3,) and np.isfinite([point, normal]).all()
     length = float(np.linalg.norm(normal))
-    if point.shape != (3,) or normal.shape != (3,) or not (0.0 < length < np.inf):
+    if not (is_point and 0.0 < length < np.inf):
         raise ConstraintError(
             f"symmetry must be 'x', 'y', 'z', 'auto', or a point and a normal of the plane; "
             f"got {shown(symmetry)}"
         )
-    return point, normal / length
+    return _Plane(point, normal / length)
 
 
-def _settled(mesh: Mesh, normal: FloatArray, *, turns: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the plane near that through the middle about which the mesh is most symmetric.
+def _found(mesh: Mesh) -> _Plane:
+    """Return the plane about which *mesh* is most symmetric.
 
-    By iterated nearest points; it keeps its *normal* (3,) unless it *turns*.
+    The normal of a plane of symmetry is a principal axis.  Where some are equally long it is any
+    direction between them, so the search also starts there.
     """
-    x = mesh.vertices[:: 1 + mesh.n_vertices // _POINTS]
-    tree = cKDTree(mesh.vertices)
     areas = mesh.vertex_areas
     middle = areas @ mesh.vertices / areas.sum()
-    point = middle if turns else mesh.bounds.mean(axis=0)
+    x = mesh.vertices - middle
+    own = np.linalg.eigh((x.T * areas) @ x)[1].T
+    between = [a + sign * b for a, b in combinations(own, 2) for sign in (1.0, -1.0)]
+    starts = [*np.eye(3), *own, *(each / np.linalg.norm(each) for each in between)]
+    planes = [_settled(mesh, middle, axis, most=_FEW_POINTS) for axis in starts]
+    best = min(planes, key=lambda each: each.off)
+    return _settled(mesh, best.point, best.normal)
+
+
+def _settled(
+    mesh: Mesh, point: FloatArray, normal: FloatArray, *, turns: bool = True, most: int = _POINTS
+) -> _Plane:
+    """Return the plane near one through *point* (3,) about which *mesh* is most symmetric.
+
+    By iterated nearest points, of *most* vertices; it keeps its *normal* (3,) unless it *turns*.
+    """
+    x = mesh.vertices[:: 1 + mesh.n_vertices // most]
+    tree = cKDTree(mesh.vertices)
+    away = np.zeros(0)
     for _ in range(_ROUNDS):
         image = x - 2.0 * np.outer((x - point) @ normal, normal)
-        near = mesh.vertices[tree.query(image)[1]]
+        away, ids = (np.asarray(each) for each in tree.query(image))
+        near = mesh.vertices[ids]
         if turns:
             a, b = x - x.mean(axis=0), near - near.mean(axis=0)
             covariance = a.T @ b
             normal = np.linalg.eigh(covariance + covariance.T)[1][:, 0]
         between = 0.5 * (x + near).mean(axis=0)
         point = point + ((between - point) @ normal) * normal
-    return point, normal
+    return _Plane(point, normal, float(away.mean()))
 
 
 def _with_mates(mesh: Mesh, point: FloatArray, normal: FloatArray) -> Mirror:
