@@ -102,6 +102,18 @@ def test_both_hands_given_are_followed_as_given():
     assert_allclose(pose.vertices[both] - X[both], u, atol=1e-12)
 
 
+def test_a_handle_across_the_plane_moves_along_it():
+    head = np.flatnonzero(X[:, 2] > 1.5)
+    assert np.ptp(X[head, 0]) > 0.2
+    symmetric = deformer().hold(fixed=FEET, handle=head, symmetry="x")
+    pose = symmetric.finish(symmetric.solve(X[head] + [0.3, 0.2, 0.1]))
+    require_mirrored(pose)
+    assert_allclose(
+        pose.vertices[head] - X[head], np.tile([0.0, 0.2, 0.1], (len(head), 1)), atol=1e-12
+    )
+    assert pose.handle_error < 1e-12
+
+
 def test_frames_of_a_drag_are_nearly_mirrored_and_end_where_one_solve_does():
     symmetric = deformer().hold(fixed=FEET, handle=HAND, symmetry="x")
     for k in range(1, 9):

@@ -6,8 +6,8 @@ not:
 
     u_i = M u_mate(i),    M = I - 2 n n^T
 
-The mates of handles and fixed vertices are handles and fixed vertices as well; a handle on the
-plane stays on it.  The cages, which are not symmetric, follow by a term of the objective,
+The mates of handles and fixed vertices are handles and fixed vertices as well; a handle across the
+plane moves along it.  The cages, which are not symmetric, follow by a term of the objective,
 
     sum_i omega |u_i - M u_mate(i)|^2
 
@@ -17,6 +17,7 @@ and a finish makes the pose symmetric: to rounding, if the mesh is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import NamedTuple, TypeAlias
 
@@ -101,7 +102,7 @@ class Mirror:
         image = self.point + self.reflected((point.at(mesh.vertices) - self.point)[None])[0]
         return SurfacePoint.nearest(mesh, image)
 
-    @property
+    @cached_property
     def mates(self) -> IntArray:
         """(n,) int: the vertex nearest to each mate."""
         each = np.arange(len(self.corners))
@@ -126,12 +127,16 @@ class Mirror:
         """Return the *targets* (k, 3) of vertices of *mesh* and those of their mates, (k + e, 3).
 
         *ids* (k + e,) are all these vertices, *sources* (e,) whose mates the last ones are.
-        Vertices that are their own mates stay on the plane.
+        Targets of vertices whose mates have targets as well become mirror images of each other:
+        the mean of both, so that a handle across the plane moves along it.
         """
         rest, given = mesh.vertices[ids], ids[: len(targets)]
         u = targets - rest[: len(targets)]
-        on_plane = self.mates[given] == given
-        u[on_plane] -= np.outer(u[on_plane] @ self.normal, self.normal)
+        order = np.argsort(given)
+        mates = self.mates[given]
+        place = order[np.searchsorted(given, mates, sorter=order).clip(max=len(given) - 1)]
+        both = np.flatnonzero(given[place] == mates) if len(given) else order
+        u[both] = 0.5 * (u[both] + self.reflected(u[place[both]]))
         return np.asarray(rest + np.concatenate([u, self.reflected(u[sources])]))
 
     def term(self, subspace: Subspace, rest_cages: FloatArray, weight: float) -> MirrorTerm:
