@@ -16,6 +16,7 @@ import pyvista as pv
 from matplotlib.colors import LinearSegmentedColormap
 
 import vtk_segdeform as sd
+from making.constrained import rigid, slide, symmetry
 from making.made import FIGURES as FOLDER
 from making.plots import convergence, volume_along_a_step
 from making.scene import (
@@ -190,6 +191,9 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "several": (several, 3),
     "local_volume": (local_volume, 0),
     "pipeline": (pipeline, 3),
+    "rigid": (rigid, 2),
+    "slide": (slide, 2),
+    "symmetry": (symmetry, 3),
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }

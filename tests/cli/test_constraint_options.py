@@ -34,6 +34,7 @@ def given(tmp_path_factory) -> str:
     surface = pv.PolyData(X, faces)
     surface["fibre"] = np.tile([0.0, 0.0, 1.0], (len(X), 1))
     surface["flow"] = np.tile([0.0, 2.0, 0.0], (len(X), 1))
+    surface["plane"] = (X[:, 2] < -1.3).astype(int)
     path = tmp_path_factory.mktemp("given") / "torso.vtp"
     write_mesh(path, surface)
     return str(path)
@@ -84,6 +85,14 @@ def test_a_slide_along_a_line_or_the_surface_follows_a_colon(given, tmp_path):
             across = np.linalg.eigh(np.cov(X[feet].T))[1][:, :2]
             assert np.abs(u[feet] @ across).max() < 1e-9 * SIZE
         assert np.abs(u[feet]).max() > 1e-4
+
+
+def test_an_array_may_have_the_name_of_a_kind_of_slide(given, tmp_path):
+    poses = []
+    for text in ("plane", "z<-1.3"):
+        assert main(command(given, tmp_path / "posed.vtp", "pull", "--slide", text)) == 0
+        poses.append(Surface(read_polydata(tmp_path / "posed.vtp")).mesh.vertices)
+    assert_allclose(poses[0], poses[1], atol=0.0)
 
 
 @pytest.mark.parametrize(

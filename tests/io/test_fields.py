@@ -133,6 +133,8 @@ def test_points_of_degenerate_faces_and_of_no_face_stay_finite():
         moved = surface.moved(surface.mesh.vertices @ TURN.T, **{how: ["v"]})
         assert np.isfinite(moved.point_data["v"]).all()
         assert np.isfinite(moved.cell_data["v"]).all()
+        assert_array_equal(moved.point_data["v"][5], given.point_data["v"][5])
+        assert_array_equal(moved.cell_data["v"][2], given.cell_data["v"][2])
         used = [0, 1, 2, 3]
         assert_allclose(
             moved.point_data["v"][used], given.point_data["v"][used] @ TURN.T, atol=1e-12

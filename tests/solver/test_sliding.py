@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from limbed import torso
 from numpy.testing import assert_allclose
 from solids import icosphere, rotation
 
 from vtk_segdeform.deformer.slides import Slide, guides
-from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, distance_to_surface
 from vtk_segdeform.solver import Sliding
 
 BODY = Mesh(*icosphere(2))
@@ -82,6 +83,21 @@ def test_it_is_the_distance_from_the_track():
     term = Sliding(rows, guides([Slide(CAP, "surface")], BODY)[0].track, 1.0)
     assert term.value_and_slope(outward)[0] == pytest.approx(len(CAP) * 0.3**2, rel=0.05)
     assert term.value_and_slope(x)[0] < 1e-28
+
+
+def test_the_nearest_point_is_in_the_nearest_triangle():
+    """It need not be next to the nearest vertex."""
+    mesh = torso()
+    rng = np.random.default_rng(0)
+    shares, faces = (
+        rng.dirichlet(np.ones(3), 2000),
+        mesh.faces[rng.integers(mesh.n_faces, size=2000)],
+    )
+    x = np.einsum("kc,kcj->kj", shares, mesh.vertices[faces])
+    x = x + 0.02 * mesh.diagonal * rng.normal(size=x.shape)
+    nearest, _ = guides([Slide([0], "surface")], mesh)[0].track(x)
+    expected = distance_to_surface(x, mesh.vertices, mesh.faces)
+    assert_allclose(np.linalg.norm(x - nearest, axis=1), expected, atol=1e-12)
 
 
 def test_a_plane_or_a_line_is_by_default_the_nearest_to_the_vertices():

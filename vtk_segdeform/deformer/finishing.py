@@ -52,10 +52,7 @@ def finish_of(
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
-        stays = far | _is_near_pulled_points(constraints)
-        if mirror is not None:
-            stays |= stays[mirror.mates]
-        stays &= ~held
+        stays = (far | _is_near_pulled_points(constraints)) & ~held
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
