@@ -155,9 +155,9 @@ def test_a_rigid_part_slides_along_a_line():
 def test_slides_of_one_side_of_a_symmetric_body_are_mirrored():
     mesh = torso()
     x = mesh.vertices
-    foot = x[:, 2] < -1.4
+    foot = x[:, 2] < -1.3
     left = np.flatnonzero(foot & (x[:, 0] < 0.0))
-    hand = np.flatnonzero(x[:, 0] > 1.7)
+    hand = np.flatnonzero(x[:, 0] > 1.6)
     direction = np.array([0.4, 0.1, 1.0]) / np.linalg.norm([0.4, 0.1, 1.0])
     pose = sd.deform(
         mesh, [], hand, x[hand] + [-0.3, 0.1, 0.8], slides=[sd.Slide(left, "plane", direction)],
@@ -166,7 +166,7 @@ def test_slides_of_one_side_of_a_symmetric_body_are_mirrored():
     u = pose.vertices - x
     mirrored = direction * [-1, 1, 1]
     right = np.flatnonzero(foot & (x[:, 0] > 0.0))
-    assert len(left) == len(right) > 5
+    assert len(left) == len(right) > 3
     assert np.abs(u[left] @ direction).max() < FLAT * mesh.diagonal
     assert np.abs(u[right] @ mirrored).max() < FLAT * mesh.diagonal
     assert np.abs(u[right]).max() > 0.01

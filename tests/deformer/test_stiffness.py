@@ -125,7 +125,7 @@ def test_the_same_stiffness_everywhere_changes_nothing():
     targets = X[UPPER] + [0.4, 0.1, -0.2]
     plain = bar_deformer().hold(fixed=LOWER, handle=UPPER)
     before = plain.finish(plain.solve(targets)).vertices
-    for same in (0.0, 7.5, 1e30):
+    for same in (0.0, 7.5):
         alike = bar_deformer().stiffened(np.full(len(X), same)).hold(fixed=LOWER, handle=UPPER)
         assert_array_equal(alike.finish(alike.solve(targets)).vertices, before)
     other = of_two_materials(1.5).hold(fixed=LOWER, handle=UPPER)
@@ -186,12 +186,12 @@ def test_the_energies_of_surface_and_finish_grow_with_the_stiffness():
 
 def bodies():
     """Return meshes, fixed vertices, handles and rigid vertices, by name."""
-    ring = models.torus(800)
+    ring = models.torus(500)
     x = ring.vertices
     yield "ring", ring, x[:, 0] < -1.1, x[:, 0] > 1.1, np.abs(x[:, 0]) < 0.3  # two parts
     body = torso()
     x = body.vertices
-    yield "in the rigid part", body, x[:, 2] < -1.4, x[:, 0] > 1.7, x[:, 0] > 1.2
+    yield "in the rigid part", body, x[:, 2] < -1.3, x[:, 0] > 1.6, x[:, 0] > 1.2
     body = crab()
     x = body.vertices
     yield "beside it", body, x[:, 1] < -1.2, x[:, 1] > 1.0, np.abs(x[:, 1]) < 0.3

@@ -20,12 +20,12 @@ _CRAB = [
 ]
 
 
-def torso(level: int = 4) -> Mesh:
+def torso(level: int = 3) -> Mesh:
     """Return a trunk with arms, legs and a head."""
     return limbed(_TORSO, level)
 
 
-def crab(level: int = 4) -> Mesh:
+def crab(level: int = 3) -> Mesh:
     """Return a flat body with claws, legs and a tail."""
     body = limbed(_CRAB, level)
     return body.with_vertices(body.vertices * [1.0, 1.0, 0.5])

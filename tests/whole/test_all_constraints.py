@@ -35,7 +35,7 @@ class Random:
         self.session = session = sd.Session(BODY)
         labels = np.digitize(X[:, 2], [-0.5, 0.8])
         session.set_regions(sd.Regions.from_labels(BODY, labels, overlap=1))
-        session.change_options(n_cage_vertices=100)
+        session.change_options(n_cage_vertices=70)
         session.fit_cages()
         session.change_options(symmetry="x", volumes={"whole": "free"})
         session.set_stiffness(STIFFNESS)
