@@ -17,6 +17,7 @@ import pyvista as pv
 from matplotlib.colors import LinearSegmentedColormap
 
 import vtk_segdeform as sd
+from making.constrained import rigid, slide, symmetry
 from making.made import EXAMPLES
 from making.made import FIGURES as FOLDER
 from making.plots import convergence, volume_along_a_step
@@ -239,6 +240,9 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "followers": (followers, 3),
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
+    "rigid": (rigid, 2),
+    "slide": (slide, 2),
+    "symmetry": (symmetry, 3),
     "volume_along": (volume_along_a_step, 0),
     "convergence": (convergence, 0),
 }

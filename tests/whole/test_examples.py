@@ -42,6 +42,11 @@ RIGHT = {
     "dinosaur": lambda names: (
         abs(names["session"].volume_change) < 1e-12 and names["solution"].handle_error < 1e-3
     ),
+    "dinosaur_with_constraints": lambda names: (
+        max(names["off_rigid"], names["off_ground"]) < 1e-9
+        and abs(names["solution"].volume_change) < 1e-12
+        and names["along_ground"] > 0.01
+    ),
     "custom_regions": lambda names: (
         names["session"].regions.n_regions == 3 and abs(names["session"].volume_change) < 1e-12
     ),

@@ -20,7 +20,7 @@ from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
 from ..deformer import Deformer, Slide, checked_goals, clamped, finished, solved_along
-from ..errors import ConstraintError, MeshError
+from ..errors import ArgumentError, ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
@@ -225,6 +225,10 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
     """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
+    try:  # before the pose is solved, not when it is written
+        surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
+    except ArgumentError as fault:
+        raise ConstraintError(f"--turn or --push: {fault}") from None
     return {
         "volumes": goals or None,
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},

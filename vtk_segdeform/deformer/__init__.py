@@ -50,6 +50,7 @@ from .problem import Problem
 from .pull import pull
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
+from .symmetry import Mirror
 from .volume_goals import Goals, checked_goals
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "SPREAD",
     "Deformer",
     "Goals",
+    "Mirror",
     "PaperDeformer",
     "PaperSolution",
     "Problem",

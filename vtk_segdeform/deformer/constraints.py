@@ -32,7 +32,7 @@ from ..solver import (
 from .arguments import check_distance, checked_constraints, checked_targets
 from .enclosed_volume import EnclosedVolume, Preserved
 from .problem import Problem
-from .slides import Guide, Slide, guides
+from .slides import Guide, Slide, guides, with_mirrored
 from .symmetry import Mirror
 from .volume_goals import VolumeGoal
 
@@ -117,10 +117,12 @@ class Constraints:
         """
         mesh = enclosed.problem.mesh
         fixed, handle = checked_constraints(mesh, fixed, handle)
-        mirror, mates, fixed_mates = options.mirror, _NONE, _NONE
+        mirror, slides = options.mirror, options.slides
+        mates = fixed_mates = _NONE
         if mirror is not None:
             fixed, fixed_mates = mirror.with_mates(fixed, handle)
             handle, mates = mirror.with_mates(handle, fixed)
+            slides = with_mirrored(slides, mesh, mirror)
         fixed, handle = read_only(fixed), read_only(handle)
         preserved = enclosed.preserved(
             handle,
@@ -154,7 +156,7 @@ class Constraints:
         contact = _contact(problem, ids) if options.avoid_contact else None
         sliding = [
             Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
-            for each in guides(options.slides, problem.rest, few=True)
+            for each in guides(slides, problem.rest, few=True)
         ]
         terms: list[Term] = [*sliding, *(() if contact is None else (contact,))]
         if mirror is not None:
@@ -173,7 +175,7 @@ class Constraints:
             preserved=preserved,
             solver=GaussNewton(energy, positions, preserved.volumes, terms=tuple(terms)),
             contact=contact,
-            guides=guides(options.slides, problem.rest_pose),
+            guides=guides(slides, problem.rest_pose),
             mirror=mirror,
             mates=mates,
         )

@@ -204,6 +204,7 @@ class Deformer:
             cache=None if cache is None else as_path(cache, "cache"),
             progress=part(progress, 0.0, _BOUND),
         )
+        self._stiffness = None if stiffness is None else np.array(stiffness)
         self._enclosed = EnclosedVolume.under(self._problem, self._options.lids)
         self._hold(Constraints.of(self._enclosed, self._options, fixed=fixed, handle=handle))
         if compiled_kernels(mesh.n_vertices):
@@ -263,6 +264,8 @@ class Deformer:
             options = replace(options, lids=as_lids(lids))
             other._enclosed = EnclosedVolume.under(self._problem, options.lids)
         other._options = options
+        if symmetry is not ... and self._stiffness is not None:
+            other._stiffen(self._stiffness)
         other._hold(
             Constraints.of(other._enclosed, options, fixed=fixed, handle=handle, places=fixed_at)
         )
@@ -275,12 +278,16 @@ class Deformer:
         It has the options of this one and shares its subspace, which takes most of the time.
         """
         other = self._shared()
-        other._problem = self._problem.stiffened(
-            Stiffness.of(self.mesh, stiffness, self._options.mirror)
-        )
-        other._enclosed = EnclosedVolume.under(other._problem, self._options.lids)
+        other._stiffen(stiffness)
         other._hold(Constraints.of(other._enclosed, self._options, fixed=(), handle=()))
         return other
+
+    def _stiffen(self, stiffness: ArrayLike | None) -> None:
+        self._problem = self._problem.stiffened(
+            Stiffness.of(self.mesh, stiffness, self._options.mirror)
+        )
+        self._stiffness = None if stiffness is None else np.array(stiffness)
+        self._enclosed = EnclosedVolume.under(self._problem, self._options.lids)
 
     @one_blas_thread()
     def local(

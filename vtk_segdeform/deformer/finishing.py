@@ -24,7 +24,8 @@ from .symmetry import Mirror
 
 VOLUME_MET = 1e-9
 """Relative error of a volume, at most; a finish with a larger error is not used."""
-_FIRM = 1e6  # weight of a handle or fixed vertex in the place of a rigid part
+_FIRM = 1e9  # weight of a handle, fixed or sliding vertex in the place of a rigid part
+_ROUNDS, _PLACED = 100, 1e-13  # of placing a rigid part that slides; diagonals of its last motion
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -43,7 +44,9 @@ def finish_of(
     frame, preserved = problem.frame, constraints.preserved.constraints
     held = np.zeros(len(pose), dtype=bool)
     held[constraints.fixed] = held[constraints.handle] = True
-    held[[each.vertex for each in constraints.pulled.points if not each.is_vertex]] = False
+    pulled = constraints.pulled
+    inside = [not each.is_vertex for each in pulled.points]
+    held[constraints.handle[pulled.targets[inside]]] = False
     places = np.array(problem.rest_pose.vertices)
     places[constraints.fixed] = frame.about_origin(constraints.fixed_at)
     places[constraints.handle] = frame.about_origin(frame.outward(path.targets))
@@ -55,10 +58,7 @@ def finish_of(
     if constraints.keeps is not None:
         keeps = np.minimum(np.sqrt(constraints.keeps / _STAYS), 1.0)
         far = problem.samples.smooth_at_vertices(keeps) == 1.0
-        stays = far | _is_near_pulled_points(constraints)
-        if mirror is not None:
-            stays |= stays[mirror.mates]
-        stays &= ~held
+        stays = (far | _is_near_pulled_points(constraints)) & ~held
         places[stays] = pose[stays]
         held |= stays
         _place_points(path, places, stays)
@@ -111,14 +111,26 @@ def _symmetric(path: Path, mirror: Mirror, pose: FloatArray) -> FloatArray:
 
 
 def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:
-    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices."""
-    problem = path.constraints.problem
-    stiff = problem.inputs.stiffness
+    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices.
+
+    Those that slide are placed again and again, nearest to where they are on their tracks.
+    """
+    constraints, problem = path.constraints, path.constraints.problem
+    stiff, rest = problem.inputs.stiffness, problem.rest_pose
+    slides = np.zeros(len(pose), dtype=bool)
+    for guide in constraints.guides:
+        slides[guide.vertices] = True
+    slides[constraints.fixed] = slides[constraints.handle] = False
     for ids in () if stiff is None else stiff.rigid:
-        own = held[ids]
-        near = np.where(own[:, None], places[ids], pose[ids])
-        weights = np.where(own, _FIRM, 1.0)
-        moved = rigid_places(problem.rest_pose.vertices[ids], near, weights)
+        firm = held[ids]
+        near = np.where(firm[:, None], places[ids], pose[ids])
+        weights = np.where(firm, _FIRM, 1.0)
+        for _ in range(_ROUNDS):
+            before, moved = near, rigid_places(rest.vertices[ids], near, weights)
+            near = np.where(slides[ids][:, None], _on_tracks(constraints, ids, moved), near)
+            if not np.abs(near - before).max() > _PLACED * rest.diagonal:
+                break
+        own = held[ids] & ~slides[ids]
         places[ids[~own]] = moved[~own]
         held[ids] = True
 
@@ -147,6 +159,15 @@ def on_volumes(
         directions.append(normals)
     paths = np.hstack([moved, *directions])
     return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
+
+
+def _on_tracks(constraints: Constraints, ids: IntArray, x: FloatArray) -> FloatArray:
+    """Return *x* (k, 3) of the vertices *ids*, those that slide on their tracks."""
+    full = np.zeros((constraints.problem.mesh.n_vertices, 3))
+    full[ids] = x
+    for guide in constraints.guides:
+        full[guide.vertices] = guide.track(full[guide.vertices])[0]
+    return full[ids]
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -38,22 +39,29 @@ def near_point(
     """
     constraints, p = path.constraints, path.p
     problem, before = constraints.problem, constraints.solver
-    points = (point,) if constraints.mirror is None else (point, constraints.mirror.mate_of(point))
+    mirror, points = constraints.mirror, [point]
+    if mirror is not None:
+        points.append(mirror.mate_of(problem.mesh, point))
     near = points, reach / problem.frame.size, follows
     energy, samples = problem.energy, problem.samples
     ids = np.concatenate([constraints.handle, constraints.fixed])
     quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
     quadratic += problem.anchors_of_loose_parts(ids)
     anchors = Anchors(quadratic, p, np.zeros_like(p))
-    handles = _points_of_handles(constraints, point)
+    handles = _points_of_handles(constraints, points)
     own_rows = np.array([problem.row_of(each.point) for each in handles])
     own_rows = own_rows.reshape(-1, problem.subspace.n_columns)
     targets = np.array([each.target for each in handles], dtype=np.int64)
+    levers = (own_rows - problem.subspace.at(constraints.handle[targets])) @ p
+    if mirror is not None:
+        sources = np.concatenate([np.arange(constraints.n_given), constraints.mates])[targets]
+        for k in np.flatnonzero(sources != targets):
+            levers[k] = mirror.reflected(levers[targets == sources[k]])[0]
     pulled = PulledPoints(
         places=np.array([each.place for each in handles], dtype=np.int64),
         targets=targets,
         points=tuple(each.point for each in handles),
-        levers=(own_rows - problem.subspace.at(constraints.handle[targets])) @ p,
+        levers=levers,
         spread=spread,
     )
     rows = before.positions.rows.copy()
@@ -69,15 +77,25 @@ def near_point(
     return replace(local, solver=solver)
 
 
-def _points_of_handles(constraints: Constraints, point: SurfacePoint) -> list[_HandlePoint]:
-    """Return the points that handles of one vertex move, and *point* if its vertex is alone."""
+def _points_of_handles(
+    constraints: Constraints, points: Sequence[SurfacePoint]
+) -> list[_HandlePoint]:
+    """Return the points that handles of one vertex move, and grabbed *points* alone in a handle.
+
+    They are the grabbed one, and its mate if there is a mirror.
+    """
     found, set_of = [], constraints.solver.positions.set_of
+    grabbed = {points[0].vertex: points[0]}
+    for target, source in enumerate(constraints.mates, constraints.n_given):
+        if constraints.handle[source] == points[0].vertex:
+            grabbed[int(constraints.handle[target])] = points[1]
     for number, ids in enumerate(constraints.handles):
         places = np.flatnonzero(set_of == number)
         for place, target in zip(places, ids, strict=False):
             vertex = int(constraints.handle[target])
-            is_grabbed = vertex == point.vertex and len(places) == len(ids)
-            own = point if is_grabbed else SurfacePoint.at_vertex(vertex)
+            own = SurfacePoint.at_vertex(vertex)
+            if len(places) == len(ids):
+                own = grabbed.get(vertex, own)
             if len(ids) == 1 or not own.is_vertex:
                 found.append(_HandlePoint(int(place), int(target), own))
     return found

@@ -97,8 +97,9 @@ def pull(
         moves all that lies together.
     refine : bool or None
         Whether to finish the pose on the mesh itself, within the reach of the pull; see `deform`.
-        None does so only with *avoid_contact*, and to place rigid and sliding vertices exactly:
-        triangles are less distorted then, but a smooth bend may get a step where the finish ends.
+        None does so only with *avoid_contact*, and to place rigid, sliding and mirrored vertices
+        exactly: triangles are less distorted then, but a smooth bend may get a step where the
+        finish ends.
     progress : Progress, optional
         Called with the fraction done, 0 to 1, and a text, while cages are fitted and bound, and
         before every step.  It cancels by raising `Cancelled`.
@@ -129,7 +130,8 @@ def pull(
     as_flag(avoid_contact, "avoid_contact")
     checked_refine(refine)
     slides, stiff = checked_slides(mesh, slides), Stiffness.of(mesh, stiffness)
-    if refine is None and not (avoid_contact or slides or (stiff is not None and stiff.rigid)):
+    is_rigid = stiff is not None and bool(stiff.rigid)
+    if refine is None and not (avoid_contact or slides or is_rigid or symmetry is not None):
         refine = False
     point = checked_place(mesh, vertex)
     fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")

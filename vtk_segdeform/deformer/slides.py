@@ -7,7 +7,7 @@ a finish places them on it exactly, where they are nearest to the pose of the ca
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray, as_ids
+from ..arrays import FloatArray, IntArray, as_ids, plain
 from ..checks import require, shown
 from ..errors import ConstraintError
 from ..mesh import Mesh, nearest_on_triangles, ragged_arange
 from ..solver import Track
+from .symmetry import Mirror
 
-_MOST_POINTS = (
-    500  # vertices of one slide in the objective: they depend on a few dozen cage vertices
-)
+_MOST_POINTS = 500  # vertices of one slide in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for the nearest point of a surface
 _KINDS = "plane", "line", "surface"
 
@@ -67,7 +66,7 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
     found = []
     for each in slides:
         slide = require(each, Slide, "slides")
-        if slide.along not in _KINDS:
+        if not isinstance(slide.along, str) or slide.along not in _KINDS:
             raise ConstraintError(
                 f"a slide must be along a plane, line or surface; got {shown(slide.along)}"
             )
@@ -77,15 +76,29 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
             raise ConstraintError(str(fault)) from None
         direction = None
         if slide.direction is not None:
-            direction = np.array(slide.direction, dtype=np.float64)
-            length = np.linalg.norm(direction)
-            if direction.shape != (3,) or not (np.isfinite(length) and length > 0.0):
+            given = plain(slide.direction, "the direction of a slide")
+            is_vector = given.shape == (3,) and given.dtype.kind in "fiu"
+            if not is_vector or not 0.0 < np.linalg.norm(given) < np.inf:
                 raise ConstraintError(
                     f"the direction of a slide must be a vector (3,), not zero; "
                     f"got {shown(slide.direction)}"
                 )
+            direction = given.astype(np.float64).tolist()
         if len(ids):
-            found.append(Slide(ids, slide.along, None if direction is None else direction.tolist()))
+            found.append(Slide(ids, slide.along, direction))
+    return tuple(found)
+
+
+def with_mirrored(slides: Sequence[Slide], mesh: Mesh, mirror: Mirror) -> tuple[Slide, ...]:
+    """Return checked *slides* and their mirror images, of vertices that do not slide yet."""
+    found = list(slides)
+    for each in slides:
+        taken = np.concatenate([np.asarray(other.vertices) for other in found])
+        own = np.asarray(each.vertices)
+        mates = mirror.with_mates(own, taken)[0][len(own) :]
+        if len(mates):
+            direction = mirror.reflected(_direction(each, mesh)[None])[0]
+            found.append(Slide(mates, each.along, direction.tolist()))
     return tuple(found)
 
 
@@ -102,13 +115,20 @@ def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[G
 def _track(slide: Slide, mesh: Mesh, some: IntArray) -> Track:
     if slide.along == "surface":
         return _Surface(mesh)
-    points = mesh.vertices[np.asarray(slide.vertices)]
-    axes = np.linalg.svd(points - points.mean(axis=0))[2]
-    nearest = axes[2] if slide.along == "plane" else axes[0]
-    direction = nearest if slide.direction is None else np.asarray(slide.direction)
-    direction = direction / np.linalg.norm(direction)
+    direction = _direction(slide, mesh)
     along = np.outer(direction, direction)
     return _Flat(mesh.vertices[some], along if slide.along == "plane" else np.eye(3) - along)
+
+
+def _direction(slide: Slide, mesh: Mesh) -> FloatArray:
+    """Return the unit normal of the planes, or the direction of the lines, (3,)."""
+    if slide.direction is not None:
+        direction = np.asarray(slide.direction)
+        return np.asarray(direction / np.linalg.norm(direction))
+    points = mesh.vertices[np.asarray(slide.vertices)]
+    points = points - points.mean(axis=0)
+    axes = np.linalg.eigh(points.T @ points)[1].T  # shortest first
+    return np.asarray(axes[2] if slide.along == "line" else axes[0])
 
 
 @dataclass(frozen=True, eq=False)

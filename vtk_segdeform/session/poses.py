@@ -129,12 +129,16 @@ class Poses:
                 progress=progress,
             )
 
-        def stiffened() -> Deformer:
-            return self.memo.get("bound", _binding(state), bound, _KEPT).stiffened(state.stiffness)
+        found = self.memo.get("bound", _binding(state), bound, _KEPT)
+        symmetry, stiffness = state.options.symmetry, state.stiffness
+        if symmetry is None and stiffness is None:
+            return found
 
-        if state.stiffness is None:
-            return self.memo.get("bound", _binding(state), bound, _KEPT)
-        return self.memo.get("stiffened", (*_binding(state), state.stiffness), stiffened)
+        def made() -> Deformer:
+            mirrored = found if symmetry is None else found.hold(symmetry=symmetry)
+            return mirrored if stiffness is None else mirrored.stiffened(stiffness)
+
+        return self.memo.get("made", (found, symmetry, stiffness), made)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
@@ -308,5 +312,4 @@ def _volumes(state: State) -> dict[str, Any]:
         **given,
         "volumes": dict(state.options.volumes),
         "slides": state.slides,
-        "symmetry": state.options.symmetry,
     }

@@ -40,6 +40,7 @@ from ..cages import Cage
 from ..checks import Described, as_flag, as_text, require, require_sequence, shown
 from ..deformer import (
     Deformer,
+    Mirror,
     Slide,
     checked_constraints,
     checked_locality,
@@ -799,6 +800,8 @@ class Session(Described):
             known = ", ".join(vars(self.options))
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
+        if options.symmetry != self.options.symmetry:
+            Mirror.of(self.mesh, options.symmetry)  # raises if the mesh is not symmetric
         label = label_of_change(self.options, options)
         self.history.step(label, replace(self.state, options=options))
 

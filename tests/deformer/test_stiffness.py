@@ -1,0 +1,273 @@
+"""Stiffness: bars of two materials bend as beams do, and rigid parts stay congruent."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from limbed import crab, torso
+from numpy.testing import assert_array_equal
+from solids import icosphere, rotation
+
+import vtk_segdeform as sd
+from vtk_segdeform import models
+from vtk_segdeform.deformer import Stiffness
+from vtk_segdeform.energy import shape_energy
+from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.finish import CellEnergy
+from vtk_segdeform.geometry import rigid_fit
+from vtk_segdeform.mesh import Mesh
+
+BAR = models.bar((0.3, 0.16, 2.4), divisions=(5, 4, 48))
+X = BAR.vertices
+HEIGHT = X[:, 2] - X[:, 2].min()  # s, the arc length of beam theory
+LENGTH = float(np.ptp(X[:, 2]))
+LEVELS = np.unique(HEIGHT.round(9))
+LOWER, UPPER = np.flatnonzero(HEIGHT < 0.03 * LENGTH), np.flatnonzero(HEIGHT > 0.97 * LENGTH)
+pytestmark = pytest.mark.usefixtures("bound_once")
+
+
+@functools.cache
+def bar_deformer() -> sd.Deformer:
+    regions = sd.segment(BAR, 1)
+    return sd.Deformer(BAR, regions, sd.fit_cages(BAR, regions, 200))
+
+
+def of_two_materials(ratio: float) -> sd.Deformer:
+    """Return a deformer of the bar, whose upper half is stiffer by *ratio*."""
+    return bar_deformer().stiffened(np.where(HEIGHT < LENGTH / 2, 1.0, ratio))
+
+
+def bent(ratio: float, fixed, handle, targets) -> np.ndarray:
+    """Return the vertices of the bar, whose upper half is stiffer by *ratio*, in a pose."""
+    stiffness = np.where(HEIGHT < LENGTH / 2, 1.0, ratio)
+    return sd.deform(
+        BAR, fixed, handle, targets, stiffness=stiffness, n_regions=1, n_cage_vertices=200
+    ).vertices
+
+
+def section_angles(x: np.ndarray) -> np.ndarray:
+    """Return by how much each cross-section of the bar has turned about y."""
+    found = []
+    for level in LEVELS:
+        ids = np.flatnonzero(np.abs(HEIGHT - level) < 1e-6)
+        turn, _ = rigid_fit(X[ids], x[ids])
+        found.append(np.arctan2(turn[0, 2], turn[2, 2]))
+    return np.array(found)
+
+
+def residuals(mesh: Mesh, stiffness: np.ndarray, x: np.ndarray) -> list[float]:
+    """Return how far each rigid part of a pose is from congruent, in diagonals."""
+    found = []
+    for ids in Stiffness.of(mesh, stiffness).rigid:
+        turn, shift = rigid_fit(mesh.vertices[ids], x[ids])
+        off = mesh.vertices[ids] @ turn.T + shift - x[ids]
+        found.append(float(np.abs(off).max()) / mesh.diagonal)
+    return found
+
+
+@pytest.mark.parametrize("ratio", [2.0, 4.0])
+def test_curvatures_under_one_moment_are_as_the_inverse_of_the_stiffness(ratio):
+    """The end is where it is if both halves are arcs, of curvatures k and k / ratio."""
+    soft = np.radians(35.0) / (LENGTH / 2 * (1.0 + 1.0 / ratio))
+    s = np.linspace(0.0, LENGTH, 4001)
+    curvature = np.where(s < LENGTH / 2, soft, soft / ratio)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (curvature[1:] + curvature[:-1]))]) * s[1]
+    along = np.stack([np.sin(angle), np.cos(angle)])
+    centre = np.concatenate([[[0.0], [0.0]], np.cumsum(along[:, 1:], axis=1) * s[1]], axis=1)
+    at = [np.interp(HEIGHT[UPPER], s, each) for each in (*centre, angle)]
+    targets = np.stack(
+        [
+            at[0] + X[UPPER, 0] * np.cos(at[2]),
+            X[UPPER, 1],
+            X[:, 2].min() + at[1] - X[UPPER, 0] * np.sin(at[2]),
+        ],
+        axis=1,
+    )
+    angles, half = section_angles(bent(ratio, LOWER, UPPER, targets)), []
+    for low, high in ((0.1, 0.4), (0.6, 0.9)):
+        own = (low * LENGTH <= LEVELS) & (high * LENGTH >= LEVELS)
+        half.append(np.polyfit(LEVELS[own], angles[own], 1)[0])
+    assert half[0] / half[1] == pytest.approx(ratio, rel=0.05)
+
+
+@pytest.mark.parametrize("ratio", [2.0, 4.0])
+def test_with_both_ends_only_turned_the_middle_turns_as_that_of_a_beam(ratio):
+    """Beam theory: s bends by (m + f s) / EI(s), so that both ends are where they were."""
+    end, turn = (HEIGHT[LOWER].max(), HEIGHT[UPPER].min()), np.radians(8.0)
+    targets = []
+    for ids, at, angle in ((LOWER, end[0], turn), (UPPER, end[1], -turn)):
+        centre = np.array([0.0, 0.0, X[:, 2].min() + at])
+        targets.append((X[ids] - centre) @ rotation([0, 1, 0], angle).T + centre)
+    ends = np.concatenate([LOWER, UPPER])
+    angles = section_angles(bent(ratio, (), ends, np.vstack(targets)))
+
+    s = np.linspace(*end, 4001)
+    stiffness = np.where(s < LENGTH / 2, 1.0, ratio)
+
+    def integral(values):
+        return np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) * (s[1] - s[0])
+
+    by_moment, by_force = integral(1.0 / stiffness), integral((s - s[0]) / stiffness)
+    system = [
+        [by_moment[-1], by_force[-1]],
+        [integral(by_moment)[-1], integral(by_force)[-1]],
+    ]
+    moment, force = np.linalg.solve(system, [-2.0 * turn, -turn * (s[-1] - s[0])])
+    expected = np.interp(LENGTH / 2, s, turn + moment * by_moment + force * by_force)
+    middle = angles[np.abs(LEVELS - LENGTH / 2).argmin()]
+    assert expected < np.radians(-0.7)
+    assert middle == pytest.approx(expected, rel=0.05)
+
+
+def test_the_same_stiffness_everywhere_changes_nothing():
+    targets = X[UPPER] + [0.4, 0.1, -0.2]
+    plain = bar_deformer().hold(fixed=LOWER, handle=UPPER)
+    before = plain.finish(plain.solve(targets)).vertices
+    for same in (0.0, 7.5):
+        alike = bar_deformer().stiffened(np.full(len(X), same)).hold(fixed=LOWER, handle=UPPER)
+        assert_array_equal(alike.finish(alike.solve(targets)).vertices, before)
+    other = of_two_materials(1.5).hold(fixed=LOWER, handle=UPPER)
+    assert np.abs(other.solve(targets).vertices - before).max() > 1e-3
+
+
+def test_only_ratios_of_stiffness_matter():
+    targets, given = X[UPPER] + [0.4, 0.1, -0.2], np.where(HEIGHT < LENGTH / 2, 1.0, 3.0)
+    one, other = (
+        bar_deformer().stiffened(scale * given).hold(fixed=LOWER, handle=UPPER).solve(targets)
+        for scale in (1.0, 1e6)
+    )
+    assert_array_equal(one.vertices, other.vertices)
+
+
+def test_a_stiffened_deformer_is_that_which_is_bound_so():
+    given = np.where(HEIGHT < LENGTH / 2, 1.0, 3.0)
+    start = bar_deformer()
+    bound = sd.Deformer(BAR, start.regions, start.cages, fixed=LOWER, handle=UPPER, stiffness=given)
+    targets = X[UPPER] + [0.4, 0.1, -0.2]
+    stiffened = start.stiffened(given).hold(fixed=LOWER, handle=UPPER)
+    assert_array_equal(stiffened.solve(targets).vertices, bound.solve(targets).vertices)
+
+
+def test_the_gradient_of_the_energy_is_that_of_its_value():
+    rng = np.random.default_rng(0)
+    problem = of_two_materials(4.0)._problem
+    energy, rest = problem.energy, problem.rest_cages
+    p = rest + 0.1 * rng.normal(size=rest.shape)
+    step = rng.normal(size=rest.shape)
+    value, slope = energy.value_and_slope(p)
+    off = [
+        energy.value_and_slope(p + e * step)[0] - value - 2.0 * e * np.vdot(slope, step)
+        for e in (2e-3, 1e-3)
+    ]
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_the_energies_of_surface_and_finish_grow_with_the_stiffness():
+    """The same factor everywhere is a factor of the energy."""
+    mesh = Mesh(*icosphere(2))
+    regions = sd.Regions.single(mesh)
+    deformer = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 40))
+    subspace, clusters = deformer.subspace, np.arange(mesh.n_vertices)
+    rest = np.concatenate([cage.vertices for cage in deformer.cages])
+    p = rest + 0.1 * np.random.default_rng(1).normal(size=rest.shape)
+    energies = [
+        shape_energy(mesh, subspace, 1.0, clusters, stiffness=each)
+        for each in (None, np.full(mesh.n_vertices, 3.0))
+    ]
+    one, three = (each.value_and_slope(p)[0] for each in energies)
+    assert three == pytest.approx(3.0 * one)
+    x = mesh.vertices + 0.1 * np.random.default_rng(2).normal(size=mesh.vertices.shape)
+    cells = [CellEnergy.of(mesh, 0.0, each) for each in (None, np.full(mesh.n_vertices, 3.0))]
+    one, three = (each.value_and_slope(x)[0] for each in cells)
+    assert three == pytest.approx(3.0 * one)
+
+
+def bodies():
+    """Return meshes, fixed vertices, handles and rigid vertices, by name."""
+    ring = models.torus(500)
+    x = ring.vertices
+    yield "ring", ring, x[:, 0] < -1.1, x[:, 0] > 1.1, np.abs(x[:, 0]) < 0.3  # two parts
+    body = torso()
+    x = body.vertices
+    yield "in the rigid part", body, x[:, 2] < -1.3, x[:, 0] > 1.6, x[:, 0] > 1.2
+    body = crab()
+    x = body.vertices
+    yield "beside it", body, x[:, 1] < -1.2, x[:, 1] > 1.0, np.abs(x[:, 1]) < 0.3
+
+
+@pytest.mark.parametrize(("name", "mesh", "fixed", "handle", "rigid"), list(bodies()))
+def test_rigid_parts_are_congruent_after_the_finish(name, mesh, fixed, handle, rigid):
+    stiffness = np.where(rigid, np.inf, 1.0)
+    handles = np.flatnonzero(handle)
+    at = mesh.vertices[handles]
+    targets = (at - at.mean(axis=0)) @ rotation([1, 2, 0], 0.6).T + at.mean(axis=0)
+    targets = targets + [0.1, 0.2, 0.3]
+    regions = sd.segment(mesh, 1)
+    cages = sd.fit_cages(mesh, regions, 80)
+    deformer = sd.Deformer(mesh, regions, cages, fixed=fixed, handle=handle, stiffness=stiffness)
+    pose = deformer.finish(deformer.solve(targets))
+    off = residuals(mesh, stiffness, pose.vertices)
+    assert len(off) == (2 if name == "ring" else 1)
+    assert max(off) <= 1e-9
+    assert abs(pose.volume_change) < 1e-12
+    assert pose.handle_error < 1e-12
+    assert pose.fixed_error < 1e-12
+    soft = deformer.stiffened(None).hold(fixed=fixed, handle=handle)
+    assert max(residuals(mesh, stiffness, soft.finish(soft.solve(targets)).vertices)) > 1e-3
+
+
+def test_a_rigid_part_with_one_handle_vertex_turns_about_it():
+    mesh = torso()
+    x = mesh.vertices
+    stiffness = np.where(x[:, 0] > 1.0, np.inf, 1.0)
+    tip = int(x[:, 0].argmax())
+    pose = sd.pull(
+        mesh, tip, x[tip] + [-0.3, 0.2, 0.7], pins=x[:, 2] < -1.3, stiffness=stiffness,
+        n_regions=1, n_cage_vertices=80,
+    )  # fmt: skip
+    assert max(residuals(mesh, stiffness, pose.vertices)) <= 1e-9
+    assert pose.handle_error < 1e-12
+    assert abs(pose.volume_change) < 1e-12
+    ids = Stiffness.of(mesh, stiffness).rigid[0]
+    turn, _ = rigid_fit(x[ids], pose.vertices[ids])
+    assert np.degrees(np.arccos((np.trace(turn) - 1.0) / 2.0)) > 5.0
+
+
+def test_a_whole_component_can_be_rigid():
+    (x, faces), (y, other) = icosphere(3), icosphere(2)
+    mesh = Mesh(np.concatenate([x, 0.4 * y + [1.6, 0.0, 0.0]]), np.vstack([faces, other + len(x)]))
+    stiffness = np.where(np.arange(mesh.n_vertices) < len(x), 1.0, np.inf)
+    handle = np.flatnonzero(mesh.vertices[:, 2] > 0.9)
+    pose = sd.deform(
+        mesh, mesh.vertices[:, 2] < -0.9, handle, mesh.vertices[handle] + [0.4, 0.0, 0.2],
+        stiffness=stiffness, n_cage_vertices=80, refine=True,
+    )  # fmt: skip
+    assert max(residuals(mesh, stiffness, pose.vertices)) <= 1e-9
+    assert abs(pose.volume_change) < 1e-12
+
+
+@pytest.mark.parametrize(
+    "given",
+    [-1.0, np.nan, [1.0, 2.0], "soft", np.ones((len(X), 1)), np.ones(len(X), dtype=complex), None],
+)
+def test_what_is_no_stiffness_is_named(given):
+    deformer = bar_deformer()
+    if given is None:
+        given = np.ones(len(X))
+        given[3] = -np.inf
+    elif isinstance(given, float):
+        given = np.where(np.arange(len(X)) == 3, given, 1.0)
+    with pytest.raises(ConstraintError, match=f"stiffness must be {len(X)} numbers, 0 or more"):
+        deformer.stiffened(given)
+
+
+def test_a_copy_of_the_stiffness_is_kept():
+    given = np.where(HEIGHT < LENGTH / 2, 1.0, 3.0)
+    deformer = bar_deformer().stiffened(given)
+    targets = X[UPPER] + [0.4, 0.0, 0.0]
+    before = deformer.hold(fixed=LOWER, handle=UPPER).solve(targets).vertices
+    given[:] = 1.0
+    again = deformer.hold(fixed=LOWER, handle=UPPER, symmetry=None).solve(targets).vertices
+    assert_array_equal(again, before)
