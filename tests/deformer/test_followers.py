@@ -69,7 +69,13 @@ def check(scene: Scene, solution: Solution) -> None:
 HOLLOW = "lining", "rod in a tube"
 
 
-@pytest.mark.parametrize("name", SCENES)
+OFTEN = ("sleeve", "tight fine sleeve", "lining", "beads")
+RARE = sorted({*SCENES} - {*OFTEN})
+
+
+@pytest.mark.parametrize(
+    "name", [*OFTEN, *(pytest.param(n, marks=pytest.mark.campaign) for n in RARE)]
+)
 def test_followers_keep_their_place_on_a_body_that_is_bent(name):
     scene = SCENES[name]()
     given = scene.mesh, scene.fixed, scene.handle

@@ -27,7 +27,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray, plain
 from ..checks import shown
-from ..errors import ConstraintError
+from ..errors import ArgumentError, ConstraintError
 from ..mesh import Mesh, SurfacePoint, nearest_on_triangles, ragged_arange
 from ..solver import MirrorTerm
 from ..subspace import Subspace
@@ -159,7 +159,10 @@ class _Plane(NamedTuple):
 
 def _given(symmetry: object) -> _Plane:
     """Return the plane that is given by a point and its normal."""
-    plane = plain(symmetry, "symmetry")  # type: ignore[arg-type]
+    try:
+        plane = plain(symmetry, "symmetry")  # type: ignore[arg-type]
+    except ArgumentError:
+        plane = np.zeros(0)
     is_pair = plane.shape == (2, 3) and plane.dtype.kind in "fiu"
     point, normal = plane * 1.0 if is_pair else np.zeros((2, 3))
     length = float(np.linalg.norm(normal))
