@@ -33,7 +33,8 @@ def pictures(block: object, script: dict[str, Any], conf: dict[str, Any]) -> str
     names = script["example_globals"]
     if not found and "solution" in names:
         found = [FOLDER / "pose.png"]
-        ends = {"fixed": names.get("foot", []), "handle": np.atleast_1d(names["tip"])}
+        handle = np.atleast_1d(names.get("tip", [])).astype(int)
+        ends = {"fixed": names.get("foot", []), "handle": handle}
         picture_before_after(found[0], names["mesh"], names["solution"].vertices, **ends)
     places = []
     for path, place in zip(found, script["image_path_iterator"], strict=False):
