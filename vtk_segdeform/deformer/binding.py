@@ -176,8 +176,7 @@ def _surface_energy(
         shape, subspace, inputs.stretch, clusters, stiffness=factors, progress=progress
     )
     faces = [cage.faces for cage in inputs.cages]
-    soft = 1.0 if stiff is None else stiff.softness(shape)
-    return with_cage_stiffness(energy, p, faces, clusters, share=soft)
+    return with_cage_stiffness(energy, p, faces, clusters)
 
 
 def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatArray]:

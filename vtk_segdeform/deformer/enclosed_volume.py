@@ -188,6 +188,8 @@ class EnclosedVolume:
             found = self.bodies.component(cavity) if kind == "cavity" else self._wall(cavity)
         elif number is not None:
             found = self._numbered(kind, number)
+        if name in parts and (found is None or not found.target):
+            raise ConstraintError(f"the part {name!r} encloses no volume under a lid")
         if found is None or not found.target:
             known = ", ".join([*self.volume_names, *parts])
             raise ConstraintError(f"there is no volume {shown(name)}; there are {known or 'none'}")

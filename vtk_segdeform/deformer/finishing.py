@@ -162,7 +162,7 @@ def on_volumes(
 
 
 def _on_tracks(constraints: Constraints, ids: IntArray, x: FloatArray) -> FloatArray:
-    """Return *x* (k, 3) of the vertices *ids*, those that slide on their tracks."""
+    """Return *x* (k, 3) of the vertices *ids*, with sliding vertices on their tracks."""
     full = np.zeros((constraints.problem.mesh.n_vertices, 3))
     full[ids] = x
     for guide in constraints.guides:

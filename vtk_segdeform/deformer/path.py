@@ -181,7 +181,7 @@ class Path:
         self.p = self.end = self.solver.landed(self.end)
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
-        """Let bounds hold that the mesh *x* (n, 3) misses, or release those that it pulls against.
+        """Activate bounds that the mesh *x* (n, 3) violates; release those with a wrong multiplier.
 
         Returns whether any did; each is *released* once at most.
         """

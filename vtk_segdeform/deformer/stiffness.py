@@ -67,11 +67,6 @@ class Stiffness:
             return None
         return cls(values, tuple(rigid[own] for own in connected_sets(mesh, rigid)))
 
-    def softness(self, mesh: Mesh) -> float:
-        """Return by how much less the energy of *mesh* would be if all factors were 1, about."""
-        areas = mesh.vertex_areas
-        return float(areas.sum() / (areas @ self.factors))
-
 
 def rigid_places(rest: FloatArray, pose: FloatArray, weights: FloatArray) -> FloatArray:
     """Return *rest* (k, 3) moved as one body to where it is nearest to *pose* (k, 3).

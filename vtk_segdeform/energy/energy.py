@@ -199,8 +199,6 @@ def with_cage_stiffness(
     rest: FloatArray,
     faces: Sequence[IntArray],
     clusters: IntArray,
-    *,
-    share: float = 1.0,
 ) -> Energy:
     """Return *energy* plus the stiffness of the cages.
 
@@ -214,8 +212,6 @@ def with_cage_stiffness(
         The faces of each cage.
     clusters : (n,) int
         The rotation cluster of each vertex.
-    share : float
-        Of the energy that the surface would have without stiff parts.
     """
     tail, head = _cage_edges(energy, faces)
     offset = rest[tail] - rest[head]
@@ -223,7 +219,7 @@ def with_cage_stiffness(
     laplacian = np.zeros((m, m))
     np.add.at(laplacian, (tail, tail), 1.0)
     np.add.at(laplacian, (tail, head), -1.0)
-    strength = share * _CAGE_STIFFNESS * energy.scale / np.trace(laplacian)
+    strength = _CAGE_STIFFNESS * energy.scale / np.trace(laplacian)
 
     omega = energy.subspace.sums_of_squares(clusters)  # (G, m)
     omega /= np.maximum(omega.sum(axis=0), np.finfo(float).tiny)

@@ -91,7 +91,7 @@ def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
 
 
 def _without_walls(faces: IntArray) -> IntArray:
-    """Return *faces* (k, 3) without those that are there in both orientations."""
+    """Return *faces* (k, 3) without pairs of opposite orientation."""
     a, b, c = faces.T
     sign = np.sign(b - a) * np.sign(c - b) * np.sign(c - a)
     _, first, same = np.unique(

@@ -462,7 +462,7 @@ class Session(Described):
         self.history.step("set slides", replace(self.state, slides=owned))
 
     def slide_fixed(self, slides: bool) -> None:
-        """Let the fixed vertices slide in the plane nearest to them; or fix those that slide."""
+        """Let the fixed vertices slide in their best-fit plane, or fix the sliding ones again."""
         if as_flag(slides, "slides"):
             own = [Slide(self.fixed)] if len(self.fixed) else []
             fixed: ArrayLike = ()

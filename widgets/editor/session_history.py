@@ -32,7 +32,7 @@ class SessionHistory:
         self.begin(session)
 
     def begin(self, session: Session) -> None:
-        """Begin anew with *session*, which is the current one now."""
+        """Start over with *session* as the current one."""
         self._sessions, self._current = [session], 0
 
     def repaired(self, session: Session) -> None:
