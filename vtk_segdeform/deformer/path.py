@@ -113,9 +113,12 @@ class Path:
             result = self._minimise(goal, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)
+            is_renewed = self.solver.renew_terms(self.end)
             if self._exchange_bounds(x, goal, released):
                 continue
-            if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
+            is_exact = scaled_by <= _SCALED and not is_renewed
+            is_late = result.status is Status.STEP_LIMIT or steps >= options.max_steps
+            if is_exact or is_late:
                 break
         return Pose(x, result, steps)
 
@@ -131,6 +134,7 @@ class Path:
     def _continue_from(self, p: FloatArray) -> None:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
+        self.solver.renew_terms(p)
         volumes = self.constraints.preserved.volumes.among(self.active_volumes)
         self.solver.preserve(volumes.preserved_at(p))
 
