@@ -63,15 +63,15 @@ def test_of_planes_and_lines_it_is_quadratic(along, direction):
 def test_the_planes_of_a_surface_are_renewed():
     track = guides([Slide(CAP, "surface")], BODY)[0].track
     faces = BODY.vertices[BODY.faces[:9]].mean(axis=1)  # inside faces, which are the planes here
-    term = moved = Sliding.at(faces, (np.arange(9), np.eye(9)), track, 2.0)
+    term = Sliding.at(faces, (np.arange(9), np.eye(9)), track, 2.0)
     assert term.renewed(faces) is term
     there = rotation([0.3, 1.0, -0.2], 0.7) @ faces.T
-    outside = 1.1 * there.T
+    outside = 1.02 * there.T
     away = outside - track(outside)[0]
     expected = 2.0 * (away**2).sum()
     assert term.value_and_slope(outside)[0] > 3.0 * expected  # far from its planes
     moved = term.renewed(outside)
-    assert moved.value_and_slope(outside)[0] == pytest.approx(expected, rel=0.1)
+    assert moved.value_and_slope(outside)[0] == pytest.approx(expected, rel=0.2)
     assert moved.renewed(outside) is moved
 
 

@@ -29,6 +29,7 @@ from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
+_RENEWALS = 12  # of the planes of slides in one solve, at most
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
@@ -109,7 +110,8 @@ class Path:
                 max_steps=min(options.max_steps, _CONTACT_STEPS),
             )
         released: set[int] = set()
-        for _ in range(1 + _SOLVES_PER_SCALING + 2 * self.constraints.n_bounds):
+        renewals = _RENEWALS if self.solver.terms else 0
+        for _ in range(1 + _SOLVES_PER_SCALING + renewals + 2 * self.constraints.n_bounds):
             result = self._minimise(goal, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)

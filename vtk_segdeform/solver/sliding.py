@@ -22,7 +22,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray, largest_length
 from .terms import NO_SURFACE
 
-_RENEWED = 1e-5  # mesh sizes between old and new planes that are no reason for others
+_RENEWED = 1e-4  # mesh sizes between old and new planes up to which they remain
 
 Track: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Returns the nearest points (k, 3) of a plane, line or surface, and N there, (k, 3, 3)."""
