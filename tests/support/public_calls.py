@@ -360,6 +360,8 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "cage_vertices": lambda: [cage.vertices for cage in cages()],
     "cages": cages,
     "carrier": lambda: None,
+    "leader": lambda: None,
+    "apart": lambda: [],
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
     "direction": lambda: (0.0, 0.0, 1.0),

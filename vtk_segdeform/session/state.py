@@ -379,7 +379,7 @@ def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
             raise RegionError("these regions belong to another mesh; create them on this mesh")
-    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier)
+    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier, regions.leader)
 
 
 def fitting_cages(
