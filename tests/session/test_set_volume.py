@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
@@ -91,6 +92,27 @@ def test_a_volume_is_set_in_a_finished_pose(goal):
     session.refine()
     if goal != "free":
         assert_allclose(share(session), 0.85, rtol=EXACT)
+
+
+def test_a_volume_that_is_set_after_a_pull_hardly_moves_what_the_pull_left_in_place():
+    session = SCENE.session()
+    session.handles.remove(*session.handles)
+    session.set_fixed([])
+    x = session.mesh.vertices
+    tip = int((x @ [1.0, 0.3, 0.0]).argmax())
+    session.pull(tip, x[tip] + [-0.4, 1.0, 0.0], locality=0.2)
+    session.commit()
+    pulled, change = session.vertices, session.volume("region 1")[1]
+    for goal in ("keep", "+10%"):
+        session.set_volume("region 1", goal)
+        session.commit()
+        away = np.linalg.norm(session.vertices - pulled, axis=1)
+        assert away.max() < 0.03 * session.mesh.diagonal
+        assert away[tip] < 1e-3 * session.mesh.diagonal
+    session.forget_volume("region 1")
+    session.refine()
+    assert_allclose(session.vertices, pulled, atol=1e-4 * session.mesh.diagonal)
+    assert_allclose(session.volume("region 1")[1], change, atol=1e-3)
 
 
 def test_resetting_the_pose_forgets_the_goals_and_undo_brings_them_back():

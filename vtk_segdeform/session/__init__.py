@@ -30,7 +30,7 @@ from .finishing import FinishedPose
 from .handle_edits import Handles
 from .handles import require_handle
 from .listeners import Change
-from .naming import region_name
+from .naming import region_name, volume_label
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
@@ -59,4 +59,5 @@ __all__ = [
     "require_handle",
     "save_session",
     "saved_view",
+    "volume_label",
 ]

@@ -658,15 +658,22 @@ class Session(Described):
         """Return one of `volumes`, and (V - V0) / V0."""
         return self.deformer.volume(name, self.vertices)
 
+    def volume_label(self, name: str) -> str:
+        """Return the volume called *name* as people see it, who count from 1: "body 1", "arm"."""
+        return naming.volume_label(self.state.region_names, name)
+
     def forget_volume(self, name: str) -> None:
         """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
         as_text(name, "name")
         goals = {own: goal for own, goal in self.options.volumes if own != name}
         options = replace(self.options, volumes=tuple(goals.items()))
-        self.history.step(f"forget the volume of {name}", replace(self.state, options=options))
+        label = f"forget the volume of {self.volume_label(name)}"
+        self.history.step(label, replace(self.state, options=options))
 
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
         """Change the volume called *name*, as part of a drag, like `drag`.
+
+        The pose of a pull remains that of a pull: the surface beyond its reach hardly moves.
 
         Parameters
         ----------
@@ -683,12 +690,12 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         as_text(name, "name")
-        state = self._released(self.state)
+        state = self.state
         goals = {**dict(state.options.volumes), name: goal}
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
-        return self._drag(state, places, [f"the volume of {name}"], max_steps)
+        return self._drag(state, places, [f"the volume of {self.volume_label(name)}"], max_steps)
 
     def refine(
         self,

@@ -22,12 +22,15 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as segment_mesh
 from vtk_segdeform.session import FinishedPose, State
 
+from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
 from .session_file import pose_remark, write_posed
 from .widget_set import Mode
+
+_GROWTH = 0.2  # of the volume of a part at rest, at each press
 
 Action = Callable[[Controller], None]
 
@@ -320,6 +323,55 @@ def unpin_all(controller: Controller) -> None:
         raise ConstraintError("No pins to remove. Shift-click the surface to add one")
     controller.session.handles.remove(*names)
     controller.say(f"Removed {_count(len(names), 'point')}")
+
+
+# The volume of the part under the hand: the region of the last pulled point or active handle.
+
+
+def keep_part(controller: Controller) -> None:
+    """Keep the volume of the part under the hand as at rest; if it has a goal, no longer."""
+    name, session = _part(controller), controller.session
+    label = session.volume_label(name)
+    if name in dict(session.options.volumes):
+        session.forget_volume(name)
+        session.refine(max_steps=STEPS)
+        controller.widgets.resume_refining()
+    else:
+        is_kept = session.options.preserve_region_volumes
+        setting_volume(name, "free" if is_kept else "keep")(controller)
+    controller.say(f"Volume of {label} {'kept' if controller.widgets.keeps_part else 'free'}")
+
+
+def grow_part(controller: Controller) -> None:
+    """Let the part under the hand have 20 % more of its volume at rest than now."""
+    name, session = _part(controller), controller.session
+    goal = f"{100.0 * (session.volume(name)[1] + _GROWTH):+.12g}%"
+    setting_volume(name, goal)(controller)
+
+
+def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
+    """Return the action that sets the goal of a volume; with *join*, moves are one undo step."""
+
+    def change(controller: Controller) -> None:
+        session = controller.session
+        session.set_volume(name, goal, max_steps=STEPS)
+        session.commit(f"set the volume of {session.volume_label(name)}", join=join)
+        controller.widgets.resume_refining()
+        controller.finishing.rest()
+
+    return change
+
+
+def _part(controller: Controller) -> str:
+    """Return the name of the volume of the part under the hand."""
+    session, part = controller.session, controller.widgets.part
+    if not session.is_bound:
+        raise SessionError("The mesh is not ready yet. Wait until it is prepared")
+    if part is None:
+        raise ConstraintError("Pull the surface first, or select a handle")
+    if part not in session.deformer.volume_names:
+        raise ConstraintError(f"{session.volume_label(part)} encloses no volume")
+    return part
 
 
 # Painting.

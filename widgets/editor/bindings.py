@@ -114,6 +114,8 @@ BINDINGS = (
     Binding(
         "show_volume_change", ("o",), P | C | D, "Show local volume change", actions.toggle_overlay
     ),
+    Binding("keep_part", ("shift+p",), DRAGGING, "Keep volume of part", actions.keep_part),
+    Binding("grow_part", ("e",), DRAGGING, "Enlarge part by 20 %", actions.grow_part),
     Binding("", ("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
     Binding("", ("return",), DRAGGING, "After a number: drag by that amount", None),
     # How the mesh is shown.

@@ -14,7 +14,7 @@ from contextlib import ExitStack
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Options, Session
+from vtk_segdeform.session import Options, Session, pulls
 
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
@@ -25,7 +25,6 @@ from ..region_selector import (
     RegionColours,
     RegionOutlines,
     RegionSelector,
-    dominant_region,
 )
 from ..scene import Pointer, SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
@@ -97,6 +96,24 @@ class WidgetSet:
         wanted = session.options.n_cage_vertices
         is_default = wanted == Options().n_cage_vertices
         return suggested_size(session.regions) if session.regions and is_default else wanted
+
+    @property
+    def part(self) -> str | None:
+        """The volume under the hand: of the region of the dragged, or else the active handle."""
+        session, drag = self.session, self.session.history.drag
+        moved = [] if drag is None else [each for each in drag.moved if each in session.handles]
+        name, regions = moved[-1] if moved else self.dragger.handle, session.regions
+        if name is None or regions is None:
+            return None
+        ids = session.handles[name]
+        return f"region {regions.label_at(pulls.middle_vertex(session.mesh, ids))}"
+
+    @property
+    def keeps_part(self) -> bool:
+        """Whether the volume of `part` is preserved or set."""
+        options = self.session.options
+        goal = dict(options.volumes).get(self.part or "")
+        return options.preserve_region_volumes if goal is None else goal != "free"
 
     def choose_region(self, region: int) -> None:
         """Select *region* for painting; an index after the last one adds a region.
@@ -200,7 +217,7 @@ class WidgetSet:
             return None
         if regions is None:
             return self.session.vertices[self._picker.component(hit.vertex)]
-        return self.session.vertices[regions.members(dominant_region(regions, hit.vertex))]
+        return self.session.vertices[regions.members(regions.label_at(hit.vertex))]
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""
@@ -232,6 +249,11 @@ class WidgetSet:
         """Show nothing at the pointer until it moves again, as the view has moved under it."""
         self.puller.leave()
         self.selector.leave()
+
+    def resume_refining(self) -> None:
+        """Refine a pose that has not converged; its widget is on."""
+        self.puller.resume_refining()
+        self.dragger.resume_refining()
 
     def finish(self) -> None:
         """Finish the ongoing drag or stroke as if the button had been released."""

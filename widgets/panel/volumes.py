@@ -6,10 +6,9 @@ from weakref import WeakKeyDictionary
 
 from vtk_segdeform.session import Session
 
-from ..editor import Action, Controller, DeformEditor
-from ..handle_dragger import STEPS
-from ..volume_overlay import percent
-from .fields import Field, Section, option
+from ..editor import Action, Controller, DeformEditor, actions
+from ..volume_overlay import brief, percent
+from .fields import Field, Section, key_button, option
 
 _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
 _LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
@@ -29,6 +28,8 @@ def volumes_section(editor: DeformEditor) -> Section:
     volume, change = session.volume(name) if name else (0.0, 0.0)
     goal = dict(session.options.volumes).get(name, _DEFAULT)
     kind = goal if goal in (_DEFAULT, _KEEP, _FREE) else _SET
+    part = editor.widgets.part
+    has_part = part in names
     return Section(
         "volumes",
         "Volumes",
@@ -61,7 +62,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 maximum=_MOST,
                 unit="%",
                 on_release=session.mesh.n_vertices > _LIVE,
-                act=lambda share: _setting(name, f"{share:+g}%"),
+                act=lambda share: actions.setting_volume(name, f"{share:+g}%", join=True),
             ),
             Field(
                 "volumes.goal",
@@ -72,6 +73,25 @@ def volumes_section(editor: DeformEditor) -> Section:
                 enabled=bool(name),
                 choices=_GOALS,
                 act=lambda kind: _with_goal(name, kind, change),
+            ),
+            (
+                Field(
+                    "volumes.keep_part",
+                    "toggle",
+                    f"Keep {_short(session, part) if part else 'region'}",
+                    "Keeps the volume of the region of the pulled point or active handle",
+                    "keep_part",
+                    value=has_part and editor.widgets.keeps_part,
+                    enabled=has_part,
+                    act=lambda _: actions.keep_part,
+                ),
+                key_button(
+                    editor.keys,
+                    "volumes.grow_part",
+                    "grow_part",
+                    "Enlarge by 20 %",
+                    enabled=has_part,
+                ),
             ),
             Field(
                 "volumes.symmetry",
@@ -87,13 +107,13 @@ def volumes_section(editor: DeformEditor) -> Section:
 
 
 def _label(session: Session, name: str) -> str:
-    """Return what a volume is called in the window, where one counts from 1."""
-    kind, _, number = name.rpartition(" ")
-    if not (kind and number.isdecimal()):
-        return name.capitalize()
-    if kind == "region":
-        return session.region_name(int(number)).capitalize()
-    return f"{kind.capitalize()} {int(number) + 1}"
+    label = session.volume_label(name)
+    return label[:1].upper() + label[1:]
+
+
+def _short(session: Session, name: str) -> str:
+    label = session.volume_label(name)
+    return brief(label, label)
 
 
 def _choosing(name: str) -> Action:
@@ -103,19 +123,7 @@ def _choosing(name: str) -> Action:
     return choose
 
 
-def _setting(name: str, goal: str) -> Action:
-    """Return the action that changes a volume; moves of the slider are one undo step."""
-
-    def change(controller: Controller) -> None:
-        session = controller.session
-        session.set_volume(name, goal, max_steps=STEPS)
-        session.commit(f"set the volume of {name}", join=True)
-        controller.finishing.rest()
-
-    return change
-
-
 def _with_goal(name: str, kind: str, change: float) -> Action:
     if kind == _DEFAULT:
         return lambda controller: controller.session.forget_volume(name)
-    return _setting(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)
+    return actions.setting_volume(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.errors import ConstraintError, RegionError
 from vtk_segdeform.pictures import FIXED, of_region, rgb
-from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
 from ..scene import handle_colour
@@ -28,12 +27,6 @@ class Paint(enum.Enum):
     REGION = enum.auto()
     FIXED = enum.auto()
     HANDLE = enum.auto()
-
-
-def dominant_region(regions: Regions, vertex: int) -> int:
-    """Return the region with the largest blend weight at *vertex*."""
-    own = np.flatnonzero(regions.membership[:, vertex])
-    return int(own[0] if len(own) == 1 else regions.labels[vertex])  # labels need all weights
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .brush_ring import BrushRing
 from .outline import Outline
-from .paint_target import Paint, PaintTarget, dominant_region
+from .paint_target import Paint, PaintTarget
 from .region_colours import RegionColours
 from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
 
@@ -151,7 +151,7 @@ class RegionSelector(Widget):
         """Return the region of largest blend weight at the pointer, or None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
-        return None if hit is None or regions is None else dominant_region(regions, hit.vertex)
+        return None if hit is None or regions is None else regions.label_at(hit.vertex)
 
     def remove(self) -> None:
         """Remove the widget from the view permanently."""
@@ -214,7 +214,7 @@ class RegionSelector(Widget):
         regions = self.session.regions
         if regions is None:
             raise RegionError("No regions yet: detect or paint them first")
-        return np.array(regions.membership[dominant_region(regions, vertex)], dtype=bool)
+        return np.array(regions.membership[regions.label_at(vertex)], dtype=bool)
 
     def _follow(self, stroke: Stroke, target: PaintTarget, erase: bool) -> Gesture:
         """Preview the changes of *stroke* until the release, then apply them."""
@@ -247,7 +247,7 @@ class RegionSelector(Widget):
             self.leave()
             return
         if self.tool is Tool.REGION and regions is not None:
-            number = dominant_region(regions, hit.vertex)
+            number = regions.label_at(hit.vertex)
         else:
             number = int(self.session.mesh.components[hit.vertex])
         target = self.paints, self.region, self.handle
