@@ -94,25 +94,31 @@ def test_a_volume_is_set_in_a_finished_pose(goal):
         assert_allclose(share(session), 0.85, rtol=EXACT)
 
 
-def test_a_volume_that_is_set_after_a_pull_hardly_moves_what_the_pull_left_in_place():
+def test_after_pulls_nothing_moves_but_what_a_volume_moves_and_all_of_it_returns():
     session = SCENE.session()
     session.handles.remove(*session.handles)
     session.set_fixed([])
-    x = session.mesh.vertices
-    tip = int((x @ [1.0, 0.3, 0.0]).argmax())
-    session.pull(tip, x[tip] + [-0.4, 1.0, 0.0], locality=0.2)
-    session.commit()
-    pulled, change = session.vertices, session.volume("region 1")[1]
-    for goal in ("keep", "+10%"):
-        session.set_volume("region 1", goal)
+    size = session.mesh.diagonal
+    for direction in ([1.0, 0.3, 0.0], [-1.0, 0.3, 0.0]):
+        tip = int((session.mesh.vertices @ direction).argmax())
+        session.pull(tip, session.vertices[tip] + [0.0, 0.15 * size, 0.0])
+        session.commit()
+    pulled = session.vertices
+    for name, goal, most in (("whole", "-20%", 0.025), ("region 1", "+10%", 0.015)):
+        session.set_volume(name, goal)
         session.commit()
         away = np.linalg.norm(session.vertices - pulled, axis=1)
-        assert away.max() < 0.03 * session.mesh.diagonal
-        assert away[tip] < 1e-3 * session.mesh.diagonal
-    session.forget_volume("region 1")
-    session.refine()
-    assert_allclose(session.vertices, pulled, atol=1e-4 * session.mesh.diagonal)
-    assert_allclose(session.volume("region 1")[1], change, atol=1e-3)
+        assert away.max() < most * size
+        assert away[tip] < 1e-3 * size
+        at_once = session.vertices
+        session.undo()
+        for share in (0.3, 0.7, 1.0):
+            session.set_volume(name, f"{share * float(goal[:-1]):+g}%")
+            session.commit()
+        assert_allclose(session.vertices, at_once, atol=1e-3 * size)
+        session.forget_volume(name)
+        session.refine()
+        assert_allclose(session.vertices, pulled, atol=1e-3 * size)
 
 
 def test_resetting_the_pose_forgets_the_goals_and_undo_brings_them_back():

@@ -310,7 +310,8 @@ class Deformer:
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
             it the surface is held the more, the farther away; from 4 times this distance it hardly
-            moves.  Infinite: all of it is free.
+            moves.  Infinite: all of it is free.  0: all of it is held, so softly that it follows
+            volumes that are changed.
         spread : float
             Distance from a handle of one vertex within which a finish leaves the surface as the
             cages have it.
@@ -320,8 +321,8 @@ class Deformer:
         """
         point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
-        if not (is_infinite or (is_number(reach) and reach > 0.0)):
-            raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
+        if not (is_infinite or is_number(reach, 0.0)):
+            raise ConstraintError(f"reach must be 0 or a positive number; got {shown(reach)}")
         if not (is_number(spread) and spread > 0.0):
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):

@@ -673,7 +673,7 @@ class Session(Described):
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
         """Change the volume called *name*, as part of a drag, like `drag`.
 
-        The pose of a pull remains that of a pull: the surface beyond its reach hardly moves.
+        After a pull nothing moves but what the volume moves.
 
         Parameters
         ----------
@@ -690,7 +690,7 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         as_text(name, "name")
-        state = self.state
+        state = pulls.kept(self.state)
         goals = {**dict(state.options.volumes), name: goal}
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)

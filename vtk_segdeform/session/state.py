@@ -213,7 +213,7 @@ class Locality(Frozen):
     point: SurfacePoint
     """The grabbed point."""
     reach: float
-    """In the mesh's unit; infinite if all of the surface is free."""
+    """In the mesh's unit; infinite if all of the surface is free, 0 if only volumes move it."""
     spread: float
     """In the mesh's unit."""
     follows: float
@@ -466,9 +466,9 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     point = checked_place(mesh, require(locality.point, SurfacePoint, "state.locality.point"))
     reach = locality.reach
     is_infinite = isinstance(reach, float) and reach == np.inf
-    for length in (locality.spread, *([] if is_infinite else [reach])):
-        if not is_number(length, _TINY):
-            raise ConstraintError(f"the radius of a pull must be positive; got {shown(length)}")
+    if not (is_number(locality.spread, _TINY) and (is_infinite or is_number(reach, 0.0))):
+        lengths = shown(locality.spread), shown(reach)
+        raise ConstraintError(f"the radius of a pull must be positive; got {', '.join(lengths)}")
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     return replace(locality, point=point, cage_vertices=start.cage_vertices)

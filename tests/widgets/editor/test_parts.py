@@ -117,7 +117,7 @@ def test_a_part_is_kept_by_a_key_through_later_pulls_and_set_free_again(bench):
     bench.settle()
     assert bench.session.options.volumes == ()
     assert not bench.field("keep_part").value
-    assert_allclose(bench.session.vertices, before, atol=1e-4 * SCENE.mesh.diagonal)
+    assert_allclose(bench.session.vertices, before, atol=1e-3 * SCENE.mesh.diagonal)
     bench.hand.types("z")
     assert bench.session.options.volumes == (("region 1", "keep"),)
 
@@ -142,9 +142,9 @@ def test_with_volumes_kept_per_region_the_key_sets_the_part_free(bench):
     assert abs(bench.change()) < EXACT
     assert bench.field("keep_part").value
     press(bench.editor, "volumes.keep_part", False)
-    bench.settle()
-    assert abs(bench.change()) > 0.02
     assert bench.editor.status.startswith("Volume of arm free")
+    bench.pull(2.2)
+    assert abs(bench.change()) > 0.02
 
 
 def test_without_a_part_under_the_hand_nothing_changes_and_the_line_says_why(bench):
