@@ -45,7 +45,7 @@ from ..kernels import compiled_kernels, load_for, one_blas_thread
 from ..mesh import Mesh, SurfacePoint, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
-from ..solver import CONVERGED, Solution, SolverOptions, Status, VolumeConstraint, Volumes
+from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
     as_lids,
@@ -395,6 +395,11 @@ class Deformer:
         are several; "region 0" ... of the regions that enclose some; and the *parts*.
         """
         return (*self._enclosed.volume_names, *self._options.parts)
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies of the mesh, "body 0" ... of `volume_names`."""
+        return self._enclosed.bodies
 
     @one_blas_thread()
     def volumes(self, vertices: ArrayLike | None = None) -> dict[str, float]:

@@ -220,6 +220,9 @@ class Regions(Described, Frozen):
 
     def label_at(self, vertex: int) -> int:
         """Return the label of one *vertex*; if it is in one region, no weights are computed."""
+        if not is_whole(vertex, 0, self.mesh.n_vertices - 1):
+            last = self.mesh.n_vertices - 1
+            raise RegionError(f"vertex must be from 0 to {last}; got {shown(vertex)}")
         own = np.flatnonzero(self.membership[:, vertex])
         if len(own) == 1:
             return int(own[0])

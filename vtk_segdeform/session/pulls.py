@@ -204,16 +204,16 @@ def released(state: State, vertices: FloatArray) -> State:
     return replace(state, pose=pose, locality=None)
 
 
-def kept(state: State) -> State:
-    """Return *state* as it is for a change of volumes: nothing else moves what was pulled.
+def kept(state: State, vertices: FloatArray) -> State:
+    """Return *state*, with the mesh at *vertices*, for changes of volumes: nothing else moves it.
 
     All changes of volumes since the pull start from the same pose, so their order does not matter.
     """
     pose, locality = state.pose, state.locality
     if pose is None or locality is None or not locality.reach:
         return state
-    kept = replace(locality, reach=0.0, cage_vertices=pose.cage_vertices)
-    return replace(state, locality=kept)
+    here = replace(locality, reach=0.0, cage_vertices=pose.cage_vertices)
+    return replace(released(state, vertices), locality=here)
 
 
 def last_pulled(mesh: Mesh, state: State) -> str | None:

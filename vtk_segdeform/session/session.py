@@ -54,7 +54,7 @@ from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
-from . import finishing, handles, naming, output, painting, preparing, pulls, solving
+from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .listeners import Listener
@@ -312,16 +312,45 @@ class Session(Described):
         progress: Progress | None = None,
     ) -> None:
         """Segment the mesh automatically; see `vtk_segdeform.segment`."""
+        regions = self.segmented(n_regions, overlap=overlap, seed=seed, progress=progress)
+        self.history.step("segment", painting.with_regions(self.state, regions))
+
+    def segmented(
+        self,
+        n_regions: int | None = None,
+        *,
+        overlap: int | None = None,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> Regions:
+        """Return the regions of `segment`, without changing the session.
+
+        This may run in another thread; pass the result to `set_regions` in the session's thread.
+        """
         follows = preparing.following(self.state)
-        regions = segment(
+        return segment(
             self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
         )
-        self.history.step("segment", painting.with_regions(self.state, regions))
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
         """Set the regions; *label* names the undo step."""
         after = painting.with_regions(self.state, of_mesh(self.mesh, regions))
         self.history.step(require(label, str, "label"), after)
+
+    def attached(self, attach: Mapping[int, int | str], progress: Progress | None = None) -> State:
+        """Return the state after `attach`, without changing the session.
+
+        This may run in another thread; pass the result to ``history.step`` in the session's thread.
+        """
+        return separating.attached(self.poses, self.state, attach, progress)
+
+    def attach(self, attach: Mapping[int, int | str]) -> None:
+        """Let components follow others at once, by the option *attach* of `Options`.
+
+        Components that follow another one now, or no longer, get other regions and cages; the other
+        regions remain, and so does the pose, nearly.
+        """
+        self.history.step("change attached components", self.attached(attach))
 
     def region_name(self, region: int) -> str:
         """Return the name of a region, also of one that does not exist yet."""
@@ -660,7 +689,7 @@ class Session(Described):
 
     def volume_label(self, name: str) -> str:
         """Return the volume called *name* as people see it, who count from 1: "body 1", "arm"."""
-        return naming.volume_label(self.state.region_names, name)
+        return naming.volume_label(self.state.region_names, as_text(name, "name"))
 
     def forget_volume(self, name: str) -> None:
         """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
@@ -690,7 +719,7 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         as_text(name, "name")
-        state = pulls.kept(self.state)
+        state = pulls.kept(self.state, self.vertices)
         goals = {**dict(state.options.volumes), name: goal}
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)

@@ -17,9 +17,9 @@ from typing import Any
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
+from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.regions import segment as segment_mesh
 from vtk_segdeform.session import FinishedPose, State
 
 from ..handle_dragger import STEPS
@@ -171,9 +171,32 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
         return f"{_count(regions.n_regions, 'region')} found{_reset(controller, before)}"
 
     def work(progress: Progress) -> Regions:
-        return segment_mesh(session.mesh, n_regions, progress=progress)
+        return session.segmented(n_regions, progress=progress)
 
     controller.start("Detecting regions", work, show)
+
+
+def attaching(component: int, carrier: str, label: str) -> Action:
+    """Return the action that lets a *component* follow another one: its number, "free", "auto".
+
+    *label* names the undo step, and what has happened.
+    """
+
+    def attach(controller: Controller) -> None:
+        session, before = controller.session, controller.session.state
+        wanted = {k: other for k, other in before.options.attach if k != component}
+        if carrier != "auto":
+            wanted[component] = carrier if carrier == FREE else int(carrier)
+
+        def show(after: State) -> str:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while cages were being fitted. Try again")
+            session.history.step(label, after)
+            return label[:1].upper() + label[1:]
+
+        controller.start("Fitting cages", partial(session.attached, wanted), show)
+
+    return attach
 
 
 def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> None:

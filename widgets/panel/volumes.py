@@ -1,21 +1,34 @@
-"""The section with the volumes of the mesh by name, and the plane of symmetry."""
+"""The sections with the volumes of the mesh by name, and with its bodies."""
 
 from __future__ import annotations
 
+from functools import partial
 from weakref import WeakKeyDictionary
 
+import numpy as np
+
+from vtk_segdeform.geometry import FREE
+from vtk_segdeform.pictures import BODY, of_region, rgb
 from vtk_segdeform.session import Session
+from vtk_segdeform.solver import Bodies
 
 from ..editor import Action, Controller, DeformEditor, actions
-from ..volume_overlay import brief, percent
-from .fields import Field, Section, key_button, option
+from ..volume_overlay import brief, in_tenths, percent
+from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button, option
 
 _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
 _LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
 _DEFAULT, _KEEP, _FREE, _SET = "default", "keep", "free", "set"
 _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set", _SET))
+_MOST_BODIES, _AUTO, _NOTHING = 12, "auto", "Nothing"
+_COLUMNS = (
+    Column("volume", "Volume", "In the unit of the mesh, cubed"),
+    Column("change", "Change"),
+    Column("follows", "Follows"),
+)
 _SYMMETRY = (("None", "none"), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
 _chosen: WeakKeyDictionary[Controller, str] = WeakKeyDictionary()
+_bodies: WeakKeyDictionary[Session, Bodies] = WeakKeyDictionary()
 
 
 def volumes_section(editor: DeformEditor) -> Section:
@@ -104,6 +117,100 @@ def volumes_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
+
+
+def bodies_section(editor: DeformEditor) -> Section:
+    """Return the largest bodies, if there are several, and what they follow."""
+    session, name = editor.session, _chosen.get(editor.controller, "")
+    if session.is_bound:
+        _bodies[session] = session.deformer.bodies
+    bodies = _bodies.get(session)  # they are the same while other cages are being bound
+    count, shown = 0, dict[str, int | None]()
+    if bodies is not None:
+        count = int(np.count_nonzero(bodies.volumes > 0.0))
+        largest = np.argsort(-bodies.volumes, kind="stable")[: min(count, _MOST_BODIES)]
+        shown = {f"body {k}": _component(bodies, k) for k in largest.tolist()}
+    name = name if name in shown else next(iter(shown), "")
+    component = shown.get(name)
+    attached = _AUTO
+    choices = [("Automatic", _AUTO), (_NOTHING, FREE)]
+    if bodies is not None and component is not None:
+        attached = str(dict(session.options.attach).get(component, _AUTO))
+        others = {str(c) for c in shown.values() if c is not None} | {attached}
+        others -= {str(component), _AUTO, FREE}
+        choices += [(_carrier(bodies, int(c)), c) for c in sorted(others, key=int)]
+    return Section(
+        "bodies",
+        "Bodies",
+        (
+            Table(
+                "bodies.list",
+                "Body",
+                _COLUMNS,
+                tuple(_row(editor, each, c, is_chosen=each == name) for each, c in shown.items()),
+                "The closed parts of the mesh, the largest first. "
+                "The selected one is that of the section Volumes as well",
+                n_rows=4,
+                acts={"select": lambda keys: _choosing(next(iter(keys), ""))},
+            ),
+            Field(
+                "bodies.more",
+                "label",
+                "Not listed",
+                "Bodies that are smaller than those in the list",
+                value=f"{count - len(shown):,} smaller ones",
+                visible=count > len(shown),
+            ),
+            Field(
+                "bodies.follows",
+                "choice",
+                "Follows",
+                "What the selected body moves with; it gets other regions and cages at once",
+                value=attached,
+                enabled=component is not None,
+                choices=tuple(choices),
+                act=partial(_attaching, session.volume_label(name), component or 0, tuple(choices)),
+            ),
+        ),
+        visible=count > 1,
+    )
+
+
+def _attaching(
+    label: str, component: int, choices: tuple[tuple[str, str], ...], carrier: str
+) -> Action:
+    """Return the action that lets the body called *label* follow another one."""
+    what = next(text for text, each in choices if each == carrier).lower()
+    what = "automatically" if carrier == _AUTO else what
+    return actions.attaching(component, carrier, f"{label} follows {what}")
+
+
+def _component(bodies: Bodies, body: int) -> int | None:
+    """Return the outer component of a *body*; None for a chamber, which has none of its own."""
+    own = np.setdiff1d(np.flatnonzero(bodies.of_component == body), bodies.cavities)
+    return int(own[0]) if len(own) else None
+
+
+def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: bool) -> Row:
+    session = editor.session
+    bodies, regions = _bodies[session], session.regions
+    volume = change = follows = ""
+    if session.is_bound:
+        share = editor.widgets.overlay.region_volumes.change(name)
+        rest = float(bodies.volumes[int(name.rpartition(" ")[2])])
+        volume, change = f"{rest * (1.0 + share):.4g}", in_tenths(share)
+    colour = rgb(BODY)
+    if component is not None and regions is not None:
+        carrier = component if regions.carrier is None else int(regions.carrier[component])
+        follows = _NOTHING if carrier == component else _carrier(bodies, carrier)
+        colour = of_region(regions.label_at(int((session.mesh.components == component).argmax())))
+    cells = Cell(volume), Cell(change), Cell(follows)
+    return Row(name, _label(session, name), as_rgb(colour), cells, is_chosen)
+
+
+def _carrier(bodies: Bodies, component: int) -> str:
+    body = int(bodies.of_component[component])
+    return f"Body {body + 1}" if body >= 0 else f"Component {component + 1}"
 
 
 def _label(session: Session, name: str) -> str:

@@ -1,4 +1,4 @@
-"""The relative volume change (V - V0) / V0 of each region of a session.
+"""The relative volume change (V - V0) / V0 of regions and bodies of a session.
 
 A region is closed at its border as in `vtk_segdeform.solver.volume_constraints`.
 """
@@ -15,17 +15,17 @@ from vtk_segdeform.arrays import FloatArray, IntArray
 from vtk_segdeform.geometry import Lids
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
-from vtk_segdeform.solver import VolumeConstraint, volumes_by_label
+from vtk_segdeform.solver import Bodies, VolumeConstraint, volumes_by_label
 
 
 class RegionVolumes:
-    """The volume changes of the current regions in the current pose of a session."""
+    """The volume changes of regions and bodies in the current pose of a session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._volumes: tuple[Regions, Lids, dict[int, VolumeConstraint]] | None = None
-        self._own: _Own | None = None  # of the last `change`
-        self._last: tuple[FloatArray, _Own, float] | None = None
+        self._parts: dict[str, tuple[Bodies | VolumeConstraint, _Own]] = {}  # and what it is of
+        self._changes: tuple[FloatArray | None, dict[str, float]] = None, {}
 
     def changes(self) -> list[tuple[int, float]]:
         """Return the number and the volume change of each region that owns a face around a volume.
@@ -47,21 +47,33 @@ class RegionVolumes:
         return list(zip(owned, shares, strict=True))
 
     def change(self, name: str) -> float:
-        """Return the change of one volume, "region 0" ...; 0 if the region has none of its own."""
-        owned = self._owned().items() if self._session.state.pose is not None else ()
-        volume = next((each for region, each in owned if name == f"region {region}"), None)
-        if volume is None:
+        """Return the change of "region 0" or "body 0" ...; 0 if there is no such volume."""
+        if self._session.state.pose is None:
             return 0.0
-        x, own, last = self._session.vertices, self._own, self._last
-        if own is None or own.whole is not volume:
-            own = self._own = _Own.of(volume)
-        if last is None or last[0] is not x or last[1] is not own:
-            last = self._last = x, own, own.relative(x)
-        return last[2]
+        x = self._session.vertices
+        if self._changes[0] is not x:
+            self._changes = x, {}
+        known = self._changes[1]
+        if name not in known:
+            part = self._part(name)
+            known[name] = 0.0 if part is None else part.relative(x)
+        return known[name]
 
     def prepare(self) -> None:
         """Compute in advance everything the first call of `changes` needs."""
         self._owned()
+
+    def _part(self, name: str) -> _Own | None:
+        kind, _, number = name.rpartition(" ")
+        owned, bodies = self._owned(), self._session.deformer.bodies
+        source = owned.get(int(number)) if kind == "region" else bodies
+        if source is None:
+            return None
+        known = self._parts.get(name)
+        if known is None or known[0] is not source:
+            whole = bodies.body(int(number)) if isinstance(source, Bodies) else source
+            known = self._parts[name] = source, _Own.of(whole)
+        return known[1]
 
     def _owned(self) -> dict[int, VolumeConstraint]:
         mesh, regions = self._session.mesh, self._session.regions
@@ -75,16 +87,16 @@ class RegionVolumes:
 
 
 class _Own(NamedTuple):
-    """The volume of a region over the vertices that it depends on, which is faster."""
+    """A volume over the vertices that it depends on, which is faster than over all."""
 
-    whole: VolumeConstraint
-    """Over all vertices."""
     vertices: IntArray
     volume: VolumeConstraint
 
     @classmethod
     def of(cls, whole: VolumeConstraint) -> _Own:
-        assert whole.extension is not None
+        if whole.extension is None:
+            vertices, faces = np.unique(whole.faces, return_inverse=True)
+            return cls(vertices, replace(whole, faces=faces.reshape(-1, 3)))
         count, n = whole.extension.shape
         is_used = np.zeros(count, dtype=bool)
         is_used[whole.faces] = True
@@ -94,7 +106,7 @@ class _Own(NamedTuple):
         extension = sparse.vstack([sparse.eye_array(len(vertices)), means[:, vertices]])
         faces = (np.cumsum(is_used) - 1)[whole.faces]
         own = replace(whole, faces=faces, extension=sparse.csr_array(extension))
-        return cls(whole, vertices, own)
+        return cls(vertices, own)
 
     def relative(self, x: FloatArray) -> float:
         return self.volume.relative(x[self.vertices])
