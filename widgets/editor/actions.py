@@ -30,7 +30,7 @@ from .finishing import measured
 from .session_file import pose_remark, write_posed
 from .widget_set import Mode
 
-_GROWTH = 0.2  # of the volume of a part at rest, at each press
+_GROWTH = 20  # per cent of the volume of a part at rest, at each press
 
 Action = Callable[[Controller], None]
 
@@ -366,10 +366,10 @@ def keep_part(controller: Controller) -> None:
 
 
 def grow_part(controller: Controller) -> None:
-    """Let the part under the hand have 20 % more of its volume at rest than now."""
-    name, session = _part(controller), controller.session
-    goal = f"{100.0 * (session.volume(name)[1] + _GROWTH):+.12g}%"
-    setting_volume(name, goal)(controller)
+    """Let the part under the hand have 20 % more of its volume at rest than now, in whole %."""
+    name = _part(controller)
+    goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
+    setting_volume(name, f"{goal:+}%")(controller)
 
 
 def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
