@@ -56,7 +56,12 @@ def selector_of(controller: Controller) -> RegionSelector:
 
 def painting(target: Paint) -> Action:
     """Return the action that selects the *target* of painting."""
-    return assigning(selector_of, "paints", target)
+
+    def paint(controller: Controller) -> None:
+        selector_of(controller).paints = target
+        controller.widgets.show(controller.mode)
+
+    return paint
 
 
 # In all modes.
@@ -416,14 +421,32 @@ def select_all(controller: Controller) -> None:
         controller.say(selector.remark)
 
 
+def toggle_stiffness(controller: Controller) -> None:
+    """Paint the stiffness of the surface instead of regions, or regions again."""
+    is_on = controller.widgets.selector.paints is Paint.STIFFNESS
+    painting(Paint.REGION if is_on else Paint.STIFFNESS)(controller)
+
+
+def painting_stiffness(stiffness: float) -> Action:
+    """Return the action that selects a *stiffness* for painting."""
+
+    def choose(controller: Controller) -> None:
+        controller.widgets.selector.stiffness = stiffness
+        painting(Paint.STIFFNESS)(controller)
+
+    return choose
+
+
 def next_region(controller: Controller) -> None:
     """Select the next region for painting."""
+    painting(Paint.REGION)(controller)
     widgets = controller.widgets
     widgets.choose_region((widgets.selector.region + 1) % max(1, widgets.n_regions))
 
 
 def new_region(controller: Controller) -> None:
     """Start painting a new region."""
+    painting(Paint.REGION)(controller)
     controller.widgets.choose_region(controller.widgets.n_regions)
 
 

@@ -5,6 +5,8 @@ A hint names the key for that step, so that the user can reach every mode from e
 
 from __future__ import annotations
 
+import math
+
 from vtk_segdeform.session import Session, region_name, volume_label
 from vtk_segdeform.solver import Solution, Status
 
@@ -48,7 +50,8 @@ def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     if mode is Mode.DEFORM:
         return _deform_hint(widgets, keys)
     now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets, keys)
-    if mode is Mode.REGIONS and widgets.session.state.pose is not None:
+    resets = mode is Mode.REGIONS and widgets.selector.paints is Paint.REGION
+    if resets and widgets.session.state.pose is not None:
         now += ". A stroke resets the pose"
     next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
@@ -62,6 +65,9 @@ def _painting_hint(widgets: WidgetSet, keys: Keys) -> str:
         target = brief(name, region_name((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         target = "fixed vertices"
+    elif selector.paints is Paint.STIFFNESS:
+        is_rigid = selector.stiffness == math.inf
+        target = "rigid parts" if is_rigid else f"stiffness, {selector.stiffness:g} times as usual"
     else:
         target = "new handle" if selector.handle is None else selector.handle
     through = " (X-ray)" if selector.through else ""

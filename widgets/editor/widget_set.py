@@ -136,11 +136,10 @@ class WidgetSet:
 
     def enter(self, mode: Mode) -> None:
         """Activate the widget of *mode* and show its actors."""
-        if mode is Mode.REGIONS:
+        in_regions = self.selector.paints in (Paint.REGION, Paint.STIFFNESS)
+        if mode is Mode.REGIONS and not in_regions:
             self.selector.paints = Paint.REGION
-        elif mode is Mode.HANDLES and (
-            self.selector.paints is Paint.REGION or not self.session.handles
-        ):
+        elif mode is Mode.HANDLES and (in_regions or not self.session.handles):
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
         self.surface.instead = None
         self.show(mode)
@@ -155,6 +154,7 @@ class WidgetSet:
             regions=mode is Mode.REGIONS,
             handles=mode in (Mode.PULL, Mode.HANDLES, Mode.DEFORM),
             hidden=self.dragger.hidden,
+            stiffness=mode is Mode.REGIONS and self.selector.paints is Paint.STIFFNESS,
         )
         self.outlines.show(
             lines=self.regions_wanted and mode is not Mode.REGIONS,
@@ -184,7 +184,7 @@ class WidgetSet:
     def copy_settings(self, before: WidgetSet) -> None:
         """Use the same tools, sizes and display options as the widgets *before*."""
         mine, its = self.selector, before.selector
-        mine.tool, mine.through = its.tool, its.through
+        mine.tool, mine.through, mine.stiffness = its.tool, its.through, its.stiffness
         size = self.session.mesh.diagonal / before.session.mesh.diagonal
         mine.radius = size * its.radius
         self.puller.radius = size * before.puller.radius

@@ -31,8 +31,8 @@ from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .brush_ring import BrushRing
 from .outline import Outline
 from .paint_target import Paint, PaintTarget
-from .region_colours import RegionColours
-from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
+from .region_colours import RegionColours, stiffness_colours
+from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole, shares_of
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
@@ -59,12 +59,14 @@ class RegionSelector(Widget):
     Attributes
     ----------
     paints : Paint
-        Whether strokes paint a region, fixed vertices or a handle.
+        Whether strokes paint a region, fixed vertices, a handle or the stiffness.
     region : int
         The region to paint; the number of regions stands for a new one.
     handle : str or None
         The handle to paint, which need not exist yet.  With None, the next stroke creates a handle
         and sets its name here.
+    stiffness : float
+        The stiffness to paint, relative to the rest of the surface; infinite: rigid.
     through : bool
         Whether hidden vertices are painted too (X-ray).
     """
@@ -84,6 +86,7 @@ class RegionSelector(Widget):
         self.paints = Paint.REGION
         self.region = 0
         self.handle: str | None = None
+        self.stiffness = 10.0
         self.through = False
         self._tool = Tool.BRUSH
         self._radius = _RADIUS * session.mesh.diagonal
@@ -228,14 +231,18 @@ class RegionSelector(Widget):
                     self._draw_ring(pointer, target, erase)
             if pointer.phase is Phase.RELEASE:
                 stroke.extend(pointer)
-                self._apply(stroke.mask, target, erase)
+                self._apply(stroke, target, erase)
         finally:
             self.colours.preview(None)
             self._outline.hide()
 
     def _preview(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
         changed = target.changed(stroke.mask, erase=erase)
-        self.colours.preview(changed, rgb(PAPER) if erase else target.colour)
+        colour = rgb(PAPER) if erase else target.colour
+        if target.paint is Paint.STIFFNESS:
+            after = target.stiffened(shares_of(stroke), erase=erase)
+            colour = stiffness_colours(after[changed])
+        self.colours.preview(changed, colour)
         if stroke.outline is not None:
             self._outline.draw(stroke.outline)
 
@@ -266,14 +273,19 @@ class RegionSelector(Widget):
             self._hovered = ()
             self.colours.preview(None)
 
-    def _apply(self, vertices: BoolArray, target: PaintTarget, erase: bool) -> None:
+    def _apply(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
+        vertices = stroke.mask
         self.remark = target.remark(vertices, erase=erase)
-        if vertices.any():
+        if target.paint is Paint.STIFFNESS:
+            if vertices.any():
+                target.stiffen(shares_of(stroke), erase=erase)
+                self.remark = "Stiffness counts from the next move"
+        elif vertices.any():
             self.handle = target.erase(vertices) if erase else target.add(vertices)
 
     @property
     def _target(self) -> PaintTarget:
-        return PaintTarget(self.session, self.paints, self.region, self.handle)
+        return PaintTarget(self.session, self.paints, self.region, self.handle, self.stiffness)
 
     def _neighbours(self, vertices: BoolArray) -> BoolArray:
         """Return the vertices, (n,) bool, that share an edge with one of *vertices*."""
