@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 
 from .. import sizes
 from ..arrays import FloatArray, frozen
-from ..deformer import Deformer
+from ..deformer import Deformer, Mirror
 from ..errors import CageError
 from ..files import cache_folder
 from ..geometry import Lids, lids_of
@@ -280,6 +280,13 @@ class Poses:
     def carry(self, state: State, points: ArrayLike) -> FloatArray:
         """Return *points* (k, 3), given at rest, moved along with the mesh to the pose."""
         return self.bind(state).passengers(points).moved(state.cage_vertices)
+
+    def mirror(self, state: State) -> Mirror | None:
+        """Return the plane of symmetry with the option of *state*, if there is one."""
+        symmetry = state.options.symmetry
+        if symmetry is None:
+            return None
+        return self.memo.get("mirror", (symmetry,), lambda: Mirror.of(self.mesh, symmetry))
 
     # Volumes.
 

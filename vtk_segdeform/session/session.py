@@ -273,6 +273,11 @@ class Session(Described):
         return self.poses.lids(self.state)
 
     @property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry with ``options.symmetry``, and the mates of the vertices."""
+        return self.poses.mirror(self.state)
+
+    @property
     def solution(self) -> Solution | None:
         """The solver's result for the current pose; None at rest, after loading or undo."""
         return self.poses.solution(self.state)
@@ -837,7 +842,7 @@ class Session(Described):
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
         if options.symmetry != self.options.symmetry:
-            Mirror.of(self.mesh, options.symmetry)  # raises if the mesh is not symmetric
+            self.poses.mirror(replace(self.state, options=options))  # raises if it is not symmetric
         label = label_of_change(self.options, options)
         self.history.step(label, replace(self.state, options=options))
 

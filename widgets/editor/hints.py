@@ -67,9 +67,11 @@ def _painting_hint(widgets: WidgetSet, keys: Keys) -> str:
         target = "fixed vertices"
     elif selector.paints is Paint.STIFFNESS:
         is_rigid = selector.stiffness == math.inf
-        target = "rigid parts" if is_rigid else f"stiffness, {selector.stiffness:g} times as usual"
+        target = "rigid parts" if is_rigid else f"{selector.stiffness:g} times the usual stiffness"
     else:
         target = "new handle" if selector.handle is None else selector.handle
+    if widgets.session.options.symmetry and selector.paints in (Paint.FIXED, Paint.STIFFNESS):
+        target += " on both sides"
     through = " (X-ray)" if selector.through else ""
     return f"{keys[TOOLS[selector.tool]].label}: paint {target}{through}. Ctrl: erase"
 

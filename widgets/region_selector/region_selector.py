@@ -9,7 +9,8 @@ lasso, rectangle    start anywhere in the view
 all tools           a press with Alt held moves the camera
 ``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
 
-A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
+With a symmetry, strokes fix or stiffen both sides.  A change of regions resets the pose, as in
+`Session`; fixed vertices and handles keep it.
 `PaintTarget` says which vertices a stroke skips.
 """
 
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.arrays import BoolArray, is_number
+from vtk_segdeform.arrays import BoolArray, FloatArray, is_number
 from vtk_segdeform.checks import require, shown
 from vtk_segdeform.errors import ArgumentError, RegionError
 from vtk_segdeform.pictures import PAPER, rgb
@@ -231,16 +232,17 @@ class RegionSelector(Widget):
                     self._draw_ring(pointer, target, erase)
             if pointer.phase is Phase.RELEASE:
                 stroke.extend(pointer)
-                self._apply(stroke, target, erase)
+                self._apply(self._shares(stroke, target), target, erase)
         finally:
             self.colours.preview(None)
             self._outline.hide()
 
     def _preview(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
-        changed = target.changed(stroke.mask, erase=erase)
+        shares = self._shares(stroke, target)
+        changed = target.changed(shares > 0.0, erase=erase)
         colour = rgb(PAPER) if erase else target.colour
         if target.paint is Paint.STIFFNESS:
-            after = target.stiffened(shares_of(stroke), erase=erase)
+            after = target.stiffened(shares, erase=erase)
             colour = stiffness_colours(after[changed])
         self.colours.preview(changed, colour)
         if stroke.outline is not None:
@@ -273,12 +275,23 @@ class RegionSelector(Widget):
             self._hovered = ()
             self.colours.preview(None)
 
-    def _apply(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
-        vertices = stroke.mask
+    def _shares(self, stroke: Stroke, target: PaintTarget) -> FloatArray:
+        """Return `shares_of` a stroke, and of its mirror image where that has the same effect.
+
+        With a symmetry, fixed vertices and stiffness count on both sides.  A handle on both sides
+        could move along the plane only, and their regions are not mirrored.
+        """
+        shares = shares_of(stroke)
+        is_mirrored = target.paint in (Paint.FIXED, Paint.STIFFNESS)
+        mirror = self.session.mirror if is_mirrored else None
+        return shares if mirror is None else np.maximum(shares, shares[mirror.mates])
+
+    def _apply(self, shares: FloatArray, target: PaintTarget, erase: bool) -> None:
+        vertices = shares > 0.0
         self.remark = target.remark(vertices, erase=erase)
         if target.paint is Paint.STIFFNESS:
             if vertices.any():
-                target.stiffen(shares_of(stroke), erase=erase)
+                target.stiffen(shares, erase=erase)
                 self.remark = "Stiffness counts from the next move"
         elif vertices.any():
             self.handle = target.erase(vertices) if erase else target.add(vertices)

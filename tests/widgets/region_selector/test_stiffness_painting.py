@@ -163,7 +163,7 @@ def test_painting_stiffness_keeps_the_pose_and_the_mode_remembers_it():
     desk.editor.view.renderer.ResetCamera()
     desk.editor.view.render()
     desk.hand.types("s")
-    assert "stiffness, 10 times as usual" in desk.editor.status
+    assert "paint 10 times the usual stiffness" in desk.editor.status
     assert "resets the pose" not in desk.editor.status
     pose = session.state.pose
     desk.hand.click(desk.hand.at(session.vertices[session.vertices[:, 1].argmin()]))
@@ -182,3 +182,37 @@ def test_painting_stiffness_keeps_the_pose_and_the_mode_remembers_it():
     assert desk.selector.paints is Paint.REGION
     assert desk.hand.failures == []
     desk.editor.remove()
+
+
+@pytest.mark.parametrize("target", [Paint.STIFFNESS, Paint.FIXED, Paint.HANDLE])
+def test_with_a_symmetry_both_sides_are_fixed_or_stiffened_but_a_handle_is_on_one(desk, target):
+    x = desk.session.mesh.vertices
+    desk.session.change_options(symmetry="x")
+    desk.editor.mode = Mode.REGIONS if target is Paint.STIFFNESS else Mode.HANDLES
+    desk.selector.paints, desk.selector.radius = target, 0.2
+
+    def painted():
+        if target is Paint.STIFFNESS:
+            return np.ones(len(x)) if desk.stiffness is None else desk.stiffness
+        mask = np.zeros(len(x))
+        (ids,) = [desk.session.fixed] if target is Paint.FIXED else desk.session.handles.values()
+        mask[ids] = 1.0
+        return mask
+
+    idle = painted() if target is not Paint.HANDLE else np.zeros(len(x))
+    desk.hand.press(desk.under(0.5, 0.2))
+    during = desk.colours
+    desk.hand.release()
+    on_right = x[:, 0] > 0.2
+    assert (painted() != idle)[on_right].sum() > 5
+    if target is Paint.HANDLE:
+        assert_array_equal(painted()[~on_right], 0.0)
+        return
+    mates = desk.session.mirror.mates
+    assert_array_equal(x[mates[on_right], 0] < 0.0, True)
+    assert (painted() != idle)[~on_right].sum() > 5
+    changed = (during != desk.colours[x[:, 2].argmin()]).any(axis=1)
+    assert changed[~on_right].sum() > 5
+    desk.selector.tool, desk.selector.through = Tool.RECTANGLE, True
+    desk.hand.drag([(2, 2), (180, 398)], control=True)
+    assert_array_equal(painted(), idle)
