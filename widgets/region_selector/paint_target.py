@@ -64,7 +64,7 @@ class PaintTarget:
                 return np.array(regions.membership[self.region], dtype=bool)
             return np.zeros(session.mesh.n_vertices, dtype=bool)
         if self.paint is Paint.STIFFNESS:
-            return self._stiffness != 1.0
+            return np.asarray(self._stiffness != 1.0)
         ids = session.fixed if self.paint is Paint.FIXED else session.handles.get(self.handle or "")
         return self._mask([] if ids is None else ids)
 

@@ -135,6 +135,6 @@ def stiffness_colours(stiffness: FloatArray) -> NDArray[np.uint8]:
     with np.errstate(divide="ignore"):
         size = np.clip(np.log10(stiffness), -1.0, 1.0)[:, None]
     usual, ends = rgb(BODY).astype(float), np.where(size < 0.0, rgb(_SOFT), rgb(_STIFF))
-    colours = np.rint(usual + np.abs(size) * (ends - usual)).astype(np.uint8)
+    colours = usual + np.abs(size) * (ends - usual)
     colours[np.isinf(stiffness)] = rgb(INK)
-    return colours
+    return np.asarray(np.rint(colours), dtype=np.uint8)
