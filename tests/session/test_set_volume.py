@@ -153,6 +153,26 @@ def test_a_session_is_saved_with_its_goals_and_continues_alike(tmp_path):
     assert_allclose(share(again), 0.85, rtol=EXACT)
 
 
+def test_a_pull_whose_volumes_changed_is_saved_and_continues_alike(tmp_path):
+    session = SCENE.session()
+    tip = int(session.mesh.vertices[:, 1].argmax())
+    session.pull(tip, [0.0, 1.5, 0.2])
+    session.set_volume("region 1", "+10%")
+    session.commit()
+    path = tmp_path / "a.segdeform"
+    save_session(path, session)
+    with zipfile.ZipFile(path) as archive:
+        name = next(each for each in archive.namelist() if each.endswith("header.json"))
+        assert json.loads(archive.read(name))["version"] == 3  # earlier programs refuse it
+    again = load_session(path)
+    assert again.state.locality.reach == 0.0
+    for each in (session, again):
+        each.set_volume("region 1", "+15%")
+        each.commit()
+    assert_allclose(again.vertices, session.vertices, atol=1e-5)
+    assert_allclose(again.volume("region 1")[1], 0.15, atol=EXACT)
+
+
 def test_a_file_of_an_earlier_version_has_no_goals(tmp_path):
     """Options at their defaults are not in a file, so that earlier programs read it."""
     session = SCENE.session()

@@ -63,7 +63,7 @@ def volume_label(names: Names, volume: str) -> str:
     ('arm', 'body 1', 'wall')
     """
     kind, _, number = volume.rpartition(" ")
-    if not (kind and number.isdecimal()):
+    if kind not in ("body", "cavity", "component", "region") or not number.isdecimal():
         return volume
     return region_name(names, int(number)) if kind == "region" else f"{kind} {int(number) + 1}"
 

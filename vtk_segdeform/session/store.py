@@ -177,6 +177,7 @@ def _write(
     options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
     is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
     is_new = state.stiffness is not None or bool(state.slides)
+    is_new |= state.locality is not None and not state.locality.reach
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": 3 if is_new else 1 if is_simple else 2,

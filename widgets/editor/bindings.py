@@ -99,7 +99,7 @@ BINDINGS = (
     Binding("new_region", ("a",), R, "New region", actions.new_region),
     Binding("merge_region", ("m",), R, "Merge with region under pointer", actions.merge_region),
     Binding("split_region", ("x",), R, "Split region", actions.split_region),
-    Binding("paint_stiffness", ("s",), R, "Stiffness or regions", actions.toggle_stiffness),
+    Binding("paint_stiffness", ("s",), R, "Paint stiffness or regions", actions.toggle_stiffness),
     Binding("paint_fixed", ("s",), H, "Paint fixed vertices", actions.painting(Paint.FIXED)),
     Binding("paint_handle", ("d",), H, "Paint handle", actions.painting(Paint.HANDLE)),
     Binding("new_handle", ("a",), H, "New handle", actions.new_handle),

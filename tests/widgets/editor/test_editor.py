@@ -611,7 +611,7 @@ def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     bench.editor.mode = Mode.CAGES
     bench.type("s")  # surface, to VTK
     assert heard == []
-    said = "S works in mode 1 (Stiffness or regions), 3 (Paint fixed vertices)"
+    said = "S works in mode 1 (Paint stiffness or regions), 3 (Paint fixed vertices)"
     assert said in bench.editor.status
     bench.type("j")
     assert heard == ["char"]
