@@ -173,6 +173,45 @@ def test_a_pull_whose_volumes_changed_is_saved_and_continues_alike(tmp_path):
     assert_allclose(again.volume("region 1")[1], 0.15, atol=EXACT)
 
 
+def test_a_part_has_a_volume_under_a_lid_which_is_set_saved_and_removed(tmp_path):
+    session = SCENE.session()
+    x = session.mesh.vertices
+    top = (x[:, 2] > 0.2) & (np.abs(x[:, 0]) < 1.2)
+    session.set_part("bump", top)
+    rest, change = session.volume("bump")
+    assert (change, session.history.labels[-1]) == (0.0, "add the volume of bump")
+    assert 0.0 < rest < session.volume("whole")[0]
+    session.set_volume("bump", "+30%")
+    session.commit()
+    turned(session)
+    assert_allclose(session.volume("bump"), [1.3 * rest, 0.3], rtol=EXACT)
+    save_session(tmp_path / "a.segdeform", session)
+    again = load_session(tmp_path / "a.segdeform")
+    assert_array_equal(again.vertices, session.vertices)
+    assert_array_equal(dict(again.state.parts)["bump"], np.flatnonzero(top))
+    turned(again, 50.0)
+    assert_allclose(again.volume("bump")[1], 0.3, rtol=EXACT)
+    session.set_part("bump", None)
+    assert session.options.volumes == session.state.parts == ()
+    session.undo()
+    assert session.options.volumes == (("bump", "+30%"),)
+
+
+@pytest.mark.parametrize(
+    ("name", "ids", "says"),
+    [
+        ("whole", range(50), "there is a volume 'whole' already"), ("a", [0], "encloses no volume"),
+        ("a", [-1], "must index"), ("a", "all", "must contain vertex numbers"),
+        ("", range(50), "printable text"),
+    ],
+)  # fmt: skip
+def test_parts_that_are_wrong_are_refused(name, ids, says):
+    session = SCENE.session()
+    with pytest.raises((ConstraintError, SessionError, ValueError), match=says):
+        session.set_part(name, ids)
+    assert session.state.parts == ()
+
+
 def test_a_file_of_an_earlier_version_has_no_goals(tmp_path):
     """Options at their defaults are not in a file, so that earlier programs read it."""
     session = SCENE.session()

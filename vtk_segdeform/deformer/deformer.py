@@ -235,6 +235,7 @@ class Deformer:
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
         volumes: Goals | None = None,
+        parts: Mapping[str, ArrayLike] | None = None,
         slides: Iterable[Slide] | None = None,
         symmetry: Symmetry | EllipsisType = ...,
         avoid_contact: bool | None = None,
@@ -254,6 +255,8 @@ class Deformer:
         }
         if volumes is not None:
             given["goals"] = checked_goals(volumes)
+        if parts is not None:
+            given["parts"] = checked_parts(self.mesh, parts)
         if symmetry is not ...:
             given["mirror"] = Mirror.of(self.mesh, symmetry)
         if slides is not None:

@@ -130,15 +130,16 @@ class Poses:
             )
 
         found = self.memo.get("bound", _binding(state), bound, _KEPT)
-        symmetry, stiffness = state.options.symmetry, state.stiffness
-        if symmetry is None and stiffness is None:
+        symmetry, stiffness, parts = state.options.symmetry, state.stiffness, state.parts
+        if symmetry is None and stiffness is None and not parts:
             return found
 
         def made() -> Deformer:
-            mirrored = found if symmetry is None else found.hold(symmetry=symmetry)
-            return mirrored if stiffness is None else mirrored.stiffened(stiffness)
+            is_same = symmetry is None and not parts
+            other = found if is_same else found.hold(symmetry=symmetry, parts=dict(parts))
+            return other if stiffness is None else other.stiffened(stiffness)
 
-        return self.memo.get("made", (found, symmetry, stiffness), made)
+        return self.memo.get("made", (found, symmetry, stiffness, parts), made)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""

@@ -47,7 +47,7 @@ from ..deformer import (
     checked_place,
     checked_radius,
 )
-from ..errors import CageError, SessionError
+from ..errors import CageError, ConstraintError, SessionError
 from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
@@ -72,6 +72,7 @@ from .state import (
     fitting_cages,
     label_of_change,
     of_mesh,
+    owned_parts,
     owned_slides,
 )
 from .timeline import Timeline
@@ -695,6 +696,33 @@ class Session(Described):
     def volume_label(self, name: str) -> str:
         """Return the volume called *name* as people see it, who count from 1: "body 1", "arm"."""
         return naming.volume_label(self.state.region_names, as_text(name, "name"))
+
+    def set_part(self, name: str, vertices: ArrayLike | None) -> None:
+        """Let the part *vertices* of the surface have a volume called *name*, under a lid.
+
+        As the *parts* of `Deformer`; with None it has none any more, nor a goal.
+
+        Raises
+        ------
+        ConstraintError
+            If it encloses nothing, or another volume has this name.
+        """
+        as_text(name, "name")
+        others = tuple(pair for pair in self.state.parts if pair[0] != name)
+        after = replace(self.state, parts=others)
+        if vertices is None:
+            goals = tuple(pair for pair in self.options.volumes if pair[0] != name)
+            after = replace(after, options=replace(self.options, volumes=goals))
+            self.history.step(f"remove the volume of {name}", after)
+            return
+        if name in self.poses.bind(after).volume_names:
+            raise ConstraintError(f"there is a volume {name!r} already; choose another name")
+        after = replace(after, parts=(*others, *owned_parts(self.mesh, ((name, vertices),))))
+        try:
+            self.poses.bind(after).volume(name)
+        except ConstraintError as fault:
+            raise ConstraintError(f"vertices: {fault}") from None
+        self.history.step(f"add the volume of {name}", after)
 
     def forget_volume(self, name: str) -> None:
         """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
