@@ -361,9 +361,7 @@ def keep_part(controller: Controller) -> None:
     name, session = _part(controller), controller.session
     label = session.volume_label(name)
     if name in dict(session.options.volumes):
-        session.forget_volume(name)
-        session.refine(max_steps=STEPS)
-        controller.widgets.resume_refining()
+        forgetting_volume(name)(controller)
     else:
         is_kept = session.options.preserve_region_volumes
         setting_volume(name, "free" if is_kept else "keep")(controller)
@@ -384,10 +382,27 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
         session = controller.session
         session.set_volume(name, goal, max_steps=STEPS)
         session.commit(f"set the volume of {session.volume_label(name)}", join=join)
-        controller.widgets.resume_refining()
-        controller.finishing.rest()
+        _settle(controller)
 
     return change
+
+
+def forgetting_volume(name: str) -> Action:
+    """Return the action that lets a volume have no goal of its own."""
+
+    def forget(controller: Controller) -> None:
+        controller.session.forget_volume(name)
+        controller.session.refine(max_steps=STEPS)
+        _settle(controller)
+
+    return forget
+
+
+def _settle(controller: Controller) -> None:
+    """Let the pose converge in the next moments, and be finished unless it is that of a pull."""
+    controller.widgets.resume_refining()
+    if controller.session.state.locality is None:
+        controller.finishing.rest()
 
 
 def _part(controller: Controller) -> str:

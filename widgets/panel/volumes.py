@@ -232,5 +232,5 @@ def _choosing(name: str) -> Action:
 
 def _with_goal(name: str, kind: str, change: float) -> Action:
     if kind == _DEFAULT:
-        return lambda controller: controller.session.forget_volume(name)
+        return actions.forgetting_volume(name)
     return actions.setting_volume(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)
