@@ -19,8 +19,8 @@ from vtk_segdeform.widgets.panel.panel import all_sections, press
 pytestmark = pytest.mark.usefixtures("unprepared")
 
 SOLIDS = [
-    rod(0.5, 0.0, 4.0, n=16, step=0.3),
-    tube(0.55, 0.62, 1.0, 3.0, n=16, step=0.3),
+    rod(0.5, 0.0, 4.0, n=10, step=0.5),
+    tube(0.55, 0.62, 1.0, 3.0, n=10, step=0.5),
     ball(0.35, (1.8, 0.0, 2.0), 1),
 ]
 
@@ -38,6 +38,7 @@ def editing(session: Session) -> Iterator[DeformEditor]:
 
 def ready(*solids) -> Session:
     session = Session(joined(*solids))
+    session.change_options(n_cage_vertices=80)
     session.segment()
     session.fit_cages()
     session.bind()
