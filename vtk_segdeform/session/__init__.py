@@ -13,7 +13,7 @@ The files, in reading order:
     memo           the cache
     solving        the next pose of a state
     preparing      regions, cages and binding in advance
-    separating     regions of their own for components with handles
+    separating     components that follow others, and those with regions of their own
     finishing      poses finished on the mesh itself
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound

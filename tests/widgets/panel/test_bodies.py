@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 import numpy as np
@@ -16,7 +17,7 @@ from vtk_segdeform.widgets.editor.editor import DeformEditor
 from vtk_segdeform.widgets.panel.fields import Section
 from vtk_segdeform.widgets.panel.panel import all_sections, press
 
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 
 SOLIDS = [
     rod(0.5, 0.0, 4.0, n=10, step=0.5),
@@ -45,9 +46,16 @@ def ready(*solids) -> Session:
     return session
 
 
+@functools.cache
+def start() -> Session:
+    return ready(*SOLIDS)
+
+
 @pytest.fixture
 def editor():
-    yield from editing(ready(*SOLIDS))
+    session = Session(start().mesh, state=start().state)
+    session.bind()
+    yield from editing(session)
 
 
 def bodies(editor: DeformEditor) -> Section:
