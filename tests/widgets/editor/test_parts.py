@@ -16,6 +16,7 @@ from vtk_segdeform.widgets.editor.editor import DeformEditor
 from vtk_segdeform.widgets.editor.widget_set import Mode
 from vtk_segdeform.widgets.panel.panel import press, sections
 from vtk_segdeform.widgets.panel.status import status
+from vtk_segdeform.widgets.panel.toolbar import toolbar
 
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 
@@ -135,6 +136,9 @@ def test_a_part_grows_by_a_fifth_of_its_volume_at_rest_at_each_press(bench):
     assert_allclose(bench.change(), change + 0.2, atol=EXACT)
     assert press(bench.editor, "volumes.grow_part") is None
     assert_allclose(bench.change(), change + 0.4, atol=EXACT)
+    for expected in ((), (("region 1", "keep"),)):
+        assert press(bench.editor, "keep_part") is None  # in the toolbar
+        assert bench.session.options.volumes == expected
 
 
 def test_with_volumes_kept_per_region_the_key_sets_the_part_free(bench):
@@ -154,6 +158,7 @@ def test_without_a_part_under_the_hand_nothing_changes_and_the_line_says_why(ben
         bench.hand.types(key)
         assert "Pull the surface first" in bench.editor.status
         bench.hand.failures.pop()
+    assert not {f.name: f for f in toolbar(bench.editor)}["keep_part"].enabled
     assert not bench.field("keep_part").enabled
     assert bench.session.state is state
 
