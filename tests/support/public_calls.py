@@ -515,6 +515,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Painting.paint.vertices": lambda: [0, 1, 2],
     "Painting.rename.name": lambda: "arm",
     "Session.set_fixed.vertices": _left,
+    "Session.set_part.vertices": _left,
     "Painting.split.vertices": lambda: None,
     "Surface.at_vertices.values": lambda: np.arange(given().given.n_points),
     "Surface.of.soup": lambda: sd.mesh.mesh_of(mesh().vertices, mesh().faces),

@@ -227,6 +227,17 @@ class Regions(Described, Frozen):
         ahead = self.weights >= self.weights.max(axis=0) - _EQUAL_WEIGHT
         return np.asarray(np.argmax(ahead, axis=0), dtype=np.int64)
 
+    def label_at(self, vertex: int) -> int:
+        """Return the label of one *vertex*; if it is in one region, no weights are computed."""
+        if not is_whole(vertex, 0, self.mesh.n_vertices - 1):
+            last = self.mesh.n_vertices - 1
+            raise RegionError(f"vertex must be from 0 to {last}; got {shown(vertex)}")
+        own = np.flatnonzero(self.membership[:, vertex])
+        if len(own) == 1:
+            return int(own[0])
+        weights = self.weights[:, vertex]
+        return int(np.argmax(weights >= weights.max() - _EQUAL_WEIGHT))
+
     def members(self, region: int) -> IntArray:
         """Return the vertices of *region*, sorted."""
         require_region(region, self.n_regions)

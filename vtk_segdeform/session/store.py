@@ -177,6 +177,7 @@ def _write(
     options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
     is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
     is_new = state.stiffness is not None or bool(state.slides)
+    is_new |= bool(state.parts) or (state.locality is not None and not state.locality.reach)
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": 3 if is_new else 1 if is_simple else 2,
@@ -241,6 +242,9 @@ def _write(
             for ids, each in zip(sliding, state.slides, strict=True)
         ]
         arrays["sliding"] = np.concatenate(sliding)
+    if state.parts:
+        header["parts"] = [[name, len(ids)] for name, ids in state.parts]
+        arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -329,6 +333,11 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         more["slides"] = tuple(
             Slide(ids, *kind) for ids, (_, *kind) in zip(own, kinds, strict=True)
         )
+    if "parts" in header:
+        named = field(header, "parts", list_of(row_of(text, whole)))
+        lengths = [count for _, count in named]
+        own = split_rows(archive.array("parts", "i", (sum(lengths),)), lengths)
+        more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:
