@@ -7,8 +7,11 @@ import pytest
 from bodies import Scene, ball, bent, off_carrier, rod, tube
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
+from open_meshes import combined
+from solids import icosphere
 
 from vtk_segdeform.errors import SessionError
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session, load_session, save_session
 
@@ -184,3 +187,31 @@ def test_what_is_attached_follows_at_once_and_other_regions_remain():
 def test_attachments_of_a_session_are_checked(session, attach):
     with pytest.raises(SessionError, match="attach must map"):
         session.change_options(attach=attach)
+
+
+def test_a_slider_for_a_cavity_gives_it_regions_of_its_own_in_the_same_step(tmp_path):
+    x, faces = icosphere(2)
+    session = Session(combined(Mesh(1.2 * x, faces), Mesh(0.9 * x, faces)))
+    session.segment()
+    session.fit_cages()
+    before = session.state
+    assert before.regions.n_regions == 1
+    for share in (95, 90, 85):
+        session.set_volume("cavity", f"{share}%", max_steps=8)
+        session.commit("set the volume of cavity", join=True)
+    assert session.history.labels[-2:] == ("fit cages", "set the volume of cavity")
+    assert_array_equal(session.regions.leader, [0, 0])
+    assert_array_equal(session.regions.components, np.eye(2, dtype=bool))
+    assert not len(session.solution.crossings())
+    assert session.volume("cavity")[1] == pytest.approx(-0.15, abs=1e-12)
+    save_session(tmp_path / "hollow.segdeform", session)
+    other = load_session(tmp_path / "hollow.segdeform")
+    assert_array_equal(other.vertices, session.vertices)
+    assert_array_equal(other.regions.leader, [0, 0])
+    session.finish()  # without handles
+    session.undo()
+    assert session.state is before
+    again = Session(session.mesh)
+    again.change_options(volumes={"cavity": "85%"})
+    again.segment()
+    assert_array_equal(again.regions.leader, [0, 0])

@@ -361,7 +361,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "cages": cages,
     "carrier": lambda: None,
     "leader": lambda: None,
-    "apart": lambda: [],
+    "apart": list,
     "cache": lambda: Path("cache"),
     "callback": lambda: lambda: None,
     "direction": lambda: (0.0, 0.0, 1.0),

@@ -35,7 +35,7 @@ _NO_POINTS = np.empty((0, 3))
 _SPACINGS = 2.0
 # Weight of the gap between a component and its leader, times the scale of the shape energy; with
 # ten times more or less, hollow bodies bend alike.
-_LED, _GAPS = 100.0, 400  # and points at which it is kept, about
+_LED, _GAPS = 1.0, 400  # and points at which it is kept, about
 _LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
 
 
@@ -189,6 +189,17 @@ class Problem:
             carrier = np.where(part[found] == part, found, np.arange(len(part)))
         return Carrying(self.mesh, towards(carrier, roots))
 
+    def kept_gaps(self, ids: IntArray) -> FloatArray:
+        """Return the quadratic (m, m) that keeps the gaps between components and their leaders.
+
+        Those that have any of the vertices *ids* (k,) do not follow.
+        """
+        total, component = np.zeros_like(self.energy.quadratic), self.mesh.components
+        for k, rows in self._gaps.items():
+            if not (component[ids] == k).any():
+                total += _LED * self.energy.scale / len(rows) * (rows.T @ rows)
+        return total
+
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
 
@@ -198,10 +209,7 @@ class Problem:
         they are in, that they only prevent drifting.
         """
         component, energy = self.mesh.components, self.energy
-        inside, led = self.regions.components, np.zeros_like(self.energy.quadratic)
-        for k, rows in self._gaps.items():
-            if not (component[ids] == k).any():
-                led += _LED * energy.scale / len(rows) * (rows.T @ rows)
+        inside, led = self.regions.components, self.kept_gaps(ids)
         if not len(ids) or inside.shape[1] == 1:
             return led
         samples, (of_component, of_region) = self.samples, self.linked_parts

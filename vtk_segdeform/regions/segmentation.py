@@ -153,7 +153,7 @@ def segment(
 
 
 def with_regions_apart(carrier: IntArray, apart: ArrayLike) -> tuple[IntArray, IntArray | None]:
-    """Return the *carrier* (c,) without those around components *apart*, and these as leaders."""
+    """Return *carrier* (c,) without the trees of components *apart*, and the leaders in these."""
     own = np.arange(len(carrier))
     root = carrier
     while (root[root] != root).any():

@@ -5,7 +5,8 @@ fixed vertices or handles each, one of them may follow the other, whichever has 
 regions and cages.  Then each of them gets regions of its own, and new cages are fitted, in the same
 step as the edit.  Pins and pulled points do not count: they move all that lies together.
 
-The same happens where the option *attach* is changed by `attached`.  Regions of all others remain.
+The same happens where the option *attach* is changed by `attached`, and by `apart` where volumes of
+components are changed.  Regions of all others remain.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from types import MappingProxyType
 import numpy as np
 
 from ..arrays import IntArray
+from ..deformer import Goals, changing_components, checked_goals
 from ..errors import ArgumentError, SessionError
 from ..geometry import carriers, towards
 from ..progress import Progress, part
-from ..regions import Regions, segment
+from ..regions import Regions, segment, with_regions_apart
 from . import pulls, solving
 from .poses import Poses
 from .preparing import fitted, held_firmly
@@ -65,6 +67,21 @@ def attached(
     return replace(after, pose=solving.solve(poses, after, targets, progress=rest)[0])
 
 
+def apart(poses: Poses, state: State, goals: Goals) -> State:
+    """Return *state* with regions and cages for components whose volumes change by *goals*.
+
+    In the cage of another component they could not change.  They follow it in their own cages.
+    """
+    regions = state.regions
+    if regions is None or regions.carrier is None:
+        return state
+    changed = changing_components(poses.mesh, state.options.lids, checked_goals(goals))
+    carrier, leader = with_regions_apart(regions.carrier, changed)
+    if leader is None:
+        return state
+    return _with_regions(poses, state, _carried(regions, carrier, leader))
+
+
 def _with_regions(
     poses: Poses, state: State, regions: Regions, progress: Progress | None = None
 ) -> State:
@@ -105,8 +122,11 @@ def _separated(state: State) -> Regions | None:
     return _carried(regions, towards(before, np.concatenate([several, others])))
 
 
-def _carried(regions: Regions, after: IntArray) -> Regions:
-    """Return *regions* with carriers *after* (c,); components that lose theirs are segmented."""
+def _carried(regions: Regions, after: IntArray, leader: IntArray | None = None) -> Regions:
+    """Return *regions* with carriers *after* (c,); components that lose theirs are segmented.
+
+    Those of *leader* (c,) are added to the leaders.
+    """
     mesh, own = regions.mesh, np.arange(len(after))
     before = own if regions.carrier is None else regions.carrier
     stays = ((before == own) & (after == own))[mesh.components]
@@ -117,7 +137,10 @@ def _carried(regions: Regions, after: IntArray) -> Regions:
             rows.append(np.zeros(mesh.n_vertices, dtype=bool))
             rows[-1][kept[members]] = True
     membership = np.array([members for members in rows if members.any()])
-    return Regions(mesh, membership, regions.smoothness, after)
+    led = regions.leader
+    if leader is not None and led is not None:
+        led = np.where(leader != own, leader, led)
+    return Regions(mesh, membership, regions.smoothness, after, leader if led is None else led)
 
 
 def _roots(carrier: IntArray) -> IntArray:

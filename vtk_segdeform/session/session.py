@@ -61,7 +61,7 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
-from .separating import separated
+from .separating import apart, separated
 from .state import (
     Cages,
     Options,
@@ -333,7 +333,7 @@ class Session(Described):
 
         This may run in another thread; pass the result to `set_regions` in the session's thread.
         """
-        follows = preparing.following(self.state)
+        follows = preparing.following(self.mesh, self.state)
         return segment(
             self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
         )
@@ -752,8 +752,9 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         as_text(name, "name")
-        state = pulls.kept(self.state, self.vertices)
-        goals = {**dict(state.options.volumes), name: goal}
+        goals = {**dict(self.options.volumes), name: goal}
+        state = apart(self.poses, self.state, goals)
+        state = pulls.kept(state, self.poses.vertices(state))
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
@@ -872,7 +873,8 @@ class Session(Described):
         if options.symmetry != self.options.symmetry:
             self.poses.mirror(replace(self.state, options=options))  # raises if it is not symmetric
         label = label_of_change(self.options, options)
-        self.history.step(label, replace(self.state, options=options))
+        state = apart(self.poses, self.state, dict(options.volumes))
+        self.history.step(label, replace(state, options=options))
 
     # Undo and redo.
 

@@ -6,6 +6,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
     membership.npy        (r, n) bool      region by vertex                        if any
     carrier.npy           (c,) int         `Regions.carrier`                       if any
+    leader.npy            (c,) int         `Regions.leader`                        if any
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
@@ -177,6 +178,7 @@ def _write(
     options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
     is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
     is_new = state.stiffness is not None or bool(state.slides)
+    is_new |= regions is not None and regions.leader is not None
     is_new |= bool(state.parts) or (state.locality is not None and not state.locality.reach)
     header: dict[str, Any] = {
         "format": FORMAT,
@@ -202,6 +204,9 @@ def _write(
         if regions.carrier is not None:  # optional: earlier versions have the same membership
             header["n_components"] = len(regions.carrier)
             arrays["carrier"] = regions.carrier
+        if regions.leader is not None:
+            header["n_components"], header["has_leaders"] = len(regions.leader), True
+            arrays["leader"] = regions.leader
     if state.cages:
         arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
         arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
@@ -264,11 +269,13 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     regions = None
     if r:
         membership = archive.array("membership", "b", (r, n))
-        carrier = None
+        carrier = leader = None
         if "n_components" in header:
             count = field(header, "n_components", whole)
             carrier = archive.array("carrier", "i", (count,))
-        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier)
+            if "has_leaders" in header:
+                leader = archive.array("leader", "i", (count,))
+        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier, leader)
     counts = field(header, "cages", list_of(row_of(whole, whole)))
     n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
     total = sum(n_vertices)
