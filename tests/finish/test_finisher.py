@@ -507,6 +507,15 @@ def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
     assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13
 
 
+def test_a_mirrored_pose_far_from_its_volume_is_not_moved_there():
+    mesh, held = SCENE.mesh, np.arange(SCENE.mesh.n_vertices) > 2
+    swollen = Problem(mesh, held, 1.5 * mesh.vertices[held], mesh.vertices)
+    finisher = swollen.finisher()
+    found = finisher.run(swollen.start, swollen.places)
+    made = finisher.made(found, lambda x: x)
+    assert np.abs(made.vertices - found.vertices).max() < mesh.diagonal
+
+
 def test_what_is_within_the_length_of_held_vertices_moves_along_with_them():
     """Without a volume, as by the matrix of the finish without a force at free vertices."""
     problem = bent(sheet())
