@@ -91,7 +91,7 @@ class Random:
         pose = self.session.state.pose
         if pose is None or pose.finished is None:
             return
-        if not pose.finished.offset.any():  # the pose of the cages, because it cannot be finished
+        if np.abs(pose.finished.offset).max() < 1e-9 * SIZE:  # it cannot be finished
             self.unfinished += 1
             return
         self.finished += 1

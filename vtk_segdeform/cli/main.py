@@ -52,7 +52,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "open", "mechanisms", "paper", "peers")
+EXPERIMENTS = ("drag", "constraints", "open", "mechanisms", "paper", "peers")
 
 _SELECTION = """\
 selections (SEL):
