@@ -21,7 +21,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
 from ..deformer import Deformer, Slide, checked_goals, clamped, finished, solved_along
 from ..errors import ArgumentError, ConstraintError, MeshError
-from ..geometry import lids_of
+from ..geometry import checked_attach, lids_of
 from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
@@ -119,6 +119,8 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.output is not None:
         io.require_writable(options.output)
     session = opened(options.input)
+    if attach := checked_attach(dict(options.attach), int(session.mesh.components.max()) + 1):
+        session.change_options(attach=attach)
     require_screen()
     session = plugin.edit(
         session,

@@ -282,6 +282,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = add_command("edit", "deform a mesh or a saved session in a window")
     text = "the deformed mesh, written when the window is closed"
     _input_output(sub, text, session=True)
+    _attach(sub)
 
     sub = add_command("app", "open the desktop program")
     sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="mesh or session file")
