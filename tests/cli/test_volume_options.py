@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from open_meshes import combined
+from organs import surface_of
 
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
@@ -70,6 +71,31 @@ def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
     before = volumes(hollow, hollow.vertices)
     assert_allclose(np.divide(after, before), [1.0, 1.03], rtol=1e-12)
     assert "wall: " in capsys.readouterr().out
+
+
+def test_organs_of_a_label_map_are_called_by_their_labels(tmp_path, capsys):
+    path, out = tmp_path / "organs.vtp", tmp_path / "out.vtp"
+    labels = np.zeros((12, 12, 12), dtype=int)
+    labels[2:10, 2:10, 2:7], labels[2:10, 2:10, 7:10] = 30, 4
+    surface_of(labels).save(path)
+    assert main(["deform", str(path), "-o", str(out), "--volume", "label 4=-10%", *QUICK]) == 0
+    assert ", -10 % of the original" in capsys.readouterr().out
+    (body,) = Surface.read(path).labels()[4]
+    for goal, says in (
+        ("label 5=keep", "there is no single volume 'label 5'; there are label 4: body"),
+        (f"{body}=keep", "given twice for the same volume: label 4, "),
+    ):
+        words = ["--volume", "label 4=-10%", "--volume", goal]
+        assert main(["deform", str(path), "-o", str(out), *words, *QUICK]) == 2
+        assert says in capsys.readouterr().err
+
+
+def test_only_a_format_in_metres_has_volumes_in_ml(hollow, given, tmp_path, capsys):
+    write_mesh(tmp_path / "hollow.glb", hollow)
+    for path, has_unit in ((str(tmp_path / "hollow.glb"), True), (given, False)):
+        words = ["deform", path, "-o", str(tmp_path / "out.ply"), "--volume", "cavity=0.02"]
+        assert main([*words, *QUICK]) == 0
+        assert ("cavity: 0.02 m^3 (20000 ml), " in capsys.readouterr().out) == has_unit
 
 
 @pytest.mark.parametrize(

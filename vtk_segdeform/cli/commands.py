@@ -88,7 +88,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options)
     report_solution(stored, seconds, say)
-    report_goals(stored, say)
+    report_goals(stored, surface, options.input, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")
     if options.picture is not None:
@@ -227,6 +227,10 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
     """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
+    names = {name: name if name in parts else _labelled(name, surface) for name in goals}
+    if twice := [name for name in goals if list(names.values()).count(names[name]) > 1]:
+        raise ConstraintError(f"--volume is given twice for the same volume: {', '.join(twice)}")
+    goals = {names[name]: goal for name, goal in goals.items()}
     try:  # before the pose is solved, not when it is written
         surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
     except ArgumentError as fault:
@@ -238,6 +242,19 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
         "slides": [_slide(text, surface) for text in options.slide],
         "symmetry": options.symmetry,
     }
+
+
+def _labelled(name: str, surface: Surface) -> str:
+    """Return the name of the volume that is called *name*, which may be a label, as "label 3"."""
+    kind, _, number = name.partition(" ")
+    if kind != "label":
+        return name
+    labels = surface.labels()
+    volumes = labels.get(int(number), ()) if number.isdecimal() else ()
+    if len(volumes) == 1:
+        return volumes[0]
+    known = "; ".join(f"label {k}: {' and '.join(each)}" for k, each in sorted(labels.items()))
+    raise ConstraintError(f"there is no single volume {name!r}; there are {known or 'no labels'}")
 
 
 def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:

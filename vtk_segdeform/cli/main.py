@@ -435,8 +435,8 @@ def _constraints(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     text = (
         "a volume: keep, free, 2.5 (in the mesh's unit, cubed), 40%%, +10%% or -40%%, also after "
-        "'at least' or 'at most'; NAME is whole, body 0, cavity, wall, component 0, region 0, or a "
-        "part; may be repeated"
+        "'at least' or 'at most'; NAME is whole, body 0, cavity, wall, component 0, region 0, a "
+        "part, or label 3 of a label map; may be repeated"
     )
     add("--volume", action="append", default=[], metavar="NAME=GOAL", help=text)
     text = "a part of the surface, whose volume is that under a lid; may be repeated"

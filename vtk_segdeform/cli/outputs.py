@@ -62,11 +62,19 @@ def report_solution(solution: Solution, seconds: float, say: Say) -> None:
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
 
 
-def report_goals(solution: Solution, say: Say) -> None:
-    """Print the volumes with goals, and their changes, by name."""
+def report_goals(solution: Solution, surface: Surface, path: Path, say: Say) -> None:
+    """Print the volumes with goals, and their changes, by name and label.
+
+    Of the formats of *path*, glTF alone tells its unit, the metre.
+    """
+    labels = {volume: k for k, volumes in surface.labels().items() for volume in volumes}
+    is_in_metres = path.suffix.lower() in (".glb", ".gltf")
     for name, change in solution.volume_changes.items():
         volume = solution.volumes[name]
-        say(f"volume          {name}: {volume:.6g}, {100 * change:+.4g} % of the original")
+        unit = f" m^3 ({1e6 * volume:.6g} ml)" if is_in_metres else ""
+        label = f"label {labels[name]}, " if name in labels else ""
+        text = f"{label}{name}: {volume:.6g}{unit}"
+        say(f"volume          {text}, {100 * change:+.4g} % of the original")
 
 
 def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:

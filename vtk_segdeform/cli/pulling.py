@@ -64,7 +64,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options)
     report_volume(stored.volume_change, say)
-    report_goals(stored, say)
+    report_goals(stored, surface, options.input, say)
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
