@@ -48,6 +48,7 @@ def test_deform_sets_volumes_without_a_handle(hollow, given, tmp_path, capsys):
     assert_allclose(np.divide(after, before), [0.6, 1.0], rtol=1e-12)
     printed = capsys.readouterr().out
     assert f"volume          cavity: {after[0]:.6g}, -40 % of the original" in printed
+    assert "handle error" not in printed
     wall = next(line for line in printed.splitlines() if " wall: " in line)
     assert f"wall: {after[1]:.6g}, " in wall
     assert abs(float(wall.split(",")[1].split("%")[0])) < 1e-10
@@ -104,7 +105,7 @@ def test_only_a_format_in_metres_has_volumes_in_ml(hollow, given, tmp_path, caps
         ([], "nothing would move: add --handle SEL with a motion, or --volume"),
         (["--volume", "cavity"], "--volume must be a name and a value, as whole=+10%; got"),
         (["--volume", "=keep"], "--volume must be a name and a value"),
-        (["--volume", "belly=keep"], "there is no volume 'belly'; there are whole, cavity, wall"),
+        (["--volume", "belly=keep"], "there is no volume 'belly'; there are whole, cavity"),
         (["--volume", "wall=much"], "the goal of the volume 'wall' must be keep"),
         (["--volume", "wall=-100%"], "the volume of 'wall' must be positive"),
         (["--volume", "wall=keep", "--volume", "whole=+1%"], "follows from that of 'wall'"),

@@ -87,7 +87,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options)
-    report_solution(stored, seconds, say)
+    report_solution(stored, seconds, say, has_handle=len(handle) > 0)
     report_goals(stored, surface, options.input, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
     say(f"written         {options.output}")

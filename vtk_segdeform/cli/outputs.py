@@ -54,11 +54,14 @@ def report_cages(cages: Sequence[Cage], say: Say) -> None:
     say(f"cages           {' + '.join(map(str, counts))} = {sum(counts)} vertices")
 
 
-def report_solution(solution: Solution, seconds: float, say: Say) -> None:
-    """Print the volume change, the handle error and the time of a solution."""
+def report_solution(
+    solution: Solution, seconds: float, say: Say, *, has_handle: bool = True
+) -> None:
+    """Print the volume change, the error of a handle, if there is one, and the time."""
     each = 1e3 * seconds / max(solution.steps, 1)
     report_volume(solution.volume_change, say)
-    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
+    if has_handle:
+        say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
 
 
