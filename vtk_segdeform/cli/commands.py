@@ -34,6 +34,7 @@ from .outputs import (
     Say,
     coloured_cages,
     coloured_regions,
+    report_approximate,
     report_cages,
     report_goals,
     report_pose,
@@ -90,6 +91,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_solution(stored, seconds, say, has_handle=len(handle) > 0)
     report_goals(stored, surface, options.input, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)

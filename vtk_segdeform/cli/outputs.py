@@ -102,6 +102,12 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
         say(f"parts           {solution.unmoved_summary(mesh)}")
 
 
+def report_approximate(solution: Solution, options: Namespace, say: Say) -> None:
+    """Print if the pose has constraints that only a finish places exactly, and is not finished."""
+    if (options.rigid or options.slide or options.symmetry) and not solution.is_finished:
+        say("constraints     rigid parts, slides and symmetry are approximate: pose not finished")
+
+
 def written(surface: Surface, solution: Solution, options: Namespace) -> Solution:
     """Write *surface* in a pose, and return the pose as it is in the file of *options*.
 

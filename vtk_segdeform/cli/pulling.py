@@ -21,6 +21,7 @@ from .outputs import (
     HANDLE_TOLERANCE,
     LIDS,
     Say,
+    report_approximate,
     report_goals,
     report_pose,
     report_surface,
@@ -68,6 +69,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(
