@@ -33,6 +33,7 @@ class Random:
     def begin(self) -> None:
         """Begin a new session; pulls leave handles, which would fill the surface."""
         self.session = session = sd.Session(BODY)
+        self.failed = []  # poses of the cages, which could not be finished
         labels = np.digitize(X[:, 2], [-0.5, 0.8])
         session.set_regions(sd.Regions.from_labels(BODY, labels, overlap=1))
         session.change_options(n_cage_vertices=70)
@@ -77,7 +78,8 @@ class Random:
     def _finished(self) -> bool:
         self.session.commit()
         self.session.refine()
-        self.session.finish()
+        if not self.session.finish().is_finished:
+            self.failed.append(self.session.state.pose.finished)
         return True
 
     def _undo(self) -> bool:
@@ -91,7 +93,7 @@ class Random:
         pose = self.session.state.pose
         if pose is None or pose.finished is None:
             return
-        if np.abs(pose.finished.offset).max() < 1e-9 * SIZE:  # it cannot be finished
+        if any(pose.finished is each for each in self.failed):
             self.unfinished += 1
             return
         self.finished += 1
