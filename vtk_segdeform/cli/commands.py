@@ -29,7 +29,6 @@ from ..regions import Regions, segment
 from ..session import Session, load_session
 from . import motion
 from .outputs import (
-    HANDLE_TOLERANCE,
     LIDS,
     Say,
     coloured_cages,
@@ -42,6 +41,7 @@ from .outputs import (
     report_session,
     report_solution,
     report_surface,
+    require_met,
     written,
 )
 from .selection import Role, parse_selection
@@ -96,11 +96,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
         say(f"written         {options.picture}")
-    if solution.handle_error > HANDLE_TOLERANCE:
-        raise MeshError(
-            f"{options.output} was written, but a handle misses its target by "
-            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
-        )
+    require_met(solution, options.output, "a handle")
     _require_turns(options, surface, fixed, solution.vertices)
     return True
 

@@ -85,6 +85,7 @@ exit codes:
        and pull also where the report says that the pose has crossings, folds or not converged
   1    the command failed; for check: it cannot be deformed, or the repair left it open; for deform
        and pull also where the mesh was written, but a handle misses its target by 0.1 % of its size
+       or a volume its goal
   2    usage error
   130  interrupted by Ctrl+C
 """

@@ -19,6 +19,7 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
+from ..errors import MeshError
 from ..io import Surface, polydata_of, stored_vertices, to_polydata, volume_change
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
@@ -30,6 +31,7 @@ Say = Callable[[str], None]
 """Prints one line."""
 
 HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
+_VOLUME_TOLERANCE = 1e-9  # the same of a volume with a goal, relative
 _ADVICE = "move less, or add cage vertices"
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
@@ -100,6 +102,23 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
     say(f"folds           {folded}")
     if len(solution.unmoved):
         say(f"parts           {solution.unmoved_summary(mesh)}")
+
+
+def require_met(solution: Solution, path: Path, what: str) -> None:
+    """Raise a MeshError if *what* is moved misses its target, or a volume its goal.
+
+    *solution* is that in memory; the one in the file at *path* may be rounded.
+    """
+    if solution.handle_error > HANDLE_TOLERANCE:
+        raise MeshError(
+            f"{path} was written, but {what} misses its target by "
+            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
+        )
+    if solution.volumes and solution.volume_error > _VOLUME_TOLERANCE:
+        raise MeshError(
+            f"{path} was written, but a volume is off by "
+            f"{100 * solution.volume_error:.3g} %: {solution.status}"
+        )
 
 
 def report_approximate(solution: Solution, options: Namespace, say: Say) -> None:

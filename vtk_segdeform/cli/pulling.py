@@ -9,7 +9,7 @@ from .. import io
 from ..arrays import FloatArray
 from ..deformer import checked_place, checked_radius, fault_of_grab, place_text
 from ..deformer import pull as pulled
-from ..errors import ConstraintError, MeshError
+from ..errors import ConstraintError
 from ..geometry import lids_of
 from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
@@ -18,7 +18,6 @@ from ..progress import Progress
 from .commands import constraints_of
 from .motion import parse_vector
 from .outputs import (
-    HANDLE_TOLERANCE,
     LIDS,
     Say,
     report_approximate,
@@ -26,6 +25,7 @@ from .outputs import (
     report_pose,
     report_surface,
     report_volume,
+    require_met,
     written,
 )
 
@@ -76,11 +76,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
             options.picture, mesh, solution.vertices, fixed=pinned, handle=point.corners
         )
         say(f"written         {options.picture}")
-    if solution.handle_error > HANDLE_TOLERANCE:
-        raise MeshError(
-            f"{options.output} was written, but the point misses its target by "
-            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
-        )
+    require_met(solution, options.output, "the point")
     return True
 
 
