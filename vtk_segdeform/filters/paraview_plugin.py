@@ -134,9 +134,8 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
     @smproperty.stringvector(name="Attach", default_values="")
     def SetAttach(self, text: str) -> None:  # noqa: N802
         """Set the components that others follow, as 1=0 2=free."""
-        pairs = [each.partition("=")[::2] for each in text.replace(",", " ").split()]
-        numbers = [[int(k) if k.isdecimal() else k for k in pair] for pair in pairs]
-        super().SetAttach(dict(numbers))
+        pairs = (each.partition("=")[::2] for each in text.replace(",", " ").split())
+        super().SetAttach({int(k): int(on) if on.isdecimal() else on for k, on in pairs})
 
     @smproperty.intvector(name="PreserveVolume", default_values=1)
     @smdomain.xml('<BooleanDomain name="bool"/>')

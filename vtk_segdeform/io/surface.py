@@ -178,7 +178,8 @@ class Surface(Described):
             of_face[tuple(face)] = set(pair) - {0}
         lids = lids_of(self.mesh)
         bodies = Bodies(self.mesh, total_volume(self.mesh, lids), lids)
-        around = {f"body {k}": bodies.body(k) for k in np.flatnonzero(bodies.volumes > 0.0)}
+        own_volumes = np.flatnonzero(bodies.volumes > 0.0).tolist()
+        around = {f"body {k}": bodies.body(k) for k in own_volumes}
         around |= {f"cavity {k}": bodies.component(c) for k, c in enumerate(bodies.cavities)}
         found: dict[int, tuple[str, ...]] = {}
         for volume, constraint in around.items():
