@@ -44,6 +44,7 @@ from ..solver import (
     Status,
     Step,
     VolumeConstraint,
+    are_met,
     constrained_step,
     minimise,
     moved_along,
@@ -57,6 +58,7 @@ _STEPS = 200  # at most
 _TOLERANCE = 0.03 * CONVERGED  # diagonals; a step that moves less is the last
 # Where something comes to cross: rounds, factor of w, and rings around the faces, of a hold.
 _HOLDS, _FIRMER, _RINGS = 8, 10.0, 2
+_LANDINGS = 3  # on several volumes, of which the first is inexact where the surface is crumpled
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 
 
@@ -165,8 +167,12 @@ class Finisher:
         """
         x = found.vertices.copy()
         x[self._free] = change(x)[self._free]
-        directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
-        return replace(found, vertices=self._landed_near(x, directions))
+        for _ in range(_LANDINGS):
+            directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
+            x = self._landed_near(x, directions)
+            if are_met(self._constraints, x):
+                break
+        return replace(found, vertices=x)
 
     def _apart(self, found: Finish, progress: Progress | None) -> Finish:
         """Return *found* with w raised around faces that do not cross in y, until they do not."""
