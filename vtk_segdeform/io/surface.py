@@ -167,7 +167,7 @@ class Surface(Described):
             The body of each label, or its bodies if it has several parts, or the cavity if it is
             inside of another label, as ``{1: ("body 0",), 2: ("body 1", "body 2")}``.
         """
-        sides = np.asarray(self._given.cell_data.get(name, ()))
+        sides = np.asarray(self._given.cell_data.get(as_text(name, "name"), ()))
         if sides.ndim != 2 or sides.shape[1] != 2 or sides.dtype.kind not in "iu":
             return {}
         triangles, polygon = cut_into_triangles(self._soup.points, *polygons_of(self._given))
