@@ -69,7 +69,7 @@ def check(scene: Scene, solution: Solution) -> None:
 HOLLOW = "lining", "rod in a tube"
 
 
-OFTEN = ("sleeve", "tight fine sleeve", "lining", "beads")
+OFTEN = "sleeve", "lining", "beads"
 RARE = sorted({*SCENES} - {*OFTEN})
 
 
@@ -120,11 +120,11 @@ def test_what_is_attached_by_hand_follows_and_what_is_free_stays():
     scene = bent(arm(), ball(0.3, [1.6, 0.0, 2.0]), tube(0.55, 0.62, 1.0, 3.0))
     mesh, is_ball = scene.mesh, scene.mesh.components == 1
     given = mesh, scene.fixed, scene.handle, scene.targets(45.0)
-    for attach in ({2: "free"}, {1: 2, 2: "free"}):
-        x = deform(*given, attach=attach, refine=False).vertices
-        assert_allclose(x[mesh.components != 0], mesh.vertices[mesh.components != 0], atol=1e-9)
-    x = deform(*given, attach={1: 0}, refine=False).vertices
+    x = deform(*given, attach={1: 2, 2: "free"}, refine=False).vertices
+    assert_allclose(x[mesh.components != 0], mesh.vertices[mesh.components != 0], atol=1e-9)
+    x = deform(*given, attach={1: 0, 2: "free"}, refine=False).vertices
     assert np.linalg.norm(x - mesh.vertices, axis=1)[is_ball].max() > 0.2
+    assert_allclose(x[mesh.components == 2], mesh.vertices[mesh.components == 2], atol=1e-9)
     x = deform(*given, refine=False).vertices
     assert_allclose(x[is_ball], mesh.vertices[is_ball], atol=1e-12)
 

@@ -45,6 +45,8 @@ from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.solver.exact_volume import moved_along, slopes_along
+from vtk_segdeform.solver.volume_constraints import region_volumes, violations
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 
 MESH = models.torus(3000)
@@ -272,6 +274,26 @@ def test_on_open_meshes_volumes_and_normals_agree(twin, name, monkeypatch):
         ):
             quick, plain = twin(call)
             assert_allclose(quick, plain, rtol=1e-12, atol=1e-12)
+
+
+def test_motions_along_directions_of_several_volumes_agree(twin, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
+    mesh = Surface(bottle(5, 3)).mesh
+    labels = np.digitize(mesh.vertices[:, 2], np.quantile(mesh.vertices[:, 2], [0.3, 0.6]))
+    constraints = region_volumes(mesh, labels)
+    assert len(constraints) == 3
+    paths = np.hstack([mesh.vertices, RNG.normal(size=(mesh.n_vertices, 9))])
+    x = mesh.vertices + 0.01 * RNG.normal(size=mesh.vertices.shape)
+    for call in (
+        partial(slopes_along, constraints, x, paths),
+        partial(moved_along, paths, np.array([0.3, -2.0, 0.7])),
+    ):
+        quick, plain = twin(call)
+        assert_allclose(quick, plain, rtol=1e-12, atol=1e-12)
+    step = 1e-6 * np.eye(3)
+    moved = [violations(constraints, x - paths[:, :3] + moved_along(paths, t)) for t in step]
+    slopes = (np.transpose(moved) - violations(constraints, x)[:, None]) / 1e-6
+    assert_allclose(slopes_along(constraints, x, paths), slopes, rtol=1e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", OPEN)

@@ -75,6 +75,9 @@ class Limit:
 
     is_always_active = False
 
+    def renewed(self, p):
+        return self
+
     def value_and_slope(self, p, x=None):
         return 0.0, np.zeros_like(p)
 

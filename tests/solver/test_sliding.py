@@ -23,7 +23,8 @@ def sliding(along, direction, weight=2.5):
     rng = np.random.default_rng(3)
     track = guides([Slide(CAP, along, direction)], BODY)[0].track
     rows = rng.dirichlet(np.ones(6), len(CAP))
-    return Sliding(rows, track, weight), 1.5 * rng.normal(size=(6, 3)) + [0.0, 0.0, 1.3]
+    p = 1.5 * rng.normal(size=(6, 3)) + [0.0, 0.0, 1.3]
+    return Sliding.at(p, (np.arange(6), rows), track, weight), p
 
 
 @pytest.mark.parametrize(("along", "direction"), KINDS)
@@ -59,15 +60,19 @@ def test_of_planes_and_lines_it_is_quadratic(along, direction):
     assert_allclose(term.hessian(p) @ stacked, (there - here).T.ravel())
 
 
-def test_on_its_surface_the_hessian_is_that_of_the_distance():
-    """On the surface itself c(x) = x, where the term of the curvature vanishes."""
+def test_the_planes_of_a_surface_are_renewed():
     track = guides([Slide(CAP, "surface")], BODY)[0].track
-    faces = BODY.vertices[BODY.faces[:9]].mean(axis=1)  # inside faces, so that these are tangent
-    term, step = Sliding(np.eye(9), track, 2.0), np.random.default_rng(4).normal(size=(9, 3))
-    value = [term.value_and_slope(faces + e * step)[0] for e in (0.0, 1e-4)]
-    expected = np.dot(term.hessian(faces) @ step.T.ravel(), step.T.ravel())
-    assert value[0] < 1e-28
-    assert value[1] == pytest.approx(1e-8 * expected, rel=1e-6)
+    faces = BODY.vertices[BODY.faces[:9]].mean(axis=1)  # inside faces, which are the planes here
+    term = Sliding.at(faces, (np.arange(9), np.eye(9)), track, 2.0)
+    assert term.renewed(faces) is term
+    there = rotation([0.3, 1.0, -0.2], 0.7) @ faces.T
+    outside = 1.02 * there.T
+    away = outside - track(outside)[0]
+    expected = 2.0 * (away**2).sum()
+    assert term.value_and_slope(outside)[0] > 3.0 * expected  # far from its planes
+    moved = term.renewed(outside)
+    assert moved.value_and_slope(outside)[0] == pytest.approx(expected, rel=0.2)
+    assert moved.renewed(outside) is moved
 
 
 def test_it_is_the_distance_from_the_track():
@@ -77,12 +82,15 @@ def test_it_is_the_distance_from_the_track():
     across = (shift @ unit) ** 2
     for along, expected in (("plane", across), ("line", shift @ shift - across)):
         track = guides([Slide(CAP, along, 9.0 * np.array(AXIS))], BODY)[0].track
-        value = Sliding(rows, track, 2.0).value_and_slope(x + shift)[0]
+        term = Sliding.at(x, (np.arange(len(x)), rows), track, 2.0)
+        value = term.value_and_slope(x + shift)[0]
         assert value == pytest.approx(2.0 * len(CAP) * expected)
     outward = 1.3 * x / np.linalg.norm(x, axis=1)[:, None]
-    term = Sliding(rows, guides([Slide(CAP, "surface")], BODY)[0].track, 1.0)
-    assert term.value_and_slope(outward)[0] == pytest.approx(len(CAP) * 0.3**2, rel=0.05)
-    assert term.value_and_slope(x)[0] < 1e-28
+    track = guides([Slide(CAP, "surface")], BODY)[0].track
+    term = Sliding.at(outward, (np.arange(len(x)), rows), track, 1.0)
+    # Above an edge or a corner the distance from the plane of one face is counted, which is less.
+    assert term.value_and_slope(outward)[0] == pytest.approx(len(CAP) * 0.3**2, rel=0.1)
+    assert term.renewed(x).value_and_slope(x)[0] < 1e-28
 
 
 def test_the_nearest_point_is_in_the_nearest_triangle():

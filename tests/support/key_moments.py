@@ -160,7 +160,7 @@ class Stand:
         self.session_before, self.start = editor.session, editor.session.state
         editor.controller.finishing.is_wanted = False  # stories compare the poses of cages
         self.references: dict[tuple, Story] = {}
-        self.camera: dict | None = None  # at the first drag; some keys move it
+        self.camera = editor.controller.camera.viewpoint.settings()  # some keys move it
 
     # What differs from host to host.
 
@@ -247,9 +247,7 @@ class Stand:
 
     def drag(self, mode: Mode) -> np.ndarray:
         """Press and drag, and return the place without releasing the button."""
-        viewpoint = self.editor.controller.camera.viewpoint
-        self.camera = self.camera or viewpoint.settings()
-        assert viewpoint.restore(self.camera)
+        assert self.editor.controller.camera.viewpoint.restore(self.camera)
         self.draw()
         first, *others = self.way(mode)
         self.hand.press(first)

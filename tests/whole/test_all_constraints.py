@@ -112,7 +112,7 @@ class Random:
 
 
 @pytest.mark.parametrize(
-    ("seed", "count"), [(1, 40), pytest.param(2, 10_000, marks=pytest.mark.campaign)]
+    ("seed", "count"), [(1, 20), pytest.param(2, 10_000, marks=pytest.mark.campaign)]
 )
 def test_random_events_keep_all_of_them_in_every_finished_pose(seed, count):
     happening = Random(seed)

@@ -127,7 +127,7 @@ def goals_of(deformer: sd.Deformer, rng: np.random.Generator) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *((name, 8) for name in BODIES),
+        *((name, 5) for name in BODIES),
         *(pytest.param(name, 250, marks=pytest.mark.campaign) for name in BODIES),
     ],
 )

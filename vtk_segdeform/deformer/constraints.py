@@ -155,7 +155,12 @@ class Constraints:
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         contact = _contact(problem, ids) if options.avoid_contact else None
         sliding = [
-            Sliding(problem.subspace.at(each.vertices), each.track, weight / len(each.vertices))
+            Sliding.at(
+                problem.rest_cages,
+                problem.subspace.nonzeros(each.vertices),
+                each.track,
+                weight / len(each.vertices),
+            )
             for each in guides(slides, problem.rest, few=True)
         ]
         terms: list[Term] = [*sliding, *(() if contact is None else (contact,))]

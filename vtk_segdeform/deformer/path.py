@@ -29,6 +29,7 @@ from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
 _SOLVES_PER_SCALING = 4  # at most
+_RENEWALS = 12  # of the planes of slides in one solve, at most
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
@@ -109,13 +110,17 @@ class Path:
                 max_steps=min(options.max_steps, _CONTACT_STEPS),
             )
         released: set[int] = set()
-        for _ in range(1 + _SOLVES_PER_SCALING + 2 * self.constraints.n_bounds):
+        renewals = _RENEWALS if self.solver.terms else 0
+        for _ in range(1 + _SOLVES_PER_SCALING + renewals + 2 * self.constraints.n_bounds):
             result = self._minimise(goal, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)
+            is_renewed = self.solver.renew_terms(self.end)
             if self._exchange_bounds(x, goal, released):
                 continue
-            if scaled_by <= _SCALED or result.status is Status.STEP_LIMIT:
+            is_exact = scaled_by <= _SCALED and not is_renewed
+            is_late = result.status is Status.STEP_LIMIT or steps >= options.max_steps
+            if is_exact or is_late:
                 break
         return Pose(x, result, steps)
 
@@ -131,6 +136,7 @@ class Path:
     def _continue_from(self, p: FloatArray) -> None:
         """Continue from cages *p* (m, 3), and preserve the volumes of that pose."""
         self.p = self.end = p
+        self.solver.renew_terms(p)
         volumes = self.constraints.preserved.volumes.among(self.active_volumes)
         self.solver.preserve(volumes.preserved_at(p))
 

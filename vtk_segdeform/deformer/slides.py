@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray, as_ids, plain
 from ..checks import require, shown
 from ..errors import ConstraintError
+from ..geometry import VertexNormals
 from ..mesh import Mesh, nearest_on_triangles, ragged_arange
 from ..solver import Track
 from .symmetry import Mirror
@@ -143,10 +144,14 @@ class _Flat:
 
 
 class _Surface:
-    """A triangle mesh."""
+    """A triangle mesh; its normals are interpolated between vertices, so that they have no jumps.
+
+    With those of faces, solves went back and forth between the planes of neighbouring faces.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         self._corners = mesh.vertices[mesh.faces]
+        self._normals = VertexNormals(mesh).of(mesh.vertices)[mesh.faces]
         self._tree = cKDTree(mesh.vertices)
         order = np.argsort(mesh.faces.ravel(), kind="stable")
         self._faces_at = order // 3
@@ -162,7 +167,6 @@ class _Surface:
         order = np.lexsort((away, point))
         best = order[np.diff(point[order], prepend=-1) != 0]
         nearest = np.einsum("kc,kcj->kj", shares[best], corners[best])
-        a, b, c = np.swapaxes(corners[best], 0, 1)
-        normals = np.cross(b - a, c - a)
+        normals = np.einsum("kc,kcj->kj", shares[best], self._normals[faces[best]])
         normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
         return nearest, normals[:, :, None] * normals[:, None]

@@ -57,10 +57,12 @@ from .volume import (
     corner_and_edges,
     outer_components,
     signed_volume,
+    signed_volumes,
     step_to_volume,
     volume_along,
     volume_along_path,
     volume_gradient,
+    volume_gradients,
 )
 
 __all__ = [
@@ -101,6 +103,7 @@ __all__ = [
     "principal_axes",
     "rigid_fit",
     "signed_volume",
+    "signed_volumes",
     "step_to_volume",
     "tie_breakers",
     "towards",
@@ -110,6 +113,7 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "volume_gradients",
     "volume_summary",
     "voronoi_cells",
     "with_least_areas",

@@ -22,6 +22,7 @@ its corners would lose three digits.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,25 +36,43 @@ _FACES_PER_SUM = 4096  # partial sums are fixed, so that results do not depend o
 
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
     """Return the enclosed volume (8) of *vertices* (n, 3), *faces* (m, 3); positive if outward."""
-    if kernels := compiled_kernels(len(faces)):
-        sums = _by_blocks(kernels.volume_sums, inputs(vertices, faces), np.empty(_blocks(faces)))
-        return float(sums.sum() / 6.0)
-    a, e, f = corner_and_edges(vertices - vertices[0], faces)
-    return float(np.einsum("ij,ij", a, cross_rows(e, f)) / 6.0)
+    return float(signed_volumes(vertices, [faces])[0])
+
+
+def signed_volumes(vertices: FloatArray, parts: Sequence[IntArray]) -> FloatArray:
+    """Return the volume of each of *parts*, (c,): faces (m, 3) of the same *vertices* (n, 3)."""
+    if kernels := compiled_kernels(sum(map(len, parts))):
+        sums = (
+            _by_blocks(kernels.volume_sums, inputs(vertices, faces), np.empty(_blocks(faces)))
+            for faces in parts
+        )
+        return np.array([each.sum() / 6.0 for each in sums])
+    points = vertices - vertices[0]
+    corners = (corner_and_edges(points, faces) for faces in parts)
+    return np.array([np.einsum("ij,ij", a, cross_rows(e, f)) / 6.0 for a, e, f in corners])
 
 
 def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return dV/dx, (n, 3): the entries of J_g in eq. (12), one row per vertex."""
-    if kernels := compiled_kernels(len(faces)):
-        kernels.volume_gradient(*inputs(vertices, faces), summed := np.zeros(vertices.shape))
-        return summed
-    _, e, f = corner_and_edges(vertices, faces)
-    normals = cross_rows(e, f) / 6.0  # on a closed mesh, equal in sum to b x c, c x a, a x b
-    gradient = np.empty_like(vertices)
-    for axis in range(3):
-        column = np.repeat(normals[:, axis], 3)
-        gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
-    return gradient
+    return volume_gradients(vertices, [faces])[0]
+
+
+def volume_gradients(vertices: FloatArray, parts: Sequence[IntArray]) -> list[FloatArray]:
+    """Return dV/dx, (n, 3), for the volume of each of *parts*."""
+    found = []
+    kernels = compiled_kernels(sum(map(len, parts)))
+    for faces in parts:
+        gradient = np.zeros(vertices.shape)
+        if kernels:
+            kernels.volume_gradient(*inputs(vertices, faces), gradient)
+        else:
+            _, e, f = corner_and_edges(vertices, faces)
+            normals = cross_rows(e, f) / 6.0  # on a closed mesh, in sum b x c, c x a, a x b
+            for axis in range(3):
+                column = np.repeat(normals[:, axis], 3)
+                gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
+        found.append(gradient)
+    return found
 
 
 def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -> FloatArray:

@@ -204,6 +204,10 @@ class Contact:
 
     is_always_active = False
 
+    def renewed(self, _: FloatArray, /) -> Contact:
+        """Return the term itself: it is the same at all poses."""
+        return self
+
     def value_and_slope(
         self, p: FloatArray, x: FloatArray = NO_SURFACE
     ) -> tuple[float, FloatArray]:

@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import in_parallel
+from ..kernels import compiled_kernels, in_parallel, inputs
 from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
 from .volume_constraints import VolumeConstraint, gradients, violations
 
@@ -40,18 +40,16 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     """
     if len(constraints) == 1:
         return np.array([constraints[0].exact_step(paths)])
-    directions = np.split(paths, len(constraints) + 1, axis=1)[1:]
     t = np.zeros(len(constraints))
     unit = sum(abs(c.target) for c in constraints)
-    here, before, jacobian = paths[:, :3], np.inf, None
+    here, before, jacobian = np.ascontiguousarray(paths[:, :3]), np.inf, None
     for _ in range(_NEWTON_STEPS):
         g = violations(constraints, here)
         error = float(np.abs(g).max())
         if error <= _EXACT * unit or (error <= _SMALL * unit and error > 0.5 * before):
             break
         if jacobian is None or error > _SMALL * unit:
-            rows = np.reshape(gradients(constraints, here), (len(constraints), -1))
-            jacobian = rows @ np.stack([d.ravel() for d in directions], axis=1)
+            jacobian = slopes_along(constraints, here, paths)
         # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.  One
         # with a few coarse points may not respond at all but for rounding, and does not take part.
         scale = np.sqrt(np.abs(np.diag(jacobian)))
@@ -70,9 +68,13 @@ def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
 
 def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
     """Return the vertices of *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions."""
-    x = np.empty((len(paths), 3))
+    kernels, x = compiled_kernels(len(paths)), np.empty((len(paths), 3))
+    (read,), t = inputs(paths), np.asarray(t, dtype=np.float64)
 
     def work(start: int, stop: int) -> None:
+        if kernels:
+            kernels.move_along(read, t, x, start, stop)
+            return
         piece = paths[start:stop]
         x[start:stop] = piece[:, :3]
         for k, tk in enumerate(t, start=1):
@@ -80,6 +82,20 @@ def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
 
     in_parallel(work, len(paths), _CACHED)
     return x
+
+
+def slopes_along(
+    constraints: Sequence[VolumeConstraint], x: FloatArray, paths: FloatArray
+) -> FloatArray:
+    """Return the derivative at *x* (n, 3) of each g along each direction of *paths*, (c, c)."""
+    rows = gradients(constraints, x)
+    if kernels := compiled_kernels(len(x)):
+        (read,), found = inputs(paths), np.zeros((len(rows), 1 + len(rows)))
+        for row, out in zip(rows, found, strict=True):
+            kernels.add_slopes(row, read, out)
+        return found[:, 1:]
+    along = paths.reshape(len(x), -1, 3)[:, 1:]
+    return np.asarray(np.tensordot(rows, along, ([1, 2], [0, 2])))
 
 
 def scale_to_volume(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:

@@ -223,6 +223,14 @@ class GaussNewton:
         """Preserve other *volumes* from now on."""
         self.volumes, self._last = volumes, None  # the rows of the last iterate are of the old ones
 
+    def renew_terms(self, p: FloatArray) -> bool:
+        """Renew the further terms at cages *p* (m, 3); return whether any has changed."""
+        terms = tuple(term.renewed(p) for term in self.terms)
+        has_changed = any(new is not old for new, old in zip(terms, self.terms, strict=True))
+        if has_changed:
+            self.terms, self._last = terms, None
+        return has_changed
+
     def minimise(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> SolverResult:
         """Iterate from cage vertices *p* (m, 3) for positions *targets* (k, 3).
 

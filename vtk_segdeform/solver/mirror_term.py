@@ -44,6 +44,10 @@ class MirrorTerm:
         outer = np.outer(normal, normal)
         return cls(weight * plus.T @ plus, weight * minus.T @ minus, outer, rest)
 
+    def renewed(self, _: FloatArray, /) -> MirrorTerm:
+        """Return the term itself: it is the same at all poses."""
+        return self
+
     def value_and_slope(
         self, p: FloatArray, _: FloatArray = NO_SURFACE, /
     ) -> tuple[float, FloatArray]:

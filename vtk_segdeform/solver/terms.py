@@ -24,6 +24,10 @@ class Term(Protocol):
         """Whether its Hessian counts at all poses."""
         ...
 
+    def renewed(self, p: FloatArray, /) -> Term:
+        """Return the term to go on with from cages *p* (m, 3), where a solve has ended."""
+        ...
+
     def value_and_slope(
         self, p: FloatArray, x: FloatArray = NO_SURFACE, /
     ) -> tuple[float, FloatArray]:

@@ -26,10 +26,10 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import (
     Lids,
     lids_of,
-    signed_volume,
+    signed_volumes,
     step_to_volume,
     volume_along_path,
-    volume_gradient,
+    volume_gradients,
 )
 from ..mesh import Mesh, edge_keys
 from ..subspace import Subspace
@@ -133,29 +133,33 @@ def with_same_points(constraints: Sequence[VolumeConstraint]) -> tuple[VolumeCon
 
 def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
     """Return g(x) of all *constraints*, (c,), in units of volume."""
-    each = _with_points(constraints, x)
-    return np.array([signed_volume(points, one.faces) - one.target for one, points in each])
+    found = np.empty(len(constraints))
+    for some, points in _with_points(constraints, x):
+        found[some] = signed_volumes(points, [constraints[k].faces for k in some])
+    return found - [each.target for each in constraints]
 
 
 def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
     """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
-    found = []
-    for one, points in _with_points(constraints, x):
-        gradient = volume_gradient(points, one.faces)
-        found.append(gradient if one.extension is None else one.extension.T @ gradient)
+    found = [x] * len(constraints)
+    for some, points in _with_points(constraints, x):
+        slopes = volume_gradients(points, [constraints[k].faces for k in some])
+        extension = constraints[some[0]].extension
+        for k, slope in zip(some, slopes, strict=True):
+            found[k] = slope if extension is None else extension.T @ slope
     return found
 
 
 def _with_points(
     constraints: Sequence[VolumeConstraint], x: FloatArray
-) -> Iterator[tuple[VolumeConstraint, FloatArray]]:
-    """Yield each constraint with its points, which are computed once if all share them."""
-    last, points = None, x
-    for each in constraints:
-        if last is None or not each.shares_points(last):
-            points = each.extended(x)
-        last = each
-        yield each, points
+) -> Iterator[tuple[list[int], FloatArray]]:
+    """Yield the numbers of the constraints that share their points, and these points."""
+    others = list(range(len(constraints)))
+    while others:
+        first = constraints[others[0]]
+        some = [k for k in others if constraints[k].shares_points(first)]
+        others = [k for k in others if k not in some]
+        yield some, first.extended(x)
 
 
 @dataclass(frozen=True, eq=False)

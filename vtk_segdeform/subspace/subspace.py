@@ -262,8 +262,9 @@ def _begin_rows(
     if base is not None:
         first = rows[start] if start else 0
         last = rows[stop] if stop < len(rows) else len(x)
-        x[first:last, :3] = base[first:last, : x.shape[1]]
-        x[first:last, 3:] = 0.0
+        if x.shape[1] > 3:
+            x[first:last] = 0.0
+        x[first:last, :3] = base[first:last]
 
 
 def _adjoint_product(

@@ -64,8 +64,26 @@ def highlighted(button: Any) -> Any:
     return button
 
 
+class _WheelFilter(QtCore.QObject):
+    """Lets the wheel scroll the panel over a field, unless the field has the focus."""
+
+    def eventFilter(self, field: Any, event: Any) -> bool:  # noqa: N802 - Qt's name
+        """Pass the wheel on to whatever is behind an unfocused *field*."""
+        if event.type() != QtCore.QEvent.Type.Wheel or field.hasFocus():
+            return False
+        event.ignore()
+        return True
+
+
+def without_wheel(field: Any) -> Any:
+    """Return *field*, whose value the wheel changes only while it has the focus."""
+    field.installEventFilter(_WheelFilter(field))
+    return field
+
+
 def number_box(box: Any) -> Any:
     """Return a spin box that reports a typed number only when it is entered."""
+    without_wheel(box).setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # Tab or a click, no wheel
     box.setKeyboardTracking(False)
     box.setMinimumWidth(box.fontMetrics().averageCharWidth() * 12)
     return box
@@ -84,7 +102,7 @@ class Slider(QtWidgets.QSlider):
         super().__init__(Qt.Orientation.Horizontal)
         self.figure, self.unit = QtWidgets.QLabel(), ""
         self.figure.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        without_wheel(self).setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.setTracking(not on_release)
         self.sliderMoved.connect(self._show)
 
@@ -122,7 +140,7 @@ def check_box(text: str, tip: str = "") -> Any:
 
 def choice_box(choices: list[str]) -> Any:
     """Return a combo box."""
-    box = QtWidgets.QComboBox()
+    box = without_wheel(QtWidgets.QComboBox())
     box.addItems(choices)
     box.setFocusPolicy(Qt.FocusPolicy.TabFocus)
     return box

@@ -386,6 +386,45 @@ def test_the_panel_follows_keys_and_the_wheel(seen):
     assert seen.editor.widgets.overlay.is_shown
 
 
+def turn_wheel(field, clicks=-1):
+    """Turn the wheel over *field*, as the window system would; return whether it was taken."""
+    middle = QtCore.QPointF(field.rect().center())
+    step = QtGui.QWheelEvent(
+        middle, QtCore.QPointF(field.mapToGlobal(middle.toPoint())), QtCore.QPoint(0, 0),
+        QtCore.QPoint(0, 120 * clicks), Qt.NoButton, Qt.NoModifier, Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )  # fmt: skip
+    application().sendEvent(field, step)
+    application().processEvents()
+    return step.isAccepted()
+
+
+@pytest.mark.parametrize("mode", list(Mode))
+def test_the_wheel_over_the_panel_changes_nothing_but_a_field_that_was_clicked(seen, mode):
+    seen.mode(mode)
+    before, options = seen.session.history.undo_label, seen.session.options
+    kinds = QtWidgets.QAbstractSpinBox, QtWidgets.QComboBox, QtWidgets.QSlider
+    fields = [
+        each for each in seen.panel.findChildren(QtWidgets.QWidget) if isinstance(each, kinds)
+    ]
+    assert len(fields) > 4
+    for field in fields:
+        turn_wheel(field)
+        turn_wheel(field, 1)
+        assert not field.hasFocus()
+    assert (seen.session.history.undo_label, seen.session.options) == (before, options)
+    seen.settle()
+    number = next(
+        each
+        for each in fields
+        if isinstance(each, QtWidgets.QAbstractSpinBox) and each.isVisible() and each.isEnabled()
+    )
+    value = number.value()
+    QtTest.QTest.mouseClick(number.lineEdit(), Qt.LeftButton)
+    assert turn_wheel(number, 1 if value == number.minimum() else -1)
+    assert number.value() != value
+
+
 def test_a_click_on_a_button_leaves_the_keys_to_the_view(seen):
     hand = seen.view_hand()
     seen.click(seen.panel.controls["paint.lasso"])

@@ -1,6 +1,7 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
-    volumes         `volume.signed_volume`, `volume.volume_along_path`, `volume.volume_gradient`
+    volumes         `volume.signed_volumes`, `volume.volume_along_path`, `volume.volume_gradients`,
+                    `exact_volume.moved_along`, `exact_volume.slopes_along`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -45,7 +46,9 @@ from .text import (
     rows_of_lists,
 )
 from .volumes import (
+    add_slopes,
     determinants,
+    move_along,
     volume_along_sums,
     volume_gradient,
     volume_sums,
@@ -56,6 +59,7 @@ __all__ = [
     "add_interpolated",
     "add_interpolated_adjoint",
     "add_product",
+    "add_slopes",
     "add_upper",
     "border_half_edges",
     "cell_forces",
@@ -70,6 +74,7 @@ __all__ = [
     "interpolated_rows",
     "link",
     "may_meet",
+    "move_along",
     "number_trees",
     "numbers_of_lines",
     "one_fan_each",

@@ -80,3 +80,28 @@ def volume_gradient(x, faces, out):
             out[corner, 0] += nx
             out[corner, 1] += ny
             out[corner, 2] += nz
+
+
+@_compile_sums("f8[:,:], const f8[:,:], f8[:]")
+def add_slopes(gradient, paths, out):
+    """Add the product of *gradient* (n, 3) and each three columns of *paths* to *out*."""
+    for i in range(len(gradient)):
+        gx, gy, gz = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+        if gx == 0.0 and gy == 0.0 and gz == 0.0:
+            continue  # most gradients are those of a part
+        row = paths[i]
+        for k in range(len(out)):
+            out[k] += gx * row[3 * k] + gy * row[3 * k + 1] + gz * row[3 * k + 2]
+
+
+@_compile("const f8[:,:], f8[:], f8[:,:], i8, i8")
+def move_along(paths, t, out, start, stop):
+    """Put *paths* (n, 3 + 3 c) after the step *t* (c,) along its directions into *out* (n, 3)."""
+    for i in range(start, stop):
+        row = paths[i]
+        x, y, z = row[0], row[1], row[2]
+        for k in range(len(t)):
+            x += t[k] * row[3 * k + 3]
+            y += t[k] * row[3 * k + 4]
+            z += t[k] * row[3 * k + 5]
+        out[i, 0], out[i, 1], out[i, 2] = x, y, z
