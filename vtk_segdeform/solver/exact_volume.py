@@ -42,20 +42,22 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
         return np.array([constraints[0].exact_step(paths)])
     t = np.zeros(len(constraints))
     unit = sum(abs(c.target) for c in constraints)
-    here, before, jacobian = np.ascontiguousarray(paths[:, :3]), np.inf, None
+    here, before, inverse = np.ascontiguousarray(paths[:, :3]), np.inf, None
     for _ in range(_NEWTON_STEPS):
         g = violations(constraints, here)
         error = float(np.abs(g).max())
         if error <= _EXACT * unit or (error <= _SMALL * unit and error > 0.5 * before):
             break
-        if jacobian is None or error > _SMALL * unit:
+        if inverse is None or error > _SMALL * unit:
             jacobian = slopes_along(constraints, here, paths)
-        # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.  One
-        # with a few coarse points may not respond at all but for rounding, and does not take part.
-        scale = np.sqrt(np.abs(np.diag(jacobian)))
-        scale[scale <= _ROUNDING * scale.max()] = scale.max() or 1.0
-        scaled = jacobian / scale[:, None] / scale
-        t += np.linalg.lstsq(scaled, -g / scale, rcond=1e-12)[0] / scale
+            # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
+            # One with a few coarse points may not respond at all but for rounding, and does not
+            # take part.
+            scale = np.sqrt(np.abs(np.diag(jacobian)))
+            scale[scale <= _ROUNDING * scale.max()] = scale.max() or 1.0
+            both = scale[:, None] * scale
+            inverse = np.linalg.pinv(jacobian / both, rcond=1e-12) / both
+        t -= inverse @ g
         here, before = moved_along(paths, t), error
     return t
 
