@@ -67,19 +67,28 @@ def attached(
     return replace(after, pose=solving.solve(poses, after, targets, progress=rest)[0])
 
 
-def apart(poses: Poses, state: State, goals: Goals) -> State:
+def apart(poses: Poses, state: State, goals: Goals, progress: Progress | None = None) -> State:
     """Return *state* with regions and cages for components whose volumes change by *goals*.
 
     In the cage of another component they could not change.  They follow it in their own cages.
+    Itself if there are none.
     """
-    regions = state.regions
-    if regions is None or regions.carrier is None:
+    regions, changed = state.regions, separated_by(poses, state, goals)
+    if changed is None or regions is None:
         return state
+    return _with_regions(poses, state, _carried(regions, *changed), progress)
+
+
+def separated_by(
+    poses: Poses, state: State, goals: Goals
+) -> tuple[IntArray, IntArray | None] | None:
+    """Return the carriers and leaders (c,) of `apart`; None if nothing changes."""
+    regions = state.regions
+    if regions is None or regions.carrier is None or not regions.is_carried.any():
+        return None
     changed = changing_components(poses.mesh, state.options.lids, checked_goals(goals))
     carrier, leader = with_regions_apart(regions.carrier, changed)
-    if leader is None:
-        return state
-    return _with_regions(poses, state, _carried(regions, carrier, leader))
+    return None if leader is None else (carrier, leader)
 
 
 def _with_regions(

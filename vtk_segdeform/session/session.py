@@ -61,7 +61,7 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
-from .separating import apart, separated
+from .separating import apart, separated, separated_by
 from .state import (
     Cages,
     Options,
@@ -759,6 +759,18 @@ class Session(Described):
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
         return self._drag(state, places, [f"the volume of {self.volume_label(name)}"], max_steps)
+
+    def needs_cages(self, name: str, goal: str | float) -> bool:
+        """Whether `set_volume` has to fit new cages first, which may take a second or more."""
+        goals = {**dict(self.options.volumes), name: goal}
+        return separated_by(self.poses, self.state, goals) is not None
+
+    def with_cages_for(
+        self, name: str, goal: str | float, progress: Progress | None = None
+    ) -> State:
+        """Return the state with these cages; this may run in another thread."""
+        goals = {**dict(self.options.volumes), name: goal}
+        return apart(self.poses, self.state, goals, progress)
 
     def refine(
         self,

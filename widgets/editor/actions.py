@@ -379,10 +379,24 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
     """Return the action that sets the goal of a volume; with *join*, moves are one undo step."""
 
     def change(controller: Controller) -> None:
-        session = controller.session
-        session.set_volume(name, goal, max_steps=STEPS)
-        session.commit(f"set the volume of {session.volume_label(name)}", join=join)
-        _settle(controller)
+        session, before = controller.session, controller.session.state
+        label = f"set the volume of {session.volume_label(name)}"
+
+        def finish(*, joins: bool = join) -> None:
+            session.set_volume(name, goal, max_steps=STEPS)
+            session.commit(label, join=joins)
+            _settle(controller)
+
+        def show(after: State) -> None:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while cages were being fitted. Try again")
+            session.history.step(label, after)
+            finish(joins=True)
+
+        if session.needs_cages(name, goal):
+            controller.start("Fitting cages", partial(session.with_cages_for, name, goal), show)
+        else:
+            finish()
 
     return change
 

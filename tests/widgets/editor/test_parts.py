@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 from hands import Hand, draw_seldom, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
+from open_meshes import combined
 from scenes import sausage
+from solids import icosphere
 
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver.volume_constraints import volumes_by_label
 from vtk_segdeform.widgets.editor.editor import DeformEditor
+from vtk_segdeform.widgets.editor.queue import Kind
 from vtk_segdeform.widgets.editor.widget_set import Mode
 from vtk_segdeform.widgets.panel.panel import press, sections
 from vtk_segdeform.widgets.panel.status import status
@@ -178,3 +182,26 @@ def test_a_dragged_handle_tells_the_change_of_its_region(bench):
     bench.hand.key("Escape")
     bench.hand.release()
     assert_array_equal(session.vertices, SCENE.mesh.vertices)
+
+
+def test_the_slider_of_a_cavity_fits_cages_in_the_background_and_is_one_step():
+    x, faces = icosphere(2)
+    session = Session(combined(Mesh(x, faces), Mesh(0.7 * x, faces)))
+    session.segment()
+    session.fit_cages()
+    session.bind()
+    editor = DeformEditor(plain_view(), session)
+    editor.mode = Mode.DEFORM
+    draw_seldom(editor.view)
+    editor.On()
+    press(editor, "volumes.name", "cavity")
+    press(editor, "volumes.change", -10)
+    assert editor.is_busy
+    editor.controller.queue.wait(Kind.JOB)
+    for share in (-15, -20):
+        press(editor, "volumes.change", share)
+        assert not editor.is_busy
+    assert session.history.labels[-2:] == ("fit cages", "set the volume of cavity")
+    assert session.volume("cavity")[1] == pytest.approx(-0.2, abs=EXACT)
+    assert not len(session.solution.crossings())
+    editor.remove()
