@@ -13,7 +13,7 @@ import functools
 import importlib
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -330,11 +330,8 @@ MADE_BY_HAND = {
     sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
 }  # fmt: skip
 EXTRA = {
-    "Session.change_options": (
-        "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-        "rotation_groups", "lids", "volumes", "symmetry",
-    ),
-}  # fmt: skip
+    "Session.change_options": tuple(field.name for field in fields(sd.Options)),
+}
 
 
 @functools.cache
