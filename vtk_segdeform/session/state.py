@@ -135,7 +135,7 @@ def _checked_attach(attach: Any) -> Attachments:
     try:
         pairs = dict(attach)
         return tuple(sorted(checked_attach(pairs, 1 + max(_numbers(pairs), default=0)).items()))
-    except (ArgumentError, TypeError, ValueError):
+    except (ArgumentError, TypeError, ValueError, RuntimeError):
         raise SessionError(
             f"attach must map components to others or {FREE!r}; got {shown(attach)}"
         ) from None
