@@ -251,7 +251,7 @@ def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:
 
 def _slide(text: str, surface: Surface) -> Slide:
     selection, colon, along = text.rpartition(":")
-    if not colon or along not in ("plane", "line", "surface"):
+    if not colon or along not in Slide.KINDS:
         selection, along = text, "plane"
     return Slide(_selected(selection, surface, "handle"), along)
 
