@@ -374,8 +374,8 @@ def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monk
     ("changes", "says"),
     [
         ({"vertex": -1}, "vertex must be"),
-        ({"reach": 0.0}, "reach must be a positive number"),
-        ({"reach": np.nan}, "reach must be a positive number"),
+        ({"reach": -1.0}, "reach must be 0 or a positive number"),
+        ({"reach": np.nan}, "reach must be 0 or a positive number"),
         ({"spread": np.inf}, "spread must be a positive number"),
         ({"spread": 0.0}, "spread must be a positive number"),
         ({"spread": "wide"}, "spread must be a positive number"),

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from campaign import every
 from numpy.testing import assert_array_equal
+from open_meshes import combined
 from real_meshes import botsch_sorkine
 from scipy.sparse import csgraph
 from solids import OCTAHEDRON, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.errors import ArgumentError, Cancelled, RegionError
 from vtk_segdeform.mesh.mesh import Mesh
-from vtk_segdeform.regions import borders
+from vtk_segdeform.regions import Regions, borders
 from vtk_segdeform.regions.coarse import coarsen
 from vtk_segdeform.regions.segmentation import segment
 from vtk_segdeform.regions.slices import quotas
@@ -365,3 +366,23 @@ def test_smoothing_shortens_a_border_and_leaves_it_where_it_is():
     assert length(smooth) < 0.7 * length(wavy)
     crossing = mesh.edges[np.diff(smooth[mesh.edges], axis=1)[:, 0] != 0]
     np.testing.assert_allclose(z[crossing], 5.0, atol=0.3)
+
+
+def test_components_that_change_have_regions_of_their_own_and_leaders():
+    x, faces = icosphere(2)
+    shells = [Mesh(radius * x, faces) for radius in (1.0, 0.8, 0.6)]
+    mesh = combined(*shells, Mesh(x + [5.0, 0.0, 0.0], faces))
+    regions = segment(mesh)
+    assert_array_equal(regions.carrier, [0, 0, 1, 3])
+    assert regions.leader is None
+    for apart in ([2], [0], [1, 2]):
+        regions = segment(mesh, apart=apart)
+        assert_array_equal(regions.carrier, [0, 1, 2, 3])
+        assert_array_equal(regions.leader, [0, 0, 1, 3])
+        assert_array_equal(regions.components.sum(axis=0), 1)
+        assert_array_equal(regions.grow(1).leader, regions.leader)
+    assert segment(mesh, apart=[3]).leader is None
+    with pytest.raises(ArgumentError, match="apart"):
+        segment(mesh, apart=[4])
+    with pytest.raises(RegionError, match="leader must be one of"):
+        Regions(mesh, regions.membership, leader=[1, 0, 2, 3])

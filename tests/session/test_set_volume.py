@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import zipfile
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform.errors import ConstraintError, SessionError
+from vtk_segdeform.mesh import SurfacePoint
 from vtk_segdeform.session import Session, load_session, save_session
 from vtk_segdeform.session.state import Options
 from vtk_segdeform.session.store import _FIRST
@@ -93,6 +95,34 @@ def test_a_volume_is_set_in_a_finished_pose(goal):
         assert_allclose(share(session), 0.85, rtol=EXACT)
 
 
+def test_after_pulls_nothing_moves_but_what_a_volume_moves_and_all_of_it_returns():
+    session = SCENE.session()
+    session.handles.remove(*session.handles)
+    session.set_fixed([])
+    size, x = session.mesh.diagonal, session.mesh.vertices
+    for direction in ([1.0, 0.3, 0.0], [-1.0, 0.3, 0.0]):
+        corners = session.mesh.faces[(x @ direction)[session.mesh.faces].min(axis=1).argmax()]
+        middle = SurfacePoint.in_face(x, corners, x[corners].mean(axis=0))
+        session.pull(middle, middle.at(session.vertices) + [0.0, 0.15 * size, 0.0])
+        session.commit()
+    pulled = session.vertices
+    for name, goal, most in (("whole", "-20%", 0.025), ("region 1", "+10%", 0.015)):
+        session.set_volume(name, goal)
+        session.commit()
+        away = np.linalg.norm(session.vertices - pulled, axis=1)
+        assert away.max() < most * size
+        assert np.linalg.norm(middle.at(session.vertices) - middle.at(pulled)) < 1e-3 * size
+        at_once = session.vertices
+        session.undo()
+        for share in (0.3, 0.7, 1.0):
+            session.set_volume(name, f"{share * float(goal[:-1]):+g}%")
+            session.commit()
+        assert_allclose(session.vertices, at_once, atol=1e-3 * size)
+        session.forget_volume(name)
+        session.refine()
+        assert_allclose(session.vertices, pulled, atol=1e-3 * size)
+
+
 def test_resetting_the_pose_forgets_the_goals_and_undo_brings_them_back():
     session = SCENE.session()
     session.set_volume("whole", "-15%")
@@ -121,6 +151,65 @@ def test_a_session_is_saved_with_its_goals_and_continues_alike(tmp_path):
         turned(each, 50.0)
     assert_allclose(again.vertices, session.vertices, atol=1e-5)  # one has an accelerated start
     assert_allclose(share(again), 0.85, rtol=EXACT)
+
+
+def test_a_pull_whose_volumes_changed_is_saved_and_continues_alike(tmp_path):
+    session = SCENE.session()
+    tip = int(session.mesh.vertices[:, 1].argmax())
+    session.pull(tip, [0.0, 1.5, 0.2])
+    session.set_volume("region 1", "+10%")
+    session.commit()
+    path = tmp_path / "a.segdeform"
+    save_session(path, session)
+    with zipfile.ZipFile(path) as archive:
+        name = next(each for each in archive.namelist() if each.endswith("header.json"))
+        assert json.loads(archive.read(name))["version"] == 3  # earlier programs refuse it
+    again = load_session(path)
+    assert again.state.locality.reach == 0.0
+    for each in (session, again):
+        each.set_volume("region 1", "+15%")
+        each.commit()
+    assert_allclose(again.vertices, session.vertices, atol=1e-5)
+    assert_allclose(again.volume("region 1")[1], 0.15, atol=EXACT)
+
+
+def test_a_part_has_a_volume_under_a_lid_which_is_set_saved_and_removed(tmp_path):
+    session = SCENE.session()
+    x = session.mesh.vertices
+    top = (x[:, 2] > 0.2) & (np.abs(x[:, 0]) < 1.2)
+    session.set_part("bump", top)
+    rest, change = session.volume("bump")
+    assert (change, session.history.labels[-1]) == (0.0, "add the volume of bump")
+    assert 0.0 < rest < session.volume("whole")[0]
+    session.set_volume("bump", "+30%")
+    session.commit()
+    turned(session)
+    assert_allclose(session.volume("bump"), [1.3 * rest, 0.3], rtol=EXACT)
+    save_session(tmp_path / "a.segdeform", session)
+    again = load_session(tmp_path / "a.segdeform")
+    assert_array_equal(again.vertices, session.vertices)
+    assert_array_equal(dict(again.state.parts)["bump"], np.flatnonzero(top))
+    turned(again, 50.0)
+    assert_allclose(again.volume("bump")[1], 0.3, rtol=EXACT)
+    session.set_part("bump", None)
+    assert session.options.volumes == session.state.parts == ()
+    session.undo()
+    assert session.options.volumes == (("bump", "+30%"),)
+
+
+@pytest.mark.parametrize(
+    ("name", "ids", "says"),
+    [
+        ("whole", range(50), "there is a volume 'whole' already"), ("a", [0], "encloses no volume"),
+        ("a", [-1], "must index"), ("a", "all", "must contain vertex numbers"),
+        ("", range(50), "printable text"),
+    ],
+)  # fmt: skip
+def test_parts_that_are_wrong_are_refused(name, ids, says):
+    session = SCENE.session()
+    with pytest.raises((ConstraintError, SessionError, ValueError), match=says):
+        session.set_part(name, ids)
+    assert session.state.parts == ()
 
 
 def test_a_file_of_an_earlier_version_has_no_goals(tmp_path):

@@ -149,7 +149,7 @@ def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     _check_errors(cheap, 1, 2, bounded)
 
 
-@pytest.mark.parametrize(("step", "most"), every(2, [(5, 7), (1, 21)]))
+@pytest.mark.parametrize(("step", "most"), every(2, [(5, 7), (1, 30)]))
 @pytest.mark.parametrize("cls", [State, Pose, Locality], ids=lambda cls: cls.__name__)
 def test_a_session_rejects_a_state_with_bad_parts(cls, step, most, bounded):
     """Each field of a state, or of its pose, in turn holds each *step*-th bad value."""
@@ -174,7 +174,7 @@ def test_a_session_rejects_a_state_with_bad_parts(cls, step, most, bounded):
                 accepted += 1
             assert len(message) < LONGEST, (each.name, kind)
     print(f"{cls.__name__}: {accepted} accepted")
-    assert accepted <= most  # pivots may be any mapping: names of no handle do not count
+    assert accepted <= most  # empty ones, and pivots of no handle
 
 
 def _paths() -> list[tuple[Call, str]]:

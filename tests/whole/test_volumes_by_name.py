@@ -95,6 +95,51 @@ def test_a_ventricle_contracts_to_two_fifths_with_its_wall():
     assert uneven < 0.05
 
 
+def hollow(inner: float) -> tuple[sd.Mesh, int]:
+    """Return an ellipsoid with a cavity of the same shape, and the number of outer vertices."""
+    x, faces = icosphere(3)
+    x = x * [1.0, 0.8, 1.4]
+    return combined(sd.Mesh(x, faces), sd.Mesh(inner * x, faces)), len(x)
+
+
+@pytest.mark.parametrize("goal", [-10, -40, 30])
+def test_the_wall_of_a_hollow_body_stays_even_where_its_cavity_changes(goal):
+    """In the cage of the outer surface the cavity could not, and both became spiky."""
+    mesh, n = hollow(0.7)
+    solution = sd.deform(mesh, [], [], NOTHING, volumes={"cavity": f"{goal:+}%"}, refine=False)
+    assert solution.status is Status.CONVERGED
+    assert not len(solution.crossings())
+    assert solution.volume_error < EXACT
+
+    def wall(x: np.ndarray) -> np.ndarray:
+        """Return the distance of each vertex of the cavity from the outer surface."""
+        return distance_to_surface(x[n:], x[:n], mesh.faces[: mesh.n_faces // 2])
+
+    growth = wall(solution.vertices) / wall(mesh.vertices)
+    # Of similar ellipsoids, with the volume of the wall kept.
+    cavity = 0.7**3 * (1.0 + goal / 100.0)
+    expected = (np.cbrt(cavity + 1.0 - 0.7**3) - np.cbrt(cavity)) / 0.3
+    print(goal, growth.min(), growth.max(), expected)
+    assert np.abs(growth - expected).max() < 0.1
+
+
+def test_a_cavity_follows_its_body_while_its_volume_changes():
+    mesh, n = hollow(0.8)
+    z = mesh.vertices[:, 2]
+    outside = np.arange(mesh.n_vertices) < n
+    fixed, handle = (np.flatnonzero(outside & each) for each in (z < -1.2, z > 1.2))
+    targets = mesh.vertices[handle] @ rotation([0.0, 1.0, 0.0], np.radians(45.0)).T
+    solution = sd.deform(mesh, fixed, handle, targets, volumes={"cavity": "-20%"})
+    assert solution.status is Status.CONVERGED
+    assert not len(solution.unmoved)
+    assert not len(solution.crossings())
+    assert solution.volume_error < EXACT
+    gap = np.linalg.norm(solution.vertices[:n] - solution.vertices[n:], axis=1)
+    rest = np.linalg.norm(mesh.vertices[:n] - mesh.vertices[n:], axis=1)
+    print((gap / rest).min(), (gap / rest).max())
+    assert 0.6 < (gap / rest).min() < (gap / rest).max() < 1.8
+
+
 def shells() -> sd.Mesh:
     """Return four shells in each other: a body with a cavity, in which there is another one."""
     x, faces = icosphere(2)

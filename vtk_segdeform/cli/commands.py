@@ -19,7 +19,15 @@ from numpy.typing import ArrayLike
 from .. import io
 from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages, suggested_size
-from ..deformer import Deformer, Slide, checked_goals, clamped, finished, solved_along
+from ..deformer import (
+    Deformer,
+    Slide,
+    changing_components,
+    checked_goals,
+    clamped,
+    finished,
+    solved_along,
+)
 from ..errors import ArgumentError, ConstraintError, MeshError
 from ..geometry import lids_of
 from ..io import Surface
@@ -68,7 +76,9 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     has_goals = bool(options.volume)
     handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
     held = np.union1d(fixed, handle)
-    found = _regions(options, surface, part(progress, 0.0, 0.18), held)
+    goals = checked_goals(constraints["volumes"])
+    apart = changing_components(mesh, LIDS[options.lids], goals)
+    found = _regions(options, surface, part(progress, 0.0, 0.18), held, apart=apart)
     size = _size(options, found)
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)
     is_fixed[fixed] = True
@@ -167,7 +177,12 @@ def opened(path: Path) -> Session:
 
 
 def _regions(
-    options: Namespace, surface: Surface, progress: Progress | None, held: ArrayLike = ()
+    options: Namespace,
+    surface: Surface,
+    progress: Progress | None,
+    held: ArrayLike = (),
+    *,
+    apart: ArrayLike = (),
 ) -> Regions:
     wanted, arrays = options.regions, surface.given.point_data
     if options.attach and (wanted in arrays or wanted == "1"):
@@ -187,7 +202,7 @@ def _regions(
         )
     number = None if wanted == "auto" else int(wanted)
     attach = dict(options.attach)
-    return segment(surface.mesh, number, attach=attach, held=held, progress=progress)
+    return segment(surface.mesh, number, attach=attach, held=held, apart=apart, progress=progress)
 
 
 def _size(options: Namespace, found: Regions) -> int:

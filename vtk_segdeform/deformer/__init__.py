@@ -45,6 +45,7 @@ from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
+from .enclosed_volume import changing_components
 from .finishing import on_volumes
 from .problem import Problem
 from .pull import pull
@@ -66,6 +67,7 @@ __all__ = [
     "Slide",
     "Stiffness",
     "automatic_locality",
+    "changing_components",
     "checked_constraints",
     "checked_goals",
     "checked_locality",

@@ -150,7 +150,7 @@ class Constraints:
         sets = [ids[own] for own in order]
         positions = position_term(problem.subspace, problem.rest, sets, weight)
         if (loose := problem.anchors_of_loose_parts(ids)).any():
-            start = problem.rest_cages
+            start = preserved.rest_cages
             positions = positions.local(positions.rows, Anchors(loose, start, np.zeros_like(start)))
         gathered = in_order if positions.mean is None else positions.mean @ in_order
         contact = _contact(problem, ids) if options.avoid_contact else None

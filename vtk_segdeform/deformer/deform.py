@@ -23,6 +23,7 @@ from ..solver import Solution
 from .arguments import as_lids, checked_constraints, checked_targets
 from .clamping import clamped
 from .deformer import Deformer
+from .enclosed_volume import changing_components
 from .slides import Slide
 from .symmetry import Symmetry
 from .volume_goals import Goals, checked_goals
@@ -141,7 +142,8 @@ def deform(
     path.append(checked_targets(targets, len(moves)))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
     held = np.union1d(stays, moves)
-    regions = segment(mesh, n_regions, attach=attach, held=held, progress=next(stages))
+    apart = changing_components(mesh, lids, checked_goals(volumes))
+    regions = segment(mesh, n_regions, attach=attach, held=held, apart=apart, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     is_fixed = np.zeros(mesh.n_vertices, dtype=bool)

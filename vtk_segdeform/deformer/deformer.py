@@ -45,7 +45,7 @@ from ..kernels import compiled_kernels, load_for, one_blas_thread
 from ..mesh import Mesh, SurfacePoint, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
-from ..solver import CONVERGED, Solution, SolverOptions, Status, VolumeConstraint, Volumes
+from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
     as_lids,
@@ -235,6 +235,7 @@ class Deformer:
         preserve_region_volumes: bool | None = None,
         lids: bool | EllipsisType | None = ...,
         volumes: Goals | None = None,
+        parts: Mapping[str, ArrayLike] | None = None,
         slides: Iterable[Slide] | None = None,
         symmetry: Symmetry | EllipsisType = ...,
         avoid_contact: bool | None = None,
@@ -254,6 +255,8 @@ class Deformer:
         }
         if volumes is not None:
             given["goals"] = checked_goals(volumes)
+        if parts is not None:
+            given["parts"] = checked_parts(self.mesh, parts)
         if symmetry is not ...:
             given["mirror"] = Mirror.of(self.mesh, symmetry)
         if slides is not None:
@@ -310,7 +313,8 @@ class Deformer:
         reach : float
             Distance along the surface, in the mesh's unit, up to which the surface is free.  Beyond
             it the surface is held the more, the farther away; from 4 times this distance it hardly
-            moves.  Infinite: all of it is free.
+            moves.  Infinite: all of it is free.  0: all of it is held, so softly that it follows
+            volumes that are changed.
         spread : float
             Distance from a handle of one vertex within which a finish leaves the surface as the
             cages have it.
@@ -320,8 +324,8 @@ class Deformer:
         """
         point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
-        if not (is_infinite or (is_number(reach) and reach > 0.0)):
-            raise ConstraintError(f"reach must be a positive number; got {shown(reach)}")
+        if not (is_infinite or is_number(reach, 0.0)):
+            raise ConstraintError(f"reach must be 0 or a positive number; got {shown(reach)}")
         if not (is_number(spread) and spread > 0.0):
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
@@ -394,6 +398,11 @@ class Deformer:
         are several; "region 0" ... of the regions that enclose some; and the *parts*.
         """
         return (*self._enclosed.volume_names, *self._options.parts)
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies of the mesh, "body 0" ... of `volume_names`."""
+        return self._enclosed.bodies
 
     @one_blas_thread()
     def volumes(self, vertices: ArrayLike | None = None) -> dict[str, float]:

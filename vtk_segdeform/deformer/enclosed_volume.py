@@ -16,6 +16,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import shown
 from ..errors import ConstraintError
 from ..geometry import Lids, lids_of
+from ..mesh import Mesh
 from ..solver import (
     Bodies,
     ScaledSurface,
@@ -260,6 +261,28 @@ class EnclosedVolume:
     def bodies(self) -> Bodies:
         """The bodies of the mesh."""
         return Bodies(self.problem.rest_pose, self.total, self.lids)
+
+
+def changing_components(
+    mesh: Mesh, lids: bool | None, goals: Mapping[str, VolumeGoal | None]
+) -> IntArray:
+    """Return the components of *mesh* whose own volumes change by *goals*; see `segment`.
+
+    Those of the whole, regions and parts are not theirs alone.
+    """
+    names = [name for name, goal in goals.items() if goal is not None and goal.share != 1.0]
+    names = [name for name in names if _split(name)[0] in ("body", "cavity", "component", "wall")]
+    if not names or not mesh.components.any():
+        return _NONE
+    under = lids_of(mesh, lids)
+    bodies, found = Bodies(mesh, total_volume(mesh, under), under), []
+    for kind, number in map(_split, names):
+        if kind == "body":
+            found.append(np.flatnonzero(bodies.of_component == number))
+        else:
+            each = np.arange(len(bodies.of_component)) if kind == "component" else bodies.cavities
+            found.append(each if number is None else each[number : number + 1])
+    return np.unique(np.concatenate(found))
 
 
 def _keys_of(faces: IntArray) -> NDArray[np.uint64]:

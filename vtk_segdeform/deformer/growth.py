@@ -18,8 +18,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from ..arrays import FloatArray
-from ..solver import GaussNewton, Volumes, position_term
+from ..solver import Anchors, GaussNewton, Volumes, position_term
 from .problem import Problem
 
 VOLUME_LEG = 0.05
@@ -38,6 +40,8 @@ def grown_cages(problem: Problem, volumes: Volumes) -> FloatArray:
     if not legs:
         return p
     free = position_term(problem.subspace, problem.rest, [], 1.0)
+    gaps = Anchors(problem.kept_gaps(np.zeros(0, dtype=np.int64)), p, np.zeros_like(p))
+    free = free.local(free.rows, gaps)
     solver = GaussNewton(problem.energy, free, volumes)
     for leg in range(1, legs + 1):
         now = (

@@ -19,6 +19,7 @@ from .path import Path
 _ANCHOR_WEIGHT = 90.0  # kappa of `locality`, times the scale of the shape energy
 _SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
+_HELD = 1.0  # the same of a surface that only volumes move; less than 0.2 lets it turn over
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
 
 
@@ -42,7 +43,7 @@ def near_point(
     mirror, points = constraints.mirror, [point]
     if mirror is not None:
         points.append(mirror.mate_of(problem.mesh, point))
-    near = points, reach / problem.frame.size, follows
+    near = points, reach / problem.frame.size or np.inf, follows
     energy, samples = problem.energy, problem.samples
     ids = np.concatenate([constraints.handle, constraints.fixed])
     quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
@@ -71,7 +72,8 @@ def near_point(
     solver = replace(solver, energy=_with_rings(local, own_rows, solver))
     load = solver.unbalanced(p, local.places(path.targets))
     is_loaded = float(np.abs(load).max()) > _BALANCED * energy.scale
-    steady = solver.steadying(p, _FIRM * energy.scale) if is_loaded else 0.0
+    firm = _FIRM if reach else _HELD
+    steady = solver.steadying(p, firm * energy.scale) if is_loaded or not reach else 0.0
     anchors = Anchors(quadratic + steady * energy.mass, p, load)
     solver = replace(solver, positions=before.positions.local(rows, anchors))
     return replace(local, solver=solver)

@@ -84,9 +84,8 @@ class Path:
 
     @property
     def is_solved(self) -> bool:
-        """Whether the handles and volumes are in their places, unlike those of a grown shape."""
-        is_rest = self.p is self.constraints.rest_cages
-        return self.is_on_volumes and not (is_rest and self.constraints.has_goals)
+        """Whether the handles are in their places, unlike those of a grown shape at rest."""
+        return not (self.constraints.has_goals and self.p is self.constraints.rest_cages)
 
     def copy(self) -> Path:
         """Return a path that continues from here independently."""

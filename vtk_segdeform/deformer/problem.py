@@ -21,7 +21,7 @@ from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
 from ..regions import Regions
-from ..subspace import Subspace
+from ..subspace import Subspace, bind_passengers
 from .binding import Binding, BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
@@ -33,6 +33,9 @@ _NO_POINTS = np.empty((0, 3))
 # four bodies is 1.5 times that of as-rigid-as-possible, with 2, 1.3 times; poses of a dog are 2 %
 # farther from the true ones.
 _SPACINGS = 2.0
+# Weight of the gap between a component and its leader, times the scale of the shape energy; with
+# ten times more or less, hollow bodies bend alike.
+_LED, _GAPS = 1.0, 400  # and points at which it is kept, about
 _LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
 
 
@@ -91,7 +94,11 @@ class Problem:
         """Return the problem with *changes* on which `samples` and `linked_parts` do not depend."""
         other = replace(self, **changes)
         vars(other).update(
-            {name: vars(self)[name] for name in ("samples", "linked_parts") if name in vars(self)}
+            {
+                name: vars(self)[name]
+                for name in ("samples", "linked_parts", "_gaps")
+                if name in vars(self)
+            }
         )
         return other
 
@@ -131,11 +138,43 @@ class Problem:
 
     @cached_property
     def linked_parts(self) -> tuple[IntArray, IntArray]:
-        """The part of each component of the mesh (c,) and each region (r,), linked by sharing."""
+        """The part of each component of the mesh (c,) and each region (r,), linked by sharing.
+
+        Components are also linked with their leaders.
+        """
         region, component = np.nonzero(self.regions.components)
         n_regions, count = self.regions.components.shape
-        part = connected(count + n_regions, component, count + region)
+        own, leader = np.arange(count), self.regions.leader
+        one = np.concatenate([component, own])
+        other = np.concatenate([count + region, own if leader is None else leader])
+        part = connected(count + n_regions, one, other)
         return part[:count], part[count:]
+
+    @cached_property
+    def _gaps(self) -> dict[int, FloatArray]:
+        """For components with a leader, W~ at points on them, less W~ of their leader there.
+
+        Each is (k, m), and its product with the cages (m, 3) at rest is 0.
+        """
+        if (leader := self.regions.leader) is None:
+            return {}
+        rest, component, found = self.rest, self.rest.components, {}
+        inside = np.split(self.rest_cages, np.cumsum([len(c.vertices) for c in self.cages])[:-1])
+        cages = [Cage(x, cage.faces) for x, cage in zip(inside, self.cages, strict=True)]
+        own = np.arange(len(leader))
+        for k in np.flatnonzero(leader != own):
+            ids = np.flatnonzero(component == k)
+            ids = ids[:: 1 + len(ids) // _GAPS]
+            other, kept = rest.of_components(own == leader[k])
+            weights = self.regions.weights[:, kept]
+            used = np.flatnonzero(weights.any(axis=1))
+            points = rest.vertices[ids]
+            led = bind_passengers(other, weights[used], [cages[r] for r in used], points).subspace
+            rows = self.subspace.at(ids)
+            for r, some, block in zip(used, led.rows, led.blocks, strict=True):
+                rows[some, self.subspace.columns[r]] -= block
+            found[int(k)] = rows
+        return found
 
     def carrying_from(self, ids: IntArray) -> Carrying:
         """Return how motions are carried from the components of vertices *ids* to the others.
@@ -150,17 +189,29 @@ class Problem:
             carrier = np.where(part[found] == part, found, np.arange(len(part)))
         return Carrying(self.mesh, towards(carrier, roots))
 
+    def kept_gaps(self, ids: IntArray) -> FloatArray:
+        """Return the quadratic (m, m) that keeps the gaps between components and their leaders.
+
+        Those that have any of the vertices *ids* (k,) do not follow.
+        """
+        total, component = np.zeros_like(self.energy.quadratic), self.mesh.components
+        for k, rows in self._gaps.items():
+            if not (component[ids] == k).any():
+                total += _LED * self.energy.scale / len(rows) * (rows.T @ rows)
+        return total
+
     def anchors_of_loose_parts(self, ids: IntArray) -> FloatArray:
         """Return the quadratic (m, m) of anchors for components without any of the vertices *ids*.
 
-        Nothing determines where they are.  Those that share no region with other components stay.
-        The others follow these; the anchors are so weak, compared with the energy of the least
-        region that they are in, that they only prevent drifting.
+        Nothing determines where they are.  Those that share no region with other components stay,
+        or follow their leaders: their gaps are kept.  The others follow those that they share
+        regions with; their anchors are so weak, compared with the energy of the least region that
+        they are in, that they only prevent drifting.
         """
         component, energy = self.mesh.components, self.energy
-        inside = self.regions.components
+        inside, led = self.regions.components, self.kept_gaps(ids)
         if not len(ids) or inside.shape[1] == 1:
-            return np.zeros_like(energy.quadratic)
+            return led
         samples, (of_component, of_region) = self.samples, self.linked_parts
         has_ids = np.zeros(len(of_component), dtype=bool)
         has_ids[component[ids]] = True
@@ -174,7 +225,7 @@ class Problem:
         loose = ~has_ids[of_sample]
         weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
         rows = samples.rows[loose]
-        return np.asarray(quadratic + (rows.T * weight) @ rows)
+        return np.asarray(led + quadratic + (rows.T * weight) @ rows)
 
     @cached_property
     def cell_energy(self) -> CellEnergy:

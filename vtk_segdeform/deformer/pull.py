@@ -28,10 +28,11 @@ from .arguments import (
 )
 from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
+from .enclosed_volume import changing_components
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
 from .symmetry import Symmetry
-from .volume_goals import Goals
+from .volume_goals import Goals, checked_goals
 
 
 def pull(
@@ -142,7 +143,8 @@ def pull(
     if locality is None:
         locality = automatic_locality(len(fixed))
     stages = iter(stages_of(progress, finishes=is_finished(mesh, refine)))
-    regions = segment(mesh, n_regions, attach=attach, progress=next(stages))
+    apart = changing_components(mesh, lids, checked_goals(volumes))
+    regions = segment(mesh, n_regions, attach=attach, apart=apart, progress=next(stages))
     size = suggested_size(regions) if n_cage_vertices is None else n_cage_vertices
     require_cage_vertices(size, regions.n_regions, "n_cage_vertices")
     cages = fit_cages(mesh, regions, size, progress=next(stages))

@@ -20,7 +20,7 @@ from .regions import (
     require_regions,
     usual_overlap,
 )
-from .segmentation import segment
+from .segmentation import segment, with_regions_apart
 
 __all__ = [
     "CageSurface",
@@ -30,5 +30,6 @@ __all__ = [
     "require_regions",
     "segment",
     "usual_overlap",
+    "with_regions_apart",
     "within_rings",
 ]

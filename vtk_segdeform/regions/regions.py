@@ -59,18 +59,21 @@ class Regions(Described, Frozen):
     carrier : (c,) int, optional
         The components that carry others, as of `geometry.carriers`: a follower is in the regions of
         the nearest points of its carrier, with their weights, whatever its *membership*.
+    leader : (c,) int, optional
+        The components that others follow in regions of their own: see `segment`.
 
     Raises
     ------
     RegionError
         If the shape is wrong, a region is empty, or a vertex is in no region, the message lists
-        them; or if *carrier* does not lead to components that nothing carries.
+        them; or if *carrier* or *leader* does not lead to components that follow none.
     """
 
     mesh: Mesh
     membership: BoolArray
     smoothness: float = 1.0
     carrier: IntArray | None = None
+    leader: IntArray | None = None
 
     def __post_init__(self) -> None:
         require_mesh(self.mesh)
@@ -83,6 +86,9 @@ class Regions(Described, Frozen):
             )
         if not (is_number(self.smoothness) and self.smoothness > 0.0):
             raise RegionError(f"smoothness must be a number above 0; got {shown(self.smoothness)}")
+        if self.leader is not None:
+            leader = _checked_carrier(self.mesh, self.leader, "leader")
+            object.__setattr__(self, "leader", leader)
         if self.carrier is not None:
             carrier = _checked_carrier(self.mesh, self.carrier)
             object.__setattr__(self, "carrier", carrier)
@@ -123,6 +129,7 @@ class Regions(Described, Frozen):
         overlap: int = 4,
         *,
         carrier: IntArray | None = None,
+        leader: IntArray | None = None,
     ) -> Regions:
         """Return one region per label, grown so that neighbouring regions overlap.
 
@@ -137,6 +144,8 @@ class Regions(Described, Frozen):
             twice as wide.  With 0 there are no overlaps, and the surface may tear at borders.
         carrier : (c,) int, optional
             As of `Regions`; every label must occur on a component that nothing carries.
+        leader : (c,) int, optional
+            As of `Regions`.
 
         Raises
         ------
@@ -162,7 +171,7 @@ class Regions(Described, Frozen):
                 f"got {array.dtype} of shape {array.shape}"
             )
         masks = array == np.unique(array)[:, None]
-        return cls(mesh, masks, carrier=carrier).grow(overlap)
+        return cls(mesh, masks, carrier=carrier, leader=leader).grow(overlap)
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -218,6 +227,17 @@ class Regions(Described, Frozen):
         ahead = self.weights >= self.weights.max(axis=0) - _EQUAL_WEIGHT
         return np.asarray(np.argmax(ahead, axis=0), dtype=np.int64)
 
+    def label_at(self, vertex: int) -> int:
+        """Return the label of one *vertex*; if it is in one region, no weights are computed."""
+        if not is_whole(vertex, 0, self.mesh.n_vertices - 1):
+            last = self.mesh.n_vertices - 1
+            raise RegionError(f"vertex must be from 0 to {last}; got {shown(vertex)}")
+        own = np.flatnonzero(self.membership[:, vertex])
+        if len(own) == 1:
+            return int(own[0])
+        weights = self.weights[:, vertex]
+        return int(np.argmax(weights >= weights.max() - _EQUAL_WEIGHT))
+
     def members(self, region: int) -> IntArray:
         """Return the vertices of *region*, sorted."""
         require_region(region, self.n_regions)
@@ -234,7 +254,7 @@ class Regions(Described, Frozen):
 
     def with_membership(self, membership: BoolArray) -> Regions:
         """Return regions with another *membership* (s, n), otherwise like these."""
-        return Regions(self.mesh, membership, self.smoothness, self.carrier)
+        return Regions(self.mesh, membership, self.smoothness, self.carrier, self.leader)
 
 
 def _require_complete(membership: BoolArray, is_carried: BoolArray) -> None:
@@ -253,9 +273,9 @@ def _require_complete(membership: BoolArray, is_carried: BoolArray) -> None:
         )
 
 
-def _checked_carrier(mesh: Mesh, carrier: ArrayLike) -> IntArray:
+def _checked_carrier(mesh: Mesh, carrier: ArrayLike, name: str = "carrier") -> IntArray:
     """Return the *carrier* of each component of *mesh*; RegionError if one has no root."""
-    found, count = plain(carrier, "carrier"), int(mesh.components.max()) + 1
+    found, count = plain(carrier, name), int(mesh.components.max()) + 1
     is_valid = found.shape == (count,) and found.dtype.kind in "iu"
     if is_valid and ((found >= 0) & (found < count)).all():
         at = found.astype(np.int64)
@@ -264,8 +284,8 @@ def _checked_carrier(mesh: Mesh, carrier: ArrayLike) -> IntArray:
         if (found[at] == at).all():
             return read_only(found.astype(np.int64))
     raise RegionError(
-        f"carrier must be one of 0..{count - 1} for each of {count} components, and lead to one "
-        f"that carries itself; got {shown(carrier)}"
+        f"{name} must be one of 0..{count - 1} for each of {count} components, and lead to one "
+        f"that is its own; got {shown(carrier)}"
     )
 
 

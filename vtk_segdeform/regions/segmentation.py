@@ -53,6 +53,7 @@ def segment(
     overlap: int | None = None,
     attach: Attach | None = None,
     held: ArrayLike = (),
+    apart: ArrayLike = (),
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Regions:
@@ -77,6 +78,9 @@ def segment(
     held : (k,) int or (n,) bool
         Vertices that will be fixed or in handles.  Components with any of them follow none, unless
         *attach* has another carrier for them.
+    apart : (j,) int
+        Components whose volumes will change.  In the cage of another one they could not, so all
+        that follow each other with one of them get regions of their own, and follow in these.
     seed : int
         Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
@@ -112,6 +116,7 @@ def segment(
     tell(progress, 0.0, "sampling vertices")
     whole, kept = mesh, np.arange(n)
     carrier = carriers(mesh, attach, roots=mesh.components[as_ids(held, n, "held")])
+    carrier, leader = with_regions_apart(carrier, apart)
     main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)
@@ -141,10 +146,23 @@ def segment(
     every[kept] = labels
     is_carried = carrier != np.arange(len(carrier))
     every[is_carried[whole.components]] = labels[0]  # will be those of the carrier
-    follows = carrier if is_carried.any() else None
-    regions = Regions.from_labels(whole, every, overlap, carrier=follows)
+    follows = carrier if is_carried.any() or leader is not None else None
+    regions = Regions.from_labels(whole, every, overlap, carrier=follows, leader=leader)
     tell(progress, 1.0, "regions found")
     return regions
+
+
+def with_regions_apart(carrier: IntArray, apart: ArrayLike) -> tuple[IntArray, IntArray | None]:
+    """Return *carrier* (c,) without the trees of components *apart*, and the leaders in these."""
+    own = np.arange(len(carrier))
+    root = carrier
+    while (root[root] != root).any():
+        root = root[root]
+    ids = as_ids(apart, len(carrier), "apart")
+    moved = np.isin(root, root[ids]) & (carrier != own)
+    if not moved.any():
+        return carrier, None
+    return np.where(moved, own, carrier), np.where(moved, carrier, own)
 
 
 def _without_ties(mesh: Mesh) -> Mesh:

@@ -13,7 +13,7 @@ The files, in reading order:
     memo           the cache
     solving        the next pose of a state
     preparing      regions, cages and binding in advance
-    separating     regions of their own for components with handles
+    separating     components that follow others, and those with regions of their own
     finishing      poses finished on the mesh itself
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
@@ -30,7 +30,7 @@ from .finishing import FinishedPose
 from .handle_edits import Handles
 from .handles import require_handle
 from .listeners import Change
-from .naming import region_name
+from .naming import region_name, volume_label
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
@@ -59,4 +59,5 @@ __all__ = [
     "require_handle",
     "save_session",
     "saved_view",
+    "volume_label",
 ]

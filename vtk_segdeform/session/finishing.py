@@ -91,7 +91,7 @@ def finish(poses: Poses, state: State) -> Finish:
     Raises
     ------
     SessionError
-        If there is no pose, or nothing is fixed or in a handle.
+        If there is no pose, or nothing is fixed, in a handle or a volume that is set.
     """
     if reason := reason_not_to_finish(state):
         raise SessionError(reason)
@@ -133,8 +133,8 @@ def reason_not_to_finish(state: State) -> str:
     """Return why the pose of *state* cannot be finished, or ""."""
     if state.pose is None:
         return "there is no pose to finish; move a handle first"
-    if not (state.handles or len(state.fixed)):
-        return "there are no handles or fixed vertices to finish the pose for; add a handle"
+    if not (state.handles or len(state.fixed) or state.options.volumes):
+        return "no handle, fixed vertex or volume to finish the pose for; add a handle"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""Names of regions and handles.
+"""Names of regions, handles and volumes.
 
 A name is text in any script that can be shown on one line: at most 80 characters, without control
 characters, line breaks and characters that change the writing direction.
@@ -54,6 +54,18 @@ def region_name(names: Names, region: int) -> str:
     if not is_whole(region, 0):
         raise RegionError(f"region must be a whole number, 0 or more; got {shown(region)}")
     return (names[region] if region < len(names) else "") or f"region {region + 1}"
+
+
+def volume_label(names: Names, volume: str) -> str:
+    """Return what a *volume* of `Deformer.volume_names` is called where one counts from 1.
+
+    >>> volume_label(("", "arm"), "region 1"), volume_label((), "body 0"), volume_label((), "wall")
+    ('arm', 'body 1', 'wall')
+    """
+    kind, _, number = volume.rpartition(" ")
+    if kind not in ("body", "cavity", "component", "region") or not number.isdecimal():
+        return volume
+    return region_name(names, int(number)) if kind == "region" else f"{kind} {int(number) + 1}"
 
 
 def renamed(names: Names, region: int, name: str) -> Names:

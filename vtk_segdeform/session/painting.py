@@ -41,11 +41,12 @@ def with_regions(state: State, regions: Regions, names: naming.Names = ()) -> St
 
 
 def _same_carrier(old: Regions, new: Regions) -> bool:
-    """Return whether the same components carry others in both."""
-    one, other = old.carrier, new.carrier
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other)
+    """Return whether the same components carry or lead others in both."""
+    pairs = (old.carrier, new.carrier), (old.leader, new.leader)
+    return all(
+        one is other if one is None or other is None else np.array_equal(one, other)
+        for one, other in pairs
+    )
 
 
 def _still_fit(old: Regions, new: Regions, cages: Sequence[Cage]) -> bool:

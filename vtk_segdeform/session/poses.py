@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 
 from .. import sizes
 from ..arrays import FloatArray, frozen
-from ..deformer import Deformer
+from ..deformer import Deformer, Mirror
 from ..errors import CageError
 from ..files import cache_folder
 from ..geometry import Lids, lids_of
@@ -134,15 +134,16 @@ class Poses:
             )
 
         found = self.memo.get("bound", _binding(state), bound, _KEPT)
-        symmetry, stiffness = state.options.symmetry, state.stiffness
-        if symmetry is None and stiffness is None:
+        symmetry, stiffness, parts = state.options.symmetry, state.stiffness, state.parts
+        if symmetry is None and stiffness is None and not parts:
             return found
 
         def made() -> Deformer:
-            mirrored = found if symmetry is None else found.hold(symmetry=symmetry)
-            return mirrored if stiffness is None else mirrored.stiffened(stiffness)
+            is_same = symmetry is None and not parts
+            other = found if is_same else found.hold(symmetry=symmetry, parts=dict(parts))
+            return other if stiffness is None else other.stiffened(stiffness)
 
-        return self.memo.get("made", (found, symmetry, stiffness), made)
+        return self.memo.get("made", (found, symmetry, stiffness, parts), made)
 
     def adopt(self, state: State, deformer: Deformer) -> None:
         """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
@@ -284,6 +285,13 @@ class Poses:
     def carry(self, state: State, points: ArrayLike) -> FloatArray:
         """Return *points* (k, 3), given at rest, moved along with the mesh to the pose."""
         return self.bind(state).passengers(points).moved(state.cage_vertices)
+
+    def mirror(self, state: State) -> Mirror | None:
+        """Return the plane of symmetry with the option of *state*, if there is one."""
+        symmetry = state.options.symmetry
+        if symmetry is None:
+            return None
+        return self.memo.get("mirror", (symmetry,), lambda: Mirror.of(self.mesh, symmetry))
 
     # Volumes.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import IntArray
 from ..cages import Cage, fit_cages, require_cage_vertices, suggested_size
-from ..deformer import Deformer
+from ..deformer import Deformer, changing_components, checked_goals
 from ..errors import RegionError
 from ..mesh import Mesh
 from ..progress import Progress, part
@@ -35,7 +35,8 @@ def preparation(poses: Poses, state: State, progress: Progress | None = None) ->
     """Return the regions and cages that *state* lacks, bound."""
     mesh, regions = poses.mesh, state.regions
     if regions is None:
-        regions = segment(mesh, None, progress=part(progress, 0.0, _SEGMENTED), **following(state))
+        first = part(progress, 0.0, _SEGMENTED)
+        regions = segment(mesh, None, progress=first, **following(mesh, state))
     state = replace(state, regions=regions)
     cages = state.cages or fitted(mesh, state, part(progress, _SEGMENTED, _FITTED))
     state = State(regions, cages, options=state.options)
@@ -44,9 +45,11 @@ def preparation(poses: Poses, state: State, progress: Progress | None = None) ->
     return Preparation(regions, cages, deformer)
 
 
-def following(state: State) -> dict[str, Any]:
+def following(mesh: Mesh, state: State) -> dict[str, Any]:
     """Return the arguments of `segment` for what follows what in *state*."""
-    return {"attach": dict(state.options.attach), "held": held_firmly(state)}
+    options = state.options
+    changed = changing_components(mesh, options.lids, checked_goals(dict(options.volumes)))
+    return {"attach": dict(options.attach), "held": held_firmly(state), "apart": changed}
 
 
 def held_firmly(state: State) -> IntArray:

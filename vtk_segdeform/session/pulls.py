@@ -204,6 +204,18 @@ def released(state: State, vertices: FloatArray) -> State:
     return replace(state, pose=pose, locality=None)
 
 
+def kept(state: State, vertices: FloatArray) -> State:
+    """Return *state*, with the mesh at *vertices*, for changes of volumes: nothing else moves it.
+
+    All changes of volumes since the pull start from the same pose, so their order does not matter.
+    """
+    pose, locality = state.pose, state.locality
+    if pose is None or locality is None or not locality.reach:
+        return state
+    here = replace(locality, reach=0.0, cage_vertices=pose.cage_vertices)
+    return replace(released(state, vertices), locality=here)
+
+
 def last_pulled(mesh: Mesh, state: State) -> str | None:
     """Return the handle of the last pull; None if the pose does not come from a pull."""
     locality = state.locality
@@ -241,8 +253,11 @@ def localised(constrained: Deformer, locality: Locality, x: FloatArray) -> Defor
 
     *x* (n, 3) is the mesh with its cages in that pose.
     """
-    other = constrained.copy()
-    other.resume(locality.cage_vertices, x[other.handle])
+    other, rest = constrained.copy(), (cage.vertices for cage in constrained.cages)
+    if all(map(np.array_equal, locality.cage_vertices, rest)):
+        other.reset()  # to the shape that has the volumes which are set
+    else:
+        other.resume(locality.cage_vertices, x[other.handle])
     return other.local(locality.point, locality.reach, locality.spread, follows=locality.follows)
 
 

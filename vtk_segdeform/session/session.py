@@ -47,21 +47,21 @@ from ..deformer import (
     checked_place,
     checked_radius,
 )
-from ..errors import CageError, SessionError
+from ..errors import CageError, ConstraintError, SessionError
 from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
-from . import finishing, handles, naming, output, painting, preparing, pulls, solving
+from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
-from .separating import separated
+from .separating import apart, separated
 from .state import (
     Cages,
     Options,
@@ -72,6 +72,7 @@ from .state import (
     fitting_cages,
     label_of_change,
     of_mesh,
+    owned_parts,
     owned_slides,
 )
 from .timeline import Timeline
@@ -273,6 +274,11 @@ class Session(Described):
         return self.poses.lids(self.state)
 
     @property
+    def mirror(self) -> Mirror | None:
+        """The plane of symmetry with ``options.symmetry``, and the mates of the vertices."""
+        return self.poses.mirror(self.state)
+
+    @property
     def solution(self) -> Solution | None:
         """The solver's result for the current pose; None at rest, after loading or undo."""
         return self.poses.solution(self.state)
@@ -312,16 +318,45 @@ class Session(Described):
         progress: Progress | None = None,
     ) -> None:
         """Segment the mesh automatically; see `vtk_segdeform.segment`."""
-        follows = preparing.following(self.state)
-        regions = segment(
+        regions = self.segmented(n_regions, overlap=overlap, seed=seed, progress=progress)
+        self.history.step("segment", painting.with_regions(self.state, regions))
+
+    def segmented(
+        self,
+        n_regions: int | None = None,
+        *,
+        overlap: int | None = None,
+        seed: int = 0,
+        progress: Progress | None = None,
+    ) -> Regions:
+        """Return the regions of `segment`, without changing the session.
+
+        This may run in another thread; pass the result to `set_regions` in the session's thread.
+        """
+        follows = preparing.following(self.mesh, self.state)
+        return segment(
             self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
         )
-        self.history.step("segment", painting.with_regions(self.state, regions))
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
         """Set the regions; *label* names the undo step."""
         after = painting.with_regions(self.state, of_mesh(self.mesh, regions))
         self.history.step(require(label, str, "label"), after)
+
+    def attached(self, attach: Mapping[int, int | str], progress: Progress | None = None) -> State:
+        """Return the state after `attach`, without changing the session.
+
+        This may run in another thread; pass the result to ``history.step`` in the session's thread.
+        """
+        return separating.attached(self.poses, self.state, attach, progress)
+
+    def attach(self, attach: Mapping[int, int | str]) -> None:
+        """Let components follow others at once, by the option *attach* of `Options`.
+
+        Components that follow another one now, or no longer, get other regions and cages; the other
+        regions remain, and so does the pose, nearly.
+        """
+        self.history.step("change attached components", self.attached(attach))
 
     def region_name(self, region: int) -> str:
         """Return the name of a region, also of one that does not exist yet."""
@@ -658,15 +693,49 @@ class Session(Described):
         """Return one of `volumes`, and (V - V0) / V0."""
         return self.deformer.volume(name, self.vertices)
 
+    def volume_label(self, name: str) -> str:
+        """Return the volume called *name* as people see it, who count from 1: "body 1", "arm"."""
+        return naming.volume_label(self.state.region_names, as_text(name, "name"))
+
+    def set_part(self, name: str, vertices: ArrayLike | None) -> None:
+        """Let the part *vertices* of the surface have a volume called *name*, under a lid.
+
+        As the *parts* of `Deformer`; with None it has none any more, nor a goal.
+
+        Raises
+        ------
+        ConstraintError
+            If it encloses nothing, or another volume has this name.
+        """
+        as_text(name, "name")
+        others = tuple(pair for pair in self.state.parts if pair[0] != name)
+        after = replace(self.state, parts=others)
+        if vertices is None:
+            goals = tuple(pair for pair in self.options.volumes if pair[0] != name)
+            after = replace(after, options=replace(self.options, volumes=goals))
+            self.history.step(f"remove the volume of {name}", after)
+            return
+        if name in self.poses.bind(after).volume_names:
+            raise ConstraintError(f"there is a volume {name!r} already; choose another name")
+        after = replace(after, parts=(*others, *owned_parts(self.mesh, ((name, vertices),))))
+        try:
+            self.poses.bind(after).volume(name)
+        except ConstraintError as fault:
+            raise ConstraintError(f"vertices: {fault}") from None
+        self.history.step(f"add the volume of {name}", after)
+
     def forget_volume(self, name: str) -> None:
         """Let the volume called *name* have no goal of its own; call `refine` to apply it."""
         as_text(name, "name")
         goals = {own: goal for own, goal in self.options.volumes if own != name}
         options = replace(self.options, volumes=tuple(goals.items()))
-        self.history.step(f"forget the volume of {name}", replace(self.state, options=options))
+        label = f"forget the volume of {self.volume_label(name)}"
+        self.history.step(label, replace(self.state, options=options))
 
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
         """Change the volume called *name*, as part of a drag, like `drag`.
+
+        After a pull nothing moves but what the volume moves.
 
         Parameters
         ----------
@@ -683,12 +752,13 @@ class Session(Described):
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
         as_text(name, "name")
-        state = self._released(self.state)
-        goals = {**dict(state.options.volumes), name: goal}
+        goals = {**dict(self.options.volumes), name: goal}
+        state = apart(self.poses, self.state, goals)
+        state = pulls.kept(state, self.poses.vertices(state))
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
-        return self._drag(state, places, [f"the volume of {name}"], max_steps)
+        return self._drag(state, places, [f"the volume of {self.volume_label(name)}"], max_steps)
 
     def refine(
         self,
@@ -801,9 +871,10 @@ class Session(Described):
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
         if options.symmetry != self.options.symmetry:
-            Mirror.of(self.mesh, options.symmetry)  # raises if the mesh is not symmetric
+            self.poses.mirror(replace(self.state, options=options))  # raises if it is not symmetric
         label = label_of_change(self.options, options)
-        self.history.step(label, replace(self.state, options=options))
+        state = apart(self.poses, self.state, dict(options.volumes))
+        self.history.step(label, replace(state, options=options))
 
     # Undo and redo.
 

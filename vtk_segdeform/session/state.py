@@ -19,7 +19,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_points, frozen, is_number, is_whole
+from ..arrays import FloatArray, IntArray, as_ids, as_points, frozen, is_number, is_whole
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import (
@@ -40,6 +40,8 @@ from .naming import Names, checked_names, fault_of, region_name
 
 Attachments: TypeAlias = tuple[tuple[int, int | str], ...]
 """Components and their carriers; see `Options`."""
+Parts: TypeAlias = tuple[tuple[str, IntArray], ...]
+"""Names and vertices (k,) of parts of the surface; see `Deformer`."""
 Cages: TypeAlias = tuple[FloatArray, ...]
 """One (m_r, 3) float per region: the vertices of the cages in a pose."""
 
@@ -149,7 +151,7 @@ def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
     try:
         goals = dict(volumes)  # type: ignore[call-overload]
         checked_goals(goals)
-    except (TypeError, ValueError) as fault:
+    except (TypeError, ValueError, RuntimeError) as fault:
         text = str(fault) if isinstance(fault, ConstraintError) else f"got {shown(volumes)}"
         raise SessionError(f"volumes must be goals by name: {text}") from None
     return tuple(goals.items())
@@ -210,7 +212,7 @@ class Locality(Frozen):
     point: SurfacePoint
     """The grabbed point."""
     reach: float
-    """In the mesh's unit; infinite if all of the surface is free."""
+    """In the mesh's unit; infinite if all of the surface is free, 0 if only volumes move it."""
     spread: float
     """In the mesh's unit."""
     follows: float
@@ -247,6 +249,8 @@ class State(Described, Frozen):
     """(n,) float: as `Deformer` takes it."""
     slides: tuple[Slide, ...] = ()
     """As `Deformer` takes them, with read-only arrays."""
+    parts: Parts = ()
+    """Parts of the surface that have volumes under lids, with read-only arrays."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -292,7 +296,8 @@ class State(Described, Frozen):
                 and self.handles is other.handles
                 and self.fixed_at is other.fixed_at
                 and self.stiffness is other.stiffness
-                and self.slides is other.slides,
+                and self.slides is other.slides
+                and self.parts is other.parts,
             ),
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
@@ -350,6 +355,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     return State(
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
+        owned_parts(mesh, state.parts),
     )  # fmt: skip
 
 
@@ -363,10 +369,32 @@ def checked_stiffness(mesh: Mesh, stiffness: ArrayLike | None) -> FloatArray | N
 
 def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
     """Return checked *slides* with read-only arrays; ConstraintError if they are none."""
-    checked = checked_slides(mesh, slides)
+    try:
+        checked = checked_slides(mesh, slides)
+    except (TypeError, RuntimeError):
+        raise ConstraintError(f"slides must be some Slide; got {shown(slides)}") from None
     for each in checked:
         frozen(np.asarray(each.vertices))
     return checked
+
+
+def owned_parts(mesh: Mesh, parts: Sequence[tuple[str, ArrayLike]]) -> Parts:
+    """Return checked *parts* with read-only arrays; ConstraintError if they are none."""
+    require_sequence(parts, "parts")
+    try:
+        pairs = [(name, ids) for name, ids in parts]
+    except (TypeError, ValueError, RuntimeError):
+        raise ConstraintError(f"parts must be names and vertices; got {shown(parts)}") from None
+    found = []
+    for name, ids in pairs:
+        if fault := fault_of(name):
+            raise ConstraintError(f"a part{fault}")
+        try:
+            own = as_ids(ids, mesh.n_vertices, "vertices")
+        except ValueError as fault:
+            raise ConstraintError(f"the part {name!r}: {fault}") from None
+        found.append((name, frozen(own)))
+    return tuple(found)
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
@@ -376,7 +404,7 @@ def of_mesh(mesh: Mesh, regions: Regions) -> Regions:
     for mine, theirs in ((mesh.vertices, regions.mesh.vertices), (mesh.faces, regions.mesh.faces)):
         if not np.array_equal(mine, theirs):
             raise RegionError("these regions belong to another mesh; create them on this mesh")
-    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier)
+    return Regions(mesh, regions.membership, regions.smoothness, regions.carrier, regions.leader)
 
 
 def fitting_cages(
@@ -463,9 +491,9 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
     point = checked_place(mesh, require(locality.point, SurfacePoint, "state.locality.point"))
     reach = locality.reach
     is_infinite = isinstance(reach, float) and reach == np.inf
-    for length in (locality.spread, *([] if is_infinite else [reach])):
-        if not is_number(length, _TINY):
-            raise ConstraintError(f"the radius of a pull must be positive; got {shown(length)}")
+    if not (is_number(locality.spread, _TINY) and (is_infinite or is_number(reach, 0.0))):
+        lengths = shown(locality.spread), shown(reach)
+        raise ConstraintError(f"the radius of a pull must be positive; got {', '.join(lengths)}")
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     return replace(locality, point=point, cage_vertices=start.cage_vertices)

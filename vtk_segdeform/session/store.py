@@ -6,6 +6,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     mesh_vertices.npy     (n, 3) float     mesh_faces.npy   (m, 3) int
     membership.npy        (r, n) bool      region by vertex                        if any
     carrier.npy           (c,) int         `Regions.carrier`                       if any
+    leader.npy            (c,) int         `Regions.leader`                        if any
     cage_vertices.npy     (c, 3) float     cage_faces.npy   (k, 3) int             if any
     fixed.npy             (f,) int         handle.npy       (h,) int
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
@@ -176,6 +177,8 @@ def _write(
     options = {k: v for k, v in options.items() if k in _FIRST or v != defaults[k]}
     is_simple = given is None and mesh.is_closed and options.keys() <= _FIRST
     is_new = state.stiffness is not None or bool(state.slides)
+    is_new |= regions is not None and regions.leader is not None
+    is_new |= bool(state.parts) or (state.locality is not None and not state.locality.reach)
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": 3 if is_new else 1 if is_simple else 2,
@@ -200,6 +203,9 @@ def _write(
         if regions.carrier is not None:  # optional: earlier versions have the same membership
             header["n_components"] = len(regions.carrier)
             arrays["carrier"] = regions.carrier
+        if regions.leader is not None:
+            header["n_components"], header["has_leaders"] = len(regions.leader), True
+            arrays["leader"] = regions.leader
     if state.cages:
         arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
         arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
@@ -240,6 +246,9 @@ def _write(
             for ids, each in zip(sliding, state.slides, strict=True)
         ]
         arrays["sliding"] = np.concatenate(sliding)
+    if state.parts:
+        header["parts"] = [[name, len(ids)] for name, ids in state.parts]
+        arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -259,11 +268,13 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     regions = None
     if r:
         membership = archive.array("membership", "b", (r, n))
-        carrier = None
+        carrier = leader = None
         if "n_components" in header:
             count = field(header, "n_components", whole)
             carrier = archive.array("carrier", "i", (count,))
-        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier)
+            if "has_leaders" in header:
+                leader = archive.array("leader", "i", (count,))
+        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier, leader)
     counts = field(header, "cages", list_of(row_of(whole, whole)))
     n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
     total = sum(n_vertices)
@@ -328,6 +339,11 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         more["slides"] = tuple(
             Slide(ids, *kind) for ids, (_, *kind) in zip(own, kinds, strict=True)
         )
+    if "parts" in header:
+        named = field(header, "parts", list_of(row_of(text, whole)))
+        lengths = [count for _, count in named]
+        own = split_rows(archive.array("parts", "i", (sum(lengths),)), lengths)
+        more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     if "surface" not in header:

@@ -17,17 +17,20 @@ from typing import Any
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
+from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.regions import segment as segment_mesh
 from vtk_segdeform.session import FinishedPose, State
 
+from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
 from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
 from .session_file import pose_remark, write_posed
 from .widget_set import Mode
+
+_GROWTH = 20  # per cent of the volume of a part at rest, at each press
 
 Action = Callable[[Controller], None]
 
@@ -53,7 +56,12 @@ def selector_of(controller: Controller) -> RegionSelector:
 
 def painting(target: Paint) -> Action:
     """Return the action that selects the *target* of painting."""
-    return assigning(selector_of, "paints", target)
+
+    def paint(controller: Controller) -> None:
+        selector_of(controller).paints = target
+        controller.widgets.show(controller.mode)
+
+    return paint
 
 
 # In all modes.
@@ -168,9 +176,32 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
         return f"{_count(regions.n_regions, 'region')} found{_reset(controller, before)}"
 
     def work(progress: Progress) -> Regions:
-        return segment_mesh(session.mesh, n_regions, progress=progress)
+        return session.segmented(n_regions, progress=progress)
 
     controller.start("Detecting regions", work, show)
+
+
+def attaching(component: int, carrier: str, label: str) -> Action:
+    """Return the action that lets a *component* follow another one: its number, "free", "auto".
+
+    *label* names the undo step, and what has happened.
+    """
+
+    def attach(controller: Controller) -> None:
+        session, before = controller.session, controller.session.state
+        wanted = {k: other for k, other in before.options.attach if k != component}
+        if carrier != "auto":
+            wanted[component] = carrier if carrier == FREE else int(carrier)
+
+        def show(after: State) -> str:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while cages were being fitted. Try again")
+            session.history.step(label, after)
+            return label[:1].upper() + label[1:]
+
+        controller.start("Fitting cages", partial(session.attached, wanted), show)
+
+    return attach
 
 
 def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> None:
@@ -322,6 +353,70 @@ def unpin_all(controller: Controller) -> None:
     controller.say(f"Removed {_count(len(names), 'point')}")
 
 
+# The volume of the part under the hand: the region of the last pulled point or active handle.
+
+
+def keep_part(controller: Controller) -> None:
+    """Keep the volume of the part under the hand as at rest; if it has a goal, no longer."""
+    name, session = _part(controller), controller.session
+    label = session.volume_label(name)
+    if name in dict(session.options.volumes):
+        forgetting_volume(name)(controller)
+    else:
+        is_kept = session.options.preserve_region_volumes
+        setting_volume(name, "free" if is_kept else "keep")(controller)
+    controller.say(f"Volume of {label} {'kept' if controller.widgets.keeps_part else 'free'}")
+
+
+def grow_part(controller: Controller) -> None:
+    """Let the part under the hand have 20 % more of its volume at rest than now, in whole %."""
+    name = _part(controller)
+    goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
+    setting_volume(name, f"{goal:+}%")(controller)
+
+
+def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
+    """Return the action that sets the goal of a volume; with *join*, moves are one undo step."""
+
+    def change(controller: Controller) -> None:
+        session = controller.session
+        session.set_volume(name, goal, max_steps=STEPS)
+        session.commit(f"set the volume of {session.volume_label(name)}", join=join)
+        _settle(controller)
+
+    return change
+
+
+def forgetting_volume(name: str) -> Action:
+    """Return the action that lets a volume have no goal of its own."""
+
+    def forget(controller: Controller) -> None:
+        controller.session.forget_volume(name)
+        controller.session.refine(max_steps=STEPS)
+        _settle(controller)
+
+    return forget
+
+
+def _settle(controller: Controller) -> None:
+    """Let the pose converge in the next moments, and be finished unless it is that of a pull."""
+    controller.widgets.resume_refining()
+    if controller.session.state.locality is None:
+        controller.finishing.rest()
+
+
+def _part(controller: Controller) -> str:
+    """Return the name of the volume of the part under the hand."""
+    session, part = controller.session, controller.widgets.part
+    if not session.is_bound:
+        raise SessionError("The mesh is not ready yet. Wait until it is prepared")
+    if part is None:
+        raise ConstraintError("Pull the surface first, or select a handle")
+    if part not in session.deformer.volume_names:
+        raise ConstraintError(f"{session.volume_label(part)} encloses no volume")
+    return part
+
+
 # Painting.
 
 
@@ -341,14 +436,32 @@ def select_all(controller: Controller) -> None:
         controller.say(selector.remark)
 
 
+def toggle_stiffness(controller: Controller) -> None:
+    """Paint the stiffness of the surface instead of regions, or regions again."""
+    is_on = controller.widgets.selector.paints is Paint.STIFFNESS
+    painting(Paint.REGION if is_on else Paint.STIFFNESS)(controller)
+
+
+def painting_stiffness(stiffness: float) -> Action:
+    """Return the action that selects a *stiffness* for painting."""
+
+    def choose(controller: Controller) -> None:
+        controller.widgets.selector.stiffness = stiffness
+        painting(Paint.STIFFNESS)(controller)
+
+    return choose
+
+
 def next_region(controller: Controller) -> None:
     """Select the next region for painting."""
+    painting(Paint.REGION)(controller)
     widgets = controller.widgets
     widgets.choose_region((widgets.selector.region + 1) % max(1, widgets.n_regions))
 
 
 def new_region(controller: Controller) -> None:
     """Start painting a new region."""
+    painting(Paint.REGION)(controller)
     controller.widgets.choose_region(controller.widgets.n_regions)
 
 

@@ -99,6 +99,7 @@ BINDINGS = (
     Binding("new_region", ("a",), R, "New region", actions.new_region),
     Binding("merge_region", ("m",), R, "Merge with region under pointer", actions.merge_region),
     Binding("split_region", ("x",), R, "Split region", actions.split_region),
+    Binding("paint_stiffness", ("s",), R, "Paint stiffness or regions", actions.toggle_stiffness),
     Binding("paint_fixed", ("s",), H, "Paint fixed vertices", actions.painting(Paint.FIXED)),
     Binding("paint_handle", ("d",), H, "Paint handle", actions.painting(Paint.HANDLE)),
     Binding("new_handle", ("a",), H, "New handle", actions.new_handle),
@@ -114,6 +115,8 @@ BINDINGS = (
     Binding(
         "show_volume_change", ("o",), P | C | D, "Show local volume change", actions.toggle_overlay
     ),
+    Binding("keep_part", ("shift+p",), DRAGGING, "Keep volume of part", actions.keep_part),
+    Binding("grow_part", ("e",), DRAGGING, "Enlarge part by 20 %", actions.grow_part),
     Binding("", ("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),
     Binding("", ("return",), DRAGGING, "After a number: drag by that amount", None),
     # How the mesh is shown.

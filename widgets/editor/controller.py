@@ -455,6 +455,7 @@ class Controller:
     def _accept(self, session: Session, preparation: Preparation) -> None:
         was_modified = self.file.is_modified(session)
         session.accept(preparation)
+        self.widgets.overlay.region_volumes.prepare()  # so that the first frame need not
         self._load_later()
         self.file.prepared(session, was_modified=was_modified)
         self.refresh()

@@ -5,7 +5,9 @@ A hint names the key for that step, so that the user can reach every mode from e
 
 from __future__ import annotations
 
-from vtk_segdeform.session import Session, region_name
+import math
+
+from vtk_segdeform.session import Session, region_name, volume_label
 from vtk_segdeform.solver import Solution, Status
 
 from ..puller import LOCKED
@@ -48,7 +50,8 @@ def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     if mode is Mode.DEFORM:
         return _deform_hint(widgets, keys)
     now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets, keys)
-    if mode is Mode.REGIONS and widgets.session.state.pose is not None:
+    resets = mode is Mode.REGIONS and widgets.selector.paints is Paint.REGION
+    if resets and widgets.session.state.pose is not None:
         now += ". A stroke resets the pose"
     next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
@@ -62,8 +65,13 @@ def _painting_hint(widgets: WidgetSet, keys: Keys) -> str:
         target = brief(name, region_name((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         target = "fixed vertices"
+    elif selector.paints is Paint.STIFFNESS:
+        is_rigid = selector.stiffness == math.inf
+        target = "rigid parts" if is_rigid else f"{selector.stiffness:g} times the usual stiffness"
     else:
         target = "new handle" if selector.handle is None else selector.handle
+    if widgets.session.options.symmetry and selector.paints in (Paint.FIXED, Paint.STIFFNESS):
+        target += " on both sides"
     through = " (X-ray)" if selector.through else ""
     return f"{keys[TOOLS[selector.tool]].label}: paint {target}{through}. Ctrl: erase"
 
@@ -75,21 +83,41 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
     if widgets.puller.waiting.is_active:
         return "Preparing: the pull starts in a moment · Esc to cancel"
     if session.is_dragging:
-        return _drag_hint(session, "X Y Z: axis. R: turn. ")
+        return _drag_hint(widgets, "X Y Z: axis. R: turn. ")
     if _is_volume_off(session):
         return f"Drag the surface · {_volume_off(keys)}"
-    if session.history.undo_label == "pull":
-        return f"Drag the surface. Shift-click pins. {keys.cap('undo')}: undo"
+    part = _part(widgets, keys)
+    if part or session.history.undo_label == "pull":
+        return f"Drag the surface. Shift-click pins. {part or keys.cap('undo') + ': undo'}"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
     share = f"{radius:.1f}".removesuffix(".0")  # as in the panel
     return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({share} %)"
 
 
-def _drag_hint(session: Session, own: str = "") -> str:
+def _drag_hint(widgets: WidgetSet, own: str = "") -> str:
+    session = widgets.session
     volume = f"Volume {signed(100.0 * session.volume_change, 2)} %"
     if not session.has_volume:
         volume = "No volume to preserve"
-    return f"{volume} · {own}Esc to cancel"
+    return " · ".join(filter(None, (volume, _part(widgets), f"{own}Esc to cancel")))
+
+
+def _part(widgets: WidgetSet, keys: Keys | None = None) -> str:
+    """Return the volume change of the part under the hand, "Arm +14 %"; "" if it is 0 %.
+
+    With *keys*, also the key that keeps this volume, unless it has a goal.
+    """
+    session, part = widgets.session, widgets.part
+    if part is None or not session.is_bound:
+        return ""
+    change = signed(100.0 * widgets.overlay.region_volumes.change(part), 0)
+    if change == "0":
+        return ""
+    text = f"{brief(session.volume_label(part), volume_label((), part))} {change} %"
+    text = text[:1].upper() + text[1:]
+    if keys is None or widgets.keeps_part:
+        return text
+    return f"{text} · {keys.cap('keep_part')}: keep its volume"
 
 
 def _is_volume_off(session: Session) -> bool:
@@ -104,7 +132,7 @@ def _volume_off(keys: Keys) -> str:
 def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
     if session.is_dragging:
-        return _drag_hint(session)
+        return _drag_hint(widgets)
     stuck = _out_of_reach(widgets)
     if stuck:
         return stuck
@@ -120,7 +148,8 @@ def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     fixing = f" · {keys.cap('handles')}, {keys.cap('paint_fixed')}: paint fixed vertices"
     next_step = "" if len(session.fixed) else fixing
     axes = f" · Local axes ({keys.cap('local_axes')})" if widgets.dragger.local else ""
-    return f"Move or rotate a handle{axes}{next_step}{further}"
+    part = f" · {text}" if (text := _part(widgets, keys)) else ""
+    return f"Move or rotate a handle{axes}{part}{next_step}{further}"
 
 
 def _fault(solution: Solution | None) -> str:

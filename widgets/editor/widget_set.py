@@ -14,7 +14,7 @@ from contextlib import ExitStack
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Options, Session
+from vtk_segdeform.session import Options, Session, pulls
 
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
@@ -25,7 +25,6 @@ from ..region_selector import (
     RegionColours,
     RegionOutlines,
     RegionSelector,
-    dominant_region,
 )
 from ..scene import Pointer, SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
@@ -98,6 +97,24 @@ class WidgetSet:
         is_default = wanted == Options().n_cage_vertices
         return suggested_size(session.regions) if session.regions and is_default else wanted
 
+    @property
+    def part(self) -> str | None:
+        """The volume under the hand: of the region of the dragged, or else the active handle."""
+        session, drag = self.session, self.session.history.drag
+        moved = [] if drag is None else [each for each in drag.moved if each in session.handles]
+        name, regions = moved[-1] if moved else self.dragger.handle, session.regions
+        if name is None or regions is None:
+            return None
+        ids = session.handles[name]
+        return f"region {regions.label_at(pulls.middle_vertex(session.mesh, ids))}"
+
+    @property
+    def keeps_part(self) -> bool:
+        """Whether the volume of `part` is preserved or set."""
+        options = self.session.options
+        goal = dict(options.volumes).get(self.part or "")
+        return options.preserve_region_volumes if goal is None else goal != "free"
+
     def choose_region(self, region: int) -> None:
         """Select *region* for painting; an index after the last one adds a region.
 
@@ -119,11 +136,10 @@ class WidgetSet:
 
     def enter(self, mode: Mode) -> None:
         """Activate the widget of *mode* and show its actors."""
-        if mode is Mode.REGIONS:
+        in_regions = self.selector.paints in (Paint.REGION, Paint.STIFFNESS)
+        if mode is Mode.REGIONS and not in_regions:
             self.selector.paints = Paint.REGION
-        elif mode is Mode.HANDLES and (
-            self.selector.paints is Paint.REGION or not self.session.handles
-        ):
+        elif mode is Mode.HANDLES and (in_regions or not self.session.handles):
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
         self.surface.instead = None
         self.show(mode)
@@ -138,6 +154,7 @@ class WidgetSet:
             regions=mode is Mode.REGIONS,
             handles=mode in (Mode.PULL, Mode.HANDLES, Mode.DEFORM),
             hidden=self.dragger.hidden,
+            stiffness=mode is Mode.REGIONS and self.selector.paints is Paint.STIFFNESS,
         )
         self.outlines.show(
             lines=self.regions_wanted and mode is not Mode.REGIONS,
@@ -167,7 +184,7 @@ class WidgetSet:
     def copy_settings(self, before: WidgetSet) -> None:
         """Use the same tools, sizes and display options as the widgets *before*."""
         mine, its = self.selector, before.selector
-        mine.tool, mine.through = its.tool, its.through
+        mine.tool, mine.through, mine.stiffness = its.tool, its.through, its.stiffness
         size = self.session.mesh.diagonal / before.session.mesh.diagonal
         mine.radius = size * its.radius
         self.puller.radius = size * before.puller.radius
@@ -200,7 +217,7 @@ class WidgetSet:
             return None
         if regions is None:
             return self.session.vertices[self._picker.component(hit.vertex)]
-        return self.session.vertices[regions.members(dominant_region(regions, hit.vertex))]
+        return self.session.vertices[regions.members(regions.label_at(hit.vertex))]
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""
@@ -232,6 +249,11 @@ class WidgetSet:
         """Show nothing at the pointer until it moves again, as the view has moved under it."""
         self.puller.leave()
         self.selector.leave()
+
+    def resume_refining(self) -> None:
+        """Refine a pose that has not converged; its widget is on."""
+        self.puller.resume_refining()
+        self.dragger.resume_refining()
 
     def finish(self) -> None:
         """Finish the ongoing drag or stroke as if the button had been released."""

@@ -60,6 +60,16 @@ def handles_section(editor: DeformEditor) -> Section:
                 ),
             ),
             Field(
+                "handles.volume",
+                "toggle",
+                "Volume under a lid",
+                "Lists the volume of this part of the surface, under a lid, in the section Volumes",
+                value=handle in dict(session.state.parts),
+                enabled=exists and session.is_bound,
+                visible=mode is not Mode.PULL,
+                act=lambda on: _with_volume(str(handle), on),
+            ),
+            Field(
                 "handles.slide",
                 "toggle",
                 "Fixed part slides in its plane",
@@ -166,6 +176,11 @@ def _showing(key: str, on: bool) -> Action:
         controller.widgets.show(controller.mode)
 
     return show
+
+
+def _with_volume(name: str, on: bool) -> Action:
+    """Return the action that makes the vertices of a handle a part with a volume, or no longer."""
+    return lambda c: c.session.set_part(name, c.session.handles[name] if on else None)
 
 
 def _convert(controller: Controller) -> None:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ..editor import TOOLS, DeformEditor, Mode, actions
-from ..region_selector import Tool
+from ..editor import TOOLS, Action, DeformEditor, Mode, actions
+from ..region_selector import Paint, Tool
 from .fields import Field, Section, key_button
+from .regions import STIFFNESS
+
+_REGIONS = "regions"
 
 
 def painting_section(editor: DeformEditor) -> Section:
@@ -14,6 +17,10 @@ def painting_section(editor: DeformEditor) -> Section:
     selector, keys = editor.widgets.selector, editor.keys
     diagonal = editor.session.mesh.diagonal
     decimals = max(0, 4 - math.floor(math.log10(diagonal)))
+    what = f"{selector.stiffness:g}" if selector.paints is Paint.STIFFNESS else _REGIONS
+    choices = [("Regions", _REGIONS), *((f"Stiffness: {each.lower()}", s) for each, s in STIFFNESS)]
+    if what not in {value for _, value in choices}:  # set by a script
+        choices.append((f"Stiffness: {what}", what))
     tools = tuple(
         key_button(keys, f"paint.{action}", action, value=selector.tool is tool, group="tools")
         for tool, action in TOOLS.items()
@@ -22,6 +29,17 @@ def painting_section(editor: DeformEditor) -> Section:
         "paint",
         "Paint with",
         (
+            Field(
+                "paint.what",
+                "choice",
+                "Paint",
+                "Regions, or how stiff the surface is: orange is stiff, blue soft, black rigid",
+                "paint_stiffness",
+                value=what,
+                choices=tuple(choices),
+                visible=editor.mode is Mode.REGIONS,
+                act=_painting,
+            ),
             tools[:3],
             tools[3:],
             Field(
@@ -56,3 +74,9 @@ def painting_section(editor: DeformEditor) -> Section:
             ),
         ),
     )
+
+
+def _painting(what: str) -> Action:
+    if what == _REGIONS:
+        return actions.painting(Paint.REGION)
+    return actions.painting_stiffness(float(what))

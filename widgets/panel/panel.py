@@ -20,7 +20,7 @@ from .pulling import pull_section
 from .regions import regions_section
 from .status import history, status
 from .toolbar import toolbar
-from .volumes import volumes_section
+from .volumes import bodies_section, volumes_section
 
 # From the top of the panel, with the modes of each.
 _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
@@ -29,6 +29,7 @@ _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (cages_section, {Mode.CAGES}),
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
+    (bodies_section, {Mode.PULL, Mode.DEFORM}),
     (regions_section, {Mode.REGIONS, Mode.CAGES, Mode.DEFORM}),
     (painting_section, {Mode.REGIONS, Mode.HANDLES}),
 )

@@ -11,7 +11,14 @@ from ..volume_overlay import in_tenths
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button
 
 _MOST_REGIONS = 20  # regions of a segmentation
-_STIFFNESS = (("Usual", "1"), ("3 times", "3"), ("10 times", "10"), ("Rigid", "inf"))
+STIFFNESS = (
+    ("Soft (0.3)", "0.3"),
+    ("Usual", "1"),
+    ("3 times", "3"),
+    ("10 times", "10"),
+    ("Rigid", "inf"),
+)
+"""The choices of a stiffness."""
 _COLUMNS = (
     Column("cage", "Cage", "Number of cage vertices. Tick: show the cage"),
     Column("volume", "Volume"),
@@ -61,7 +68,7 @@ def regions_section(editor: DeformEditor) -> Section:
                 "How much stiffer the selected regions are; rigid ones keep their shape",
                 value=_stiffness(editor, existing),
                 enabled=bool(existing),
-                choices=_STIFFNESS,
+                choices=STIFFNESS,
                 act=lambda times: _stiffening(existing, times),
             ),
             (
@@ -94,10 +101,10 @@ def _stiffness(editor: DeformEditor, chosen: list[int]) -> str:
     """Return the choice that fits the stiffness of the *chosen* regions best."""
     stiffness, regions = editor.session.state.stiffness, editor.session.regions
     if stiffness is None or regions is None or not chosen:
-        return _STIFFNESS[0][1]
+        return "1"
     median = float(np.median(stiffness[np.isin(regions.labels, chosen)]))
     return min(
-        (times for _, times in _STIFFNESS),
+        (times for _, times in STIFFNESS),
         key=lambda times: 0.0 if float(times) == median else abs(float(times) - median),
     )
 

@@ -1,4 +1,4 @@
-"""The toolbar: files, undo and redo, the modes, the rest pose, what is shown, and help."""
+"""The toolbar: files, undo and redo, the modes, the volume of a part, what is shown, and help."""
 
 from __future__ import annotations
 
@@ -57,7 +57,15 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
         )
         for mode in Mode
     ]
+    has_part = is_free and editor.mode in (Mode.PULL, Mode.DEFORM) and editor.session.is_bound
     others = [
+        key_button(
+            keys,
+            "keep_part",
+            "keep_part",
+            "Keep part",
+            enabled=has_part and editor.widgets.part is not None,
+        ),
         Field(
             "compare",
             "hold",

@@ -1,22 +1,34 @@
-"""The section with the volumes of the mesh by name, and the plane of symmetry."""
+"""The sections with the volumes of the mesh by name, and with its bodies."""
 
 from __future__ import annotations
 
+from functools import partial
 from weakref import WeakKeyDictionary
 
-from vtk_segdeform.session import Session
+import numpy as np
 
-from ..editor import Action, Controller, DeformEditor
-from ..handle_dragger import STEPS
-from ..volume_overlay import percent
-from .fields import Field, Section, option
+from vtk_segdeform.geometry import FREE
+from vtk_segdeform.pictures import BODY, of_region, rgb
+from vtk_segdeform.session import Session
+from vtk_segdeform.solver import Bodies
+
+from ..editor import Action, Controller, DeformEditor, actions
+from ..volume_overlay import brief, in_tenths, percent
+from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button, option
 
 _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
 _LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
 _DEFAULT, _KEEP, _FREE, _SET = "default", "keep", "free", "set"
 _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set", _SET))
+_MOST_BODIES, _AUTO, _NOTHING = 12, "auto", "Nothing"
+_COLUMNS = (
+    Column("volume", "Volume", "In the unit of the mesh, cubed"),
+    Column("change", "Change"),
+    Column("follows", "Follows"),
+)
 _SYMMETRY = (("None", "none"), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
 _chosen: WeakKeyDictionary[Controller, str] = WeakKeyDictionary()
+_bodies: WeakKeyDictionary[Session, Bodies] = WeakKeyDictionary()
 
 
 def volumes_section(editor: DeformEditor) -> Section:
@@ -29,6 +41,8 @@ def volumes_section(editor: DeformEditor) -> Section:
     volume, change = session.volume(name) if name else (0.0, 0.0)
     goal = dict(session.options.volumes).get(name, _DEFAULT)
     kind = goal if goal in (_DEFAULT, _KEEP, _FREE) else _SET
+    part = editor.widgets.part
+    has_part = part in names
     return Section(
         "volumes",
         "Volumes",
@@ -61,7 +75,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 maximum=_MOST,
                 unit="%",
                 on_release=session.mesh.n_vertices > _LIVE,
-                act=lambda share: _setting(name, f"{share:+g}%"),
+                act=lambda share: actions.setting_volume(name, f"{share:+g}%", join=True),
             ),
             Field(
                 "volumes.goal",
@@ -72,6 +86,25 @@ def volumes_section(editor: DeformEditor) -> Section:
                 enabled=bool(name),
                 choices=_GOALS,
                 act=lambda kind: _with_goal(name, kind, change),
+            ),
+            (
+                Field(
+                    "volumes.keep_part",
+                    "toggle",
+                    f"Keep {_short(session, part) if part else 'region'}",
+                    "Keeps the volume of the region of the pulled point or active handle",
+                    "keep_part",
+                    value=has_part and editor.widgets.keeps_part,
+                    enabled=has_part,
+                    act=lambda _: actions.keep_part,
+                ),
+                key_button(
+                    editor.keys,
+                    "volumes.grow_part",
+                    "grow_part",
+                    "Enlarge by 20 %",
+                    enabled=has_part,
+                ),
             ),
             Field(
                 "volumes.symmetry",
@@ -86,14 +119,108 @@ def volumes_section(editor: DeformEditor) -> Section:
     )
 
 
+def bodies_section(editor: DeformEditor) -> Section:
+    """Return the largest bodies, if there are several, and what they follow."""
+    session, name = editor.session, _chosen.get(editor.controller, "")
+    if session.is_bound:
+        _bodies[session] = session.deformer.bodies
+    bodies = _bodies.get(session)  # they are the same while other cages are being bound
+    count, shown = 0, dict[str, int | None]()
+    if bodies is not None:
+        count = int(np.count_nonzero(bodies.volumes > 0.0))
+        largest = np.argsort(-bodies.volumes, kind="stable")[: min(count, _MOST_BODIES)]
+        shown = {f"body {k}": _component(bodies, k) for k in largest.tolist()}
+    name = name if name in shown else next(iter(shown), "")
+    component = shown.get(name)
+    attached = _AUTO
+    choices = [("Automatic", _AUTO), (_NOTHING, FREE)]
+    if bodies is not None and component is not None:
+        attached = str(dict(session.options.attach).get(component, _AUTO))
+        others = {str(c) for c in shown.values() if c is not None} | {attached}
+        others -= {str(component), _AUTO, FREE}
+        choices += [(_carrier(bodies, int(c)), c) for c in sorted(others, key=int)]
+    return Section(
+        "bodies",
+        "Bodies",
+        (
+            Table(
+                "bodies.list",
+                "Body",
+                _COLUMNS,
+                tuple(_row(editor, each, c, is_chosen=each == name) for each, c in shown.items()),
+                "The closed parts of the mesh, the largest first. "
+                "The selected one is that of the section Volumes as well",
+                n_rows=4,
+                acts={"select": lambda keys: _choosing(next(iter(keys), ""))},
+            ),
+            Field(
+                "bodies.more",
+                "label",
+                "Not listed",
+                "Bodies that are smaller than those in the list",
+                value=f"{count - len(shown):,} smaller ones",
+                visible=count > len(shown),
+            ),
+            Field(
+                "bodies.follows",
+                "choice",
+                "Follows",
+                "What the selected body moves with; it gets other regions and cages at once",
+                value=attached,
+                enabled=component is not None,
+                choices=tuple(choices),
+                act=partial(_attaching, session.volume_label(name), component or 0, tuple(choices)),
+            ),
+        ),
+        visible=count > 1,
+    )
+
+
+def _attaching(
+    label: str, component: int, choices: tuple[tuple[str, str], ...], carrier: str
+) -> Action:
+    """Return the action that lets the body called *label* follow another one."""
+    what = next(text for text, each in choices if each == carrier).lower()
+    what = "automatically" if carrier == _AUTO else what
+    return actions.attaching(component, carrier, f"{label} follows {what}")
+
+
+def _component(bodies: Bodies, body: int) -> int | None:
+    """Return the outer component of a *body*; None for a chamber, which has none of its own."""
+    own = np.setdiff1d(np.flatnonzero(bodies.of_component == body), bodies.cavities)
+    return int(own[0]) if len(own) else None
+
+
+def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: bool) -> Row:
+    session = editor.session
+    bodies, regions = _bodies[session], session.regions
+    volume = change = follows = ""
+    if session.is_bound:
+        share = editor.widgets.overlay.region_volumes.change(name)
+        rest = float(bodies.volumes[int(name.rpartition(" ")[2])])
+        volume, change = f"{rest * (1.0 + share):.4g}", in_tenths(share)
+    colour = rgb(BODY)
+    if component is not None and regions is not None:
+        carrier = component if regions.carrier is None else int(regions.carrier[component])
+        follows = _NOTHING if carrier == component else _carrier(bodies, carrier)
+        colour = of_region(regions.label_at(int((session.mesh.components == component).argmax())))
+    cells = Cell(volume), Cell(change), Cell(follows)
+    return Row(name, _label(session, name), as_rgb(colour), cells, is_chosen)
+
+
+def _carrier(bodies: Bodies, component: int) -> str:
+    body = int(bodies.of_component[component])
+    return f"Body {body + 1}" if body >= 0 else f"Component {component + 1}"
+
+
 def _label(session: Session, name: str) -> str:
-    """Return what a volume is called in the window, where one counts from 1."""
-    kind, _, number = name.rpartition(" ")
-    if not (kind and number.isdecimal()):
-        return name.capitalize()
-    if kind == "region":
-        return session.region_name(int(number)).capitalize()
-    return f"{kind.capitalize()} {int(number) + 1}"
+    label = session.volume_label(name)
+    return label[:1].upper() + label[1:]
+
+
+def _short(session: Session, name: str) -> str:
+    label = session.volume_label(name)
+    return brief(label, label)
 
 
 def _choosing(name: str) -> Action:
@@ -103,19 +230,7 @@ def _choosing(name: str) -> Action:
     return choose
 
 
-def _setting(name: str, goal: str) -> Action:
-    """Return the action that changes a volume; moves of the slider are one undo step."""
-
-    def change(controller: Controller) -> None:
-        session = controller.session
-        session.set_volume(name, goal, max_steps=STEPS)
-        session.commit(f"set the volume of {name}", join=True)
-        controller.finishing.rest()
-
-    return change
-
-
 def _with_goal(name: str, kind: str, change: float) -> Action:
     if kind == _DEFAULT:
-        return lambda controller: controller.session.forget_volume(name)
-    return _setting(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)
+        return actions.forgetting_volume(name)
+    return actions.setting_volume(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)

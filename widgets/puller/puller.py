@@ -133,6 +133,11 @@ class Puller(Widget):
         """Leave the current pose as it is, even if it has not converged."""
         self._live.halt()
 
+    def resume_refining(self) -> None:
+        """Refine the current pose if it has not converged and the widget is on."""
+        if self.GetEnabled():
+            self._live.resume()
+
     @property
     def marked(self) -> tuple[str, ...]:
         """The names of the pins and pulled points."""
@@ -147,7 +152,7 @@ class Puller(Widget):
         if not self.GetEnabled():
             super().On()
             self._markers.show(True)
-            self._live.resume()
+            self.resume_refining()
 
     def Off(self) -> None:  # noqa: N802
         """Stop handling events and refining; finish an ongoing gesture."""

@@ -12,7 +12,6 @@ The files, in reading order:
 """
 
 from .brush_ring import BrushRing
-from .paint_target import dominant_region
 from .region_colours import RegionColours
 from .region_outlines import RegionOutlines
 from .region_selector import Paint, RegionSelector, Tool
@@ -24,5 +23,4 @@ __all__ = [
     "RegionOutlines",
     "RegionSelector",
     "Tool",
-    "dominant_region",
 ]

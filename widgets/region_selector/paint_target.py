@@ -1,5 +1,8 @@
 """The target of a stroke, to which vertices are added: a region, the fixed vertices or a handle.
 
+Or the stiffness of the surface, which a stroke changes, by factors, the less towards the rim of a
+brush.  Rigid is what is rigid by at least a half.
+
 A vertex is fixed, or in one handle, or neither, and it is in at least one region.  Adding therefore
 skips vertices that are already fixed or in a handle, and erasing from a region skips vertices of no
 other region.  If a stroke would skip all its vertices, an error gives the reason.
@@ -13,13 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vtk_segdeform.arrays import BoolArray
+from vtk_segdeform.arrays import BoolArray, FloatArray
 from vtk_segdeform.errors import ConstraintError, RegionError
 from vtk_segdeform.pictures import FIXED, of_region, rgb
-from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 
 from ..scene import handle_colour
+from .region_colours import stiffness_colours
 
 
 class Paint(enum.Enum):
@@ -28,22 +31,18 @@ class Paint(enum.Enum):
     REGION = enum.auto()
     FIXED = enum.auto()
     HANDLE = enum.auto()
-
-
-def dominant_region(regions: Regions, vertex: int) -> int:
-    """Return the region with the largest blend weight at *vertex*."""
-    own = np.flatnonzero(regions.membership[:, vertex])
-    return int(own[0] if len(own) == 1 else regions.labels[vertex])  # labels need all weights
+    STIFFNESS = enum.auto()
 
 
 @dataclass(frozen=True)
 class PaintTarget:
-    """One region, the fixed vertices, or one handle, of a session with n vertices."""
+    """One region, the fixed vertices, one handle or a stiffness, of a session with n vertices."""
 
     session: Session
     paint: Paint
     region: int
     handle: str | None
+    stiffness: float = 1.0
 
     @property
     def colour(self) -> NDArray[np.uint8]:
@@ -52,6 +51,8 @@ class PaintTarget:
             return of_region(self.region)
         if self.paint is Paint.FIXED:
             return rgb(FIXED)
+        if self.paint is Paint.STIFFNESS:
+            return np.asarray(stiffness_colours(np.array([self.stiffness]))[0])
         return handle_colour(self.session, self.handle)
 
     def members(self) -> BoolArray:
@@ -62,6 +63,8 @@ class PaintTarget:
             if regions is not None and self.region < regions.n_regions:
                 return np.array(regions.membership[self.region], dtype=bool)
             return np.zeros(session.mesh.n_vertices, dtype=bool)
+        if self.paint is Paint.STIFFNESS:
+            return np.asarray(self._stiffness != 1.0)
         ids = session.fixed if self.paint is Paint.FIXED else session.handles.get(self.handle or "")
         return self._mask([] if ids is None else ids)
 
@@ -74,6 +77,8 @@ class PaintTarget:
 
     def changed(self, vertices: BoolArray, *, erase: bool) -> BoolArray:
         """Return those of *vertices*, a mask (n,), that `add`, or `erase`, would change."""
+        if self.paint is Paint.STIFFNESS:
+            return vertices
         return vertices & self._candidates(erase) & ~self._protected(erase)
 
     def remark(self, vertices: BoolArray, *, erase: bool) -> str:
@@ -83,6 +88,20 @@ class PaintTarget:
             return ""
         reason = "in no other region" if erase else "already fixed or in a handle"
         return f"{count} {'vertices' if count != 1 else 'vertex'} skipped: {reason}"
+
+    def stiffened(self, shares: FloatArray, *, erase: bool) -> FloatArray:
+        """Return the stiffness (n,) after a stroke with these *shares* (n,), 0 to 1."""
+        before, to = self._stiffness, 1.0 if erase else self.stiffness
+        is_core, is_rigid = shares >= 0.5, np.isinf(before)
+        if np.isinf(to):
+            return np.where(is_core, to, before)
+        finite = np.where(is_rigid, 1.0, before) ** (1.0 - shares) * to**shares
+        return np.where(is_rigid, np.where(is_core, to, before), finite)
+
+    def stiffen(self, shares: FloatArray, *, erase: bool) -> None:
+        """Change the stiffness by a stroke with *shares* (n,), 0 to 1."""
+        after = self.stiffened(shares, erase=erase)
+        self.session.set_stiffness(None if (after == 1.0).all() else after)
 
     def add(self, vertices: BoolArray) -> str | None:
         """Add *vertices*, a mask (n,); return the name of the handle, if the target is one.
@@ -96,6 +115,9 @@ class PaintTarget:
         RegionError
             If there is no such region.
         """
+        if self.paint is Paint.STIFFNESS:
+            self.stiffen(vertices.astype(np.float64), erase=False)
+            return self.handle
         new = self.changed(vertices, erase=False)
         if not new.any():
             if (vertices & self._candidates(False)).any():
@@ -124,6 +146,9 @@ class PaintTarget:
             if not self.session.handles:
                 raise ConstraintError("no handle to erase from yet")
             raise ConstraintError("select the handle to erase from")
+        if self.paint is Paint.STIFFNESS:
+            self.stiffen(vertices.astype(np.float64), erase=True)
+            return self.handle
         old = vertices & self._candidates(True)
         if not old.any():
             return self.handle
@@ -174,7 +199,7 @@ class PaintTarget:
         RegionError
             If the target is a region.
         """
-        if self.paint is Paint.REGION:
+        if self.paint in (Paint.REGION, Paint.STIFFNESS):
             raise RegionError("Only fixed vertices and handles can be inverted; paint the region")
         members = self.members()
         if not members.any():
@@ -205,6 +230,8 @@ class PaintTarget:
             return self.session.region_name(self.region)
         if self.paint is Paint.FIXED:
             return "the set of fixed vertices"
+        if self.paint is Paint.STIFFNESS:
+            return "the stiff or soft part"
         return "the new handle" if self.handle is None else self.handle
 
     def _candidates(self, erase: bool) -> BoolArray:
@@ -218,9 +245,14 @@ class PaintTarget:
             if erase and session.regions is not None:
                 return np.asarray(session.regions.membership.sum(axis=0) < 2)
             return self._mask([])
-        if erase:
+        if erase or self.paint is Paint.STIFFNESS:
             return self._mask([])
         return self._mask(np.concatenate([session.fixed, *session.handles.values()]))
+
+    @property
+    def _stiffness(self) -> FloatArray:
+        stiffness = self.session.state.stiffness
+        return np.ones(self.session.mesh.n_vertices) if stiffness is None else stiffness
 
     def _mask(self, ids: object) -> BoolArray:
         mask = np.zeros(self.session.mesh.n_vertices, dtype=bool)

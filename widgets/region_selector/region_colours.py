@@ -3,7 +3,8 @@
 Regions have the colours of the palette.  Where regions overlap their colours are mixed in equal
 parts, not by blend weight: weights fade towards the border of a region, which would hide how far a
 stroke went.  Fixed vertices are dark grey, each handle has its own colour, and the preview of a
-stroke covers everything.
+stroke covers everything.  Instead of regions, the stiffness can be shown: blue is softer than
+usual, orange stiffer, black rigid.
 """
 
 from __future__ import annotations
@@ -11,14 +12,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vtk_segdeform.arrays import BoolArray
-from vtk_segdeform.pictures import BODY, FIXED, of_region, rgb
+from vtk_segdeform.arrays import BoolArray, FloatArray
+from vtk_segdeform.pictures import BODY, COLOURS, FIXED, INK, of_region, rgb
 from vtk_segdeform.session import Change
 
 from ..scene import SurfaceDisplay, handle_colour
 
 LAYER = "regions"
 _PREVIEW_OPACITY = 0.9
+_SOFT, _STIFF = COLOURS[5], COLOURS[6]  # blue and vermilion: a tenth, and 10 times as stiff
 
 
 class RegionColours:
@@ -28,6 +30,7 @@ class RegionColours:
         self._surface = surface
         self._session = surface.session
         self._shown = self._fills_regions = self._marks_handles = True
+        self._shows_stiffness = False
         self._hidden: frozenset[str] = frozenset()
         self._preview: tuple[BoolArray, NDArray[np.uint8]] | None = None
         self._base = self._base_colours()
@@ -49,19 +52,30 @@ class RegionColours:
         self._shown = False
         self._draw()
 
-    def fill(self, *, regions: bool, handles: bool, hidden: frozenset[str] = frozenset()) -> None:
+    def fill(
+        self,
+        *,
+        regions: bool,
+        handles: bool,
+        hidden: frozenset[str] = frozenset(),
+        stiffness: bool = False,
+    ) -> None:
         """Choose whether regions, and handles except *hidden* ones, are coloured.
 
-        Fixed vertices always are.
+        Fixed vertices always are, unless *stiffness* is shown instead of all.
         """
-        before = self._fills_regions, self._marks_handles, self._hidden
-        if (regions, handles, hidden) != before:
+        before = self._fills_regions, self._marks_handles, self._hidden, self._shows_stiffness
+        if (regions, handles, hidden, stiffness) != before:
             self._fills_regions, self._marks_handles, self._hidden = regions, handles, hidden
+            self._shows_stiffness = stiffness
             self._base = self._base_colours()
             self._draw()
 
     def preview(self, vertices: BoolArray | None, colour: NDArray[np.uint8] | None = None) -> None:
-        """Show *vertices*, a mask (n,), in a *colour* (3,) of 0 to 255; None ends the preview."""
+        """Show *vertices*, a mask (n,), in a *colour* (3,) of 0 to 255; None ends the preview.
+
+        Or in one for each of them, (k, 3).
+        """
         if vertices is None and self._preview is None:
             return
         if vertices is None or colour is None:
@@ -85,6 +99,10 @@ class RegionColours:
     def _base_colours(self) -> NDArray[np.uint8]:
         """Return the (n, 3) colours without the preview."""
         session, regions = self._session, self._session.regions
+        if self._shows_stiffness:
+            stiffness = session.state.stiffness
+            given = np.ones(session.mesh.n_vertices) if stiffness is None else stiffness
+            return stiffness_colours(given)
         if regions is None or not self._fills_regions:
             colours = np.tile(rgb(BODY).astype(np.uint8), (session.mesh.n_vertices, 1))
         else:
@@ -110,3 +128,13 @@ class RegionColours:
             colours = colours.copy()
             colours[vertices] = np.rint(own + _PREVIEW_OPACITY * (colour - own))
         self._surface.set_colours(LAYER, colours)
+
+
+def stiffness_colours(stiffness: FloatArray) -> NDArray[np.uint8]:
+    """Return the colours (n, 3) of a *stiffness* (n,); that of the body is usual."""
+    with np.errstate(divide="ignore"):
+        size = np.clip(np.log10(stiffness), -1.0, 1.0)[:, None]
+    usual, ends = rgb(BODY).astype(float), np.where(size < 0.0, rgb(_SOFT), rgb(_STIFF))
+    colours = usual + np.abs(size) * (ends - usual)
+    colours[np.isinf(stiffness)] = rgb(INK)
+    return np.asarray(np.rint(colours), dtype=np.uint8)

@@ -9,7 +9,8 @@ lasso, rectangle    start anywhere in the view
 all tools           a press with Alt held moves the camera
 ``[``  ``]``        smaller, larger brush; with Shift held the wheel over the mesh does the same
 
-A change of regions resets the pose, as in `Session`; fixed vertices and handles keep it.
+With a symmetry, strokes fix or stiffen both sides.  A change of regions resets the pose, as in
+`Session`; fixed vertices and handles keep it.
 `PaintTarget` says which vertices a stroke skips.
 """
 
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.arrays import BoolArray, is_number
+from vtk_segdeform.arrays import BoolArray, FloatArray, is_number
 from vtk_segdeform.checks import require, shown
 from vtk_segdeform.errors import ArgumentError, RegionError
 from vtk_segdeform.pictures import PAPER, rgb
@@ -30,9 +31,9 @@ from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .brush_ring import BrushRing
 from .outline import Outline
-from .paint_target import Paint, PaintTarget, dominant_region
-from .region_colours import RegionColours
-from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole
+from .paint_target import Paint, PaintTarget
+from .region_colours import RegionColours, stiffness_colours
+from .strokes import Brush, Lasso, Rectangle, Stroke, Tool, Whole, shares_of
 
 __all__ = ["Paint", "RegionSelector", "Tool"]
 
@@ -59,12 +60,14 @@ class RegionSelector(Widget):
     Attributes
     ----------
     paints : Paint
-        Whether strokes paint a region, fixed vertices or a handle.
+        Whether strokes paint a region, fixed vertices, a handle or the stiffness.
     region : int
         The region to paint; the number of regions stands for a new one.
     handle : str or None
         The handle to paint, which need not exist yet.  With None, the next stroke creates a handle
         and sets its name here.
+    stiffness : float
+        The stiffness to paint, relative to the rest of the surface; infinite: rigid.
     through : bool
         Whether hidden vertices are painted too (X-ray).
     """
@@ -84,6 +87,7 @@ class RegionSelector(Widget):
         self.paints = Paint.REGION
         self.region = 0
         self.handle: str | None = None
+        self.stiffness = 10.0
         self.through = False
         self._tool = Tool.BRUSH
         self._radius = _RADIUS * session.mesh.diagonal
@@ -151,7 +155,7 @@ class RegionSelector(Widget):
         """Return the region of largest blend weight at the pointer, or None beside the mesh."""
         hit = self._picker.hit(self.view.pointer(Phase.HOVER))
         regions = self.session.regions
-        return None if hit is None or regions is None else dominant_region(regions, hit.vertex)
+        return None if hit is None or regions is None else regions.label_at(hit.vertex)
 
     def remove(self) -> None:
         """Remove the widget from the view permanently."""
@@ -214,7 +218,7 @@ class RegionSelector(Widget):
         regions = self.session.regions
         if regions is None:
             raise RegionError("No regions yet: detect or paint them first")
-        return np.array(regions.membership[dominant_region(regions, vertex)], dtype=bool)
+        return np.array(regions.membership[regions.label_at(vertex)], dtype=bool)
 
     def _follow(self, stroke: Stroke, target: PaintTarget, erase: bool) -> Gesture:
         """Preview the changes of *stroke* until the release, then apply them."""
@@ -228,14 +232,19 @@ class RegionSelector(Widget):
                     self._draw_ring(pointer, target, erase)
             if pointer.phase is Phase.RELEASE:
                 stroke.extend(pointer)
-                self._apply(stroke.mask, target, erase)
+                self._apply(self._shares(stroke, target), target, erase)
         finally:
             self.colours.preview(None)
             self._outline.hide()
 
     def _preview(self, stroke: Stroke, target: PaintTarget, erase: bool) -> None:
-        changed = target.changed(stroke.mask, erase=erase)
-        self.colours.preview(changed, rgb(PAPER) if erase else target.colour)
+        shares = self._shares(stroke, target)
+        changed = target.changed(shares > 0.0, erase=erase)
+        colour = rgb(PAPER) if erase else target.colour
+        if target.paint is Paint.STIFFNESS:
+            after = target.stiffened(shares, erase=erase)
+            colour = stiffness_colours(after[changed])
+        self.colours.preview(changed, colour)
         if stroke.outline is not None:
             self._outline.draw(stroke.outline)
 
@@ -247,7 +256,7 @@ class RegionSelector(Widget):
             self.leave()
             return
         if self.tool is Tool.REGION and regions is not None:
-            number = dominant_region(regions, hit.vertex)
+            number = regions.label_at(hit.vertex)
         else:
             number = int(self.session.mesh.components[hit.vertex])
         target = self.paints, self.region, self.handle
@@ -266,14 +275,30 @@ class RegionSelector(Widget):
             self._hovered = ()
             self.colours.preview(None)
 
-    def _apply(self, vertices: BoolArray, target: PaintTarget, erase: bool) -> None:
+    def _shares(self, stroke: Stroke, target: PaintTarget) -> FloatArray:
+        """Return `shares_of` a stroke, and of its mirror image where that has the same effect.
+
+        With a symmetry, fixed vertices and stiffness count on both sides.  A handle on both sides
+        could move along the plane only, and their regions are not mirrored.
+        """
+        shares = shares_of(stroke)
+        is_mirrored = target.paint in (Paint.FIXED, Paint.STIFFNESS)
+        mirror = self.session.mirror if is_mirrored else None
+        return shares if mirror is None else np.maximum(shares, shares[mirror.mates])
+
+    def _apply(self, shares: FloatArray, target: PaintTarget, erase: bool) -> None:
+        vertices = shares > 0.0
         self.remark = target.remark(vertices, erase=erase)
-        if vertices.any():
+        if target.paint is Paint.STIFFNESS:
+            if vertices.any():
+                target.stiffen(shares, erase=erase)
+                self.remark = "Stiffness counts from the next move"
+        elif vertices.any():
             self.handle = target.erase(vertices) if erase else target.add(vertices)
 
     @property
     def _target(self) -> PaintTarget:
-        return PaintTarget(self.session, self.paints, self.region, self.handle)
+        return PaintTarget(self.session, self.paints, self.region, self.handle, self.stiffness)
 
     def _neighbours(self, vertices: BoolArray) -> BoolArray:
         """Return the vertices, (n,) bool, that share an edge with one of *vertices*."""

@@ -24,6 +24,7 @@ from ..scene import Phase, Pointer
 _SPACING = 0.3  # of the radius, between the dabs of a fast brush
 _MOST_DABS = 200  # between two mouse moves
 _LEAST_SIZE = 3.0  # pixels; a smaller lasso or rectangle is taken for a click
+_LEAST_SHARE = 1e-6  # of a vertex at the radius of the brush
 
 
 class Tool(enum.Enum):
@@ -64,7 +65,7 @@ class Brush:
         self._radius, self._through = radius, through
         self._last = press.position
         self._spacing = 1.0  # pixels between dabs
-        self.mask = self._covered([press])
+        self._shares = self._covered([press])
 
     def extend(self, pointer: Pointer) -> None:
         """Brush along a straight line to *pointer*, without gaps after a fast move."""
@@ -73,15 +74,29 @@ class Brush:
         positions = self._last + path * (np.arange(1, dabs + 1) / dabs)[:, None]
         self._last = pointer.position
         pointers = [Pointer(Phase.MOVE, *position) for position in positions.tolist()]
-        self.mask = self.mask | self._covered(pointers)
+        self._shares = np.maximum(self._shares, self._covered(pointers))
 
-    def _covered(self, pointers: list[Pointer]) -> BoolArray:
+    @property
+    def mask(self) -> BoolArray:
+        """(n,) bool: the vertices selected so far."""
+        return np.asarray(self._shares > 0.0)
+
+    @property
+    def shares(self) -> FloatArray:
+        """(n,) float: 1 on the path, and less towards the radius; see `shares_of`."""
+        return self._shares
+
+    def _covered(self, pointers: list[Pointer]) -> FloatArray:
         hits = [hit for each in pointers for hit in hits_at(self._picker, each, self._through)]
         if hits:
             self._spacing = max(1.0, _SPACING * self._radius / self._picker.pixel_at(hits[-1]))
-        covered = self._picker.distances(hits, self._radius) <= self._radius
-        covered[[hit.vertex for hit in hits]] = True
-        return covered if self._through else self._picker.visible(covered)
+        away = self._picker.distances(hits, self._radius) / self._radius
+        shares = np.where(away <= 1.0, np.maximum((1.0 - away**2) ** 2, _LEAST_SHARE), 0.0)
+        own = [hit.vertex for hit in hits]
+        shares[own] = np.where(away[own] <= 1.0, shares[own], 1.0)
+        if not self._through:
+            shares[~self._picker.visible(shares > 0.0)] = 0.0
+        return shares
 
 
 class Lasso:
@@ -162,6 +177,11 @@ class Whole:
     def extend(self, pointer: Pointer) -> None:
         """Keep the part under the press."""
         del pointer
+
+
+def shares_of(stroke: Stroke) -> FloatArray:
+    """Return how far each vertex is selected, (n,), 0 to 1: with a brush, less towards its rim."""
+    return stroke.shares if isinstance(stroke, Brush) else stroke.mask.astype(np.float64)
 
 
 def hits_at(picker: Picker, pointer: Pointer, through: bool) -> list[Hit]:

@@ -5,7 +5,7 @@ The files, in reading order:
     volume_overlay    `VolumeOverlay`
     diverging         the diverging colour scale
     legend            the colour bar and the lines of text
-    region_volumes    the volume change of each region
+    region_volumes    the volume change of regions and bodies
 """
 
 from .legend import brief, in_tenths, percent, signed

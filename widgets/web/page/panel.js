@@ -4,6 +4,7 @@ const ICONS = {
   open: 'mdi-folder-open-outline', save: 'mdi-download-outline', undo: 'mdi-undo',
   redo: 'mdi-redo', pull: 'mdi-gesture-swipe-up', regions: 'mdi-select-group',
   cages: 'mdi-cube-outline', handles: 'mdi-brush-outline', deform: 'mdi-axis-arrow',
+  keep_part: 'mdi-lock-outline',
   compare: 'mdi-compare', view: 'mdi-eye-outline', help: 'mdi-keyboard-outline',
   brush: 'mdi-brush', lasso: 'mdi-lasso', rectangle: 'mdi-selection',
   connected_part: 'mdi-link-variant', whole_region: 'mdi-select-all', region: 'mdi-select-all',

@@ -1,0 +1,151 @@
+"""The list of bodies in the panel: volumes, what they follow, and changes of that."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from bodies import ball, joined, rod, tube
+from hands import Hand, draw_seldom, plain_view
+from numpy.testing import assert_array_equal
+from scenes import sausage
+
+from vtk_segdeform.session import Session
+from vtk_segdeform.widgets.editor.editor import DeformEditor
+from vtk_segdeform.widgets.panel.fields import Section
+from vtk_segdeform.widgets.panel.panel import all_sections, press
+
+pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
+
+SOLIDS = [
+    rod(0.5, 0.0, 4.0, n=10, step=0.5),
+    tube(0.55, 0.62, 1.0, 3.0, n=10, step=0.5),
+    ball(0.35, (1.8, 0.0, 2.0), 1),
+]
+
+
+def editing(session: Session) -> Iterator[DeformEditor]:
+    view = plain_view()
+    draw_seldom(view)
+    editor = DeformEditor(view, session)
+    editor.On()
+    hand = Hand(view)
+    yield editor
+    assert hand.failures == []
+    editor.remove()
+
+
+def ready(*solids) -> Session:
+    session = Session(joined(*solids))
+    session.change_options(n_cage_vertices=80)
+    session.segment()
+    session.fit_cages()
+    session.bind()
+    return session
+
+
+@functools.cache
+def start() -> Session:
+    return ready(*SOLIDS)
+
+
+@pytest.fixture
+def editor():
+    session = Session(start().mesh, state=start().state)
+    session.bind()
+    yield from editing(session)
+
+
+def bodies(editor: DeformEditor) -> Section:
+    return next(each for each in all_sections(editor) if each.name == "bodies")
+
+
+def rows(editor: DeformEditor) -> list[tuple[str, ...]]:
+    (table,) = bodies(editor).tables
+    return [(row.label, *(cell.text for cell in row.cells)) for row in table.rows]
+
+
+def follows(editor: DeformEditor):
+    return next(field for field in bodies(editor).fields if field.name == "bodies.follows")
+
+
+def test_bodies_are_listed_with_their_volumes_and_what_they_follow(editor):
+    volumes = editor.session.volumes()
+    shown = rows(editor)
+    assert [(row[0], *row[2:]) for row in shown] == [
+        ("Body 1", "0 %", "Nothing"), ("Body 2", "0 %", "Body 1"), ("Body 3", "0 %", "Nothing"),
+    ]  # fmt: skip
+    assert [row[1] for row in shown] == [f"{volumes[f'body {k}']:.4g}" for k in range(3)]
+    editor.session.set_volume("body 2", "+10%")
+    editor.session.commit()
+    assert rows(editor)[2][1:3] == (f"{1.1 * volumes['body 2']:.4g}", "+10.0 %")
+
+
+def test_what_a_body_follows_is_changed_at_once_in_one_step(editor):
+    session = editor.session
+    assert press(editor, "bodies.list.select", ["body 1"]) is None
+    assert follows(editor).value == "auto"
+    assert [label for label, _ in follows(editor).choices] == [
+        "Automatic", "Nothing", "Body 1", "Body 3"
+    ]  # fmt: skip
+    press(editor, "bodies.follows", "free")
+    editor.wait()
+    assert_array_equal(session.regions.carrier, [0, 1, 2])
+    assert (follows(editor).value, rows(editor)[1][3]) == ("free", "Nothing")
+    session.bind()
+    press(editor, "bodies.list.select", ["body 2"])
+    press(editor, "bodies.follows", "0")
+    editor.wait()
+    assert session.options.attach == ((1, "free"), (2, 0))
+    assert session.history.labels[-2:] == ("body 2 follows nothing", "body 3 follows body 1")
+    assert editor.status.startswith("Body 3 follows body 1")
+    assert_array_equal(session.regions.carrier, [0, 1, 0])
+    session.bind()
+    editor.run("segment")  # which keeps to it
+    editor.wait()
+    assert_array_equal(session.regions.carrier, [0, 1, 0])
+    for expected in ([0, 1, 0], [0, 1, 2], [0, 0, 2]):
+        session.undo()
+        assert_array_equal(session.regions.carrier, expected)
+    assert session.options.attach == ()
+
+
+def test_the_selected_body_is_the_volume_that_the_slider_changes(editor):
+    press(editor, "bodies.list.select", ["body 2"])
+    press(editor, "volumes.change", -20)
+    assert abs(editor.session.volume("body 2")[1] + 0.2) < 1e-12
+    press(editor, "volumes.name", "whole")
+    (table,) = bodies(editor).tables
+    assert [row.selected for row in table.rows] == [True, False, False]
+
+
+def test_a_circle_is_refused_and_said(editor):
+    press(editor, "bodies.list.select", ["body 2"])
+    press(editor, "bodies.follows", "0")
+    editor.wait()
+    editor.session.bind()
+    press(editor, "bodies.list.select", ["body 0"])
+    press(editor, "bodies.follows", "2")
+    with pytest.raises(Exception, match="must not lead back to a component"):
+        editor.wait()
+    assert editor.session.options.attach == ((2, 0),)
+
+
+def test_of_hundreds_of_bodies_the_largest_are_listed():
+    places = np.stack(np.meshgrid(*[np.arange(3.0)] * 2, [0.0]), axis=-1).reshape(-1, 3)
+    dots = [ball(0.1 + 0.01 * k, place, 0) for k, place in enumerate(places)]
+    far = [ball(0.05, place + [4.0, 0.0, 0.0], 0) for place in places]
+    for editor in editing(ready(*dots, *far)):
+        shown = rows(editor)
+        assert len(shown) == 12
+        assert [row[0] for row in shown[:3]] == ["Body 9", "Body 8", "Body 7"]
+        (more,) = (field for field in bodies(editor).fields if field.name == "bodies.more")
+        assert (more.value, more.visible) == ("6 smaller ones", True)
+
+
+def test_one_body_is_no_list():
+    scene = sausage(is_coarse=True)
+    for editor in editing(scene.session()):
+        assert not bodies(editor).visible
