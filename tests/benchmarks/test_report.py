@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vtk_segdeform.benchmarks import (
+    constrained,
     drags,
     felt,
     mechanisms,
@@ -41,9 +42,9 @@ def without_peers(monkeypatch):
     """Hide libigl and the benchmark poses, and run everything in this process."""
     monkeypatch.setitem(sys.modules, "igl", None)
     monkeypatch.delenv("SEGDEFORM_DATA", raising=False)
-    for module in (felt, peers, report):
+    for module in (constrained, felt, peers, report):
         monkeypatch.setattr(module, "warm_up", lambda: None)
-    for module in (felt, peers):
+    for module in (constrained, felt, peers):
         monkeypatch.setattr(module, "in_own_process", lambda work, *given: work(*given))
 
 
@@ -138,19 +139,43 @@ def test_the_measures_of_a_pose_find_its_faults(body):
 @pytest.mark.campaign
 def test_the_report_of_drags_has_all_numbers_and_names_arap_when_it_is_absent():
     section = felt.run(TINY)
-    set_up, frames, volumes = section.tables
+    set_up, frames = section.tables
     assert set_up.column("vertices") == [600, 600]
     assert min(set_up.column("total")) > 0.0
-    assert frames.column("drag") == 2 * ["handle", "handle, avoiding contact", "pull"]
+    assert frames.column("drag") == 2 * ["handle", "pull"]
     for name in ("first, ms", "median", "longest", "away", "jump"):
         assert all(math.isfinite(each) and each >= 0.0 for each in frames.column(name))
     assert all(math.isnan(each) for each in frames.column("median / ARAP"))
     assert max(frames.column("volume change")) < 1e-12
     assert len(section.skipped) == 2
-    assert volumes.column("volumes") == ["whole", "3", "7"]
-    assert volumes.column("median / whole")[0] == 1.0
-    assert min(volumes.column("median / whole")) > 0.0
-    assert max(volumes.column("error")) < 1e-12
+
+
+@pytest.mark.campaign
+def test_drags_with_constraints_are_compared_with_the_same_without():
+    (table,) = constrained.run(TINY).tables
+    names = table.column("constraint")
+    assert len(set(names)) == len(names) == 10
+    for name in ("median / none", "95 % / none", "finish / none"):
+        assert table.column(name)[0] == 1.0
+        assert min(table.column(name)) > 0.0
+    assert max(table.column("volume change")) < 1e-12
+
+
+@pytest.mark.campaign
+def test_each_constraint_of_the_comparison_is_at_work():
+    sessions = constrained.begun(300, 40)
+    poses, volumes = {}, {}
+    for name, (own, session) in sessions.items():
+        poses[name] = session.drag(own.targets(0.4)).vertices
+        volumes[name] = session.volumes()
+    rest = sessions["none"][1].deformer.volumes()
+    without = poses.pop("none"), poses.pop("avoiding contact")  # nothing comes into contact
+    np.testing.assert_allclose(*without, atol=1e-6)
+    apart = [np.abs(x[: len(without[0])] - without[0]).max() for x in poses.values()]
+    assert min(apart) > 1e-4
+    assert abs(volumes["none"]["body 1"] / rest["body 1"] - 1.0) > 1e-4
+    for name in ("three volumes", "seven volumes"):
+        assert volumes[name]["body 1"] == pytest.approx(rest["body 1"], rel=1e-12)
 
 
 @pytest.mark.campaign

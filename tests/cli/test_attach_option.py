@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from bodies import bent, rod, tube
 
+from vtk_segdeform.cli import commands
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import read_mesh, write_mesh
+from vtk_segdeform.widgets import plugin
 
 SCENE = bent(rod(0.5, 0.0, 4.0, n=16, step=0.25), tube(0.55, 0.62, 1.0, 3.0, n=16, step=0.25))
 POSE = ["--fixed", "z<0.4", "--handle", "z>3.6", "--rotate", "y,50", "--pivot", "0,0,2"]
@@ -38,6 +40,17 @@ def test_what_is_no_attachment_is_a_usage_error(given, attach, says, capsys):
         status = end.code
     assert status == 2
     assert says in capsys.readouterr().err
+
+
+def test_an_edited_mesh_has_them_in_its_session(given, monkeypatch, capsys):
+    seen = []
+    monkeypatch.setattr(commands, "require_screen", lambda: None)
+    monkeypatch.setattr(plugin, "edit", lambda session, **_: seen.append(session) or session)
+    assert main(["edit", given[0], "--attach", "1=free"]) == 0
+    assert main(["edit", given[0]]) == 0
+    assert [dict(each.options.attach) for each in seen] == [{1: "free"}, {}]
+    assert main(["edit", given[0], "--attach", "1=7"]) == 2
+    assert "--attach must map components, 0..1" in capsys.readouterr().err
 
 
 def test_attachments_are_for_automatic_regions(given, capsys):

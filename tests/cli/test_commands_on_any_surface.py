@@ -11,6 +11,7 @@ import pyvista as pv
 from campaign import every
 from given_surfaces import GIVEN, holed, parts, require_only_moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
+from organs import surface_of
 
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.geometry import lids_of
@@ -120,11 +121,26 @@ def test_check_tells_a_script_all_about_a_surface(tmp_path, capsys):
     found = checked(file_of("parts", tmp_path), capsys)
     assert found["components"] == 3
     assert found["encloses"] == [True] * 3
+    assert list(found["volumes"]) == ["body 0", "body 1", "body 2"]
     write_mesh(tmp_path / "ball.ply", sphere(300))
     found = checked(tmp_path / "ball.ply", capsys)
     assert found["closed"]
     assert (found["holes"], found["workarounds"], found["faults"]) == ([], [], [])
     assert not found["volume_under_lids"]
+
+
+def test_check_tells_the_volumes_of_a_label_map(tmp_path, capsys):
+    labels = np.zeros((14, 14, 14), dtype=int)
+    labels[1:13, 1:13, 1:13], labels[4:8, 4:8, 4:8] = 30, 4
+    surface_of(labels).save(tmp_path / "organs.vtp")
+    found = checked(tmp_path / "organs.vtp", capsys)
+    assert found["labels"] == {"30": ["body 0"], "4": ["cavity 0"]}
+    assert found["volumes"]["cavity 0"] == pytest.approx(64.0, rel=0.25)  # round corners
+    assert main(["check", str(tmp_path / "organs.vtp")]) == 0
+    inside = f"cavity 0 (label 4) {found['volumes']['cavity 0']:.6g}"
+    assert inside in capsys.readouterr().out
+    pv.Plane(i_resolution=5, j_resolution=5).triangulate().save(tmp_path / "sheet.vtp")
+    assert checked(tmp_path / "sheet.vtp", capsys)["volumes"] == {}
 
 
 def test_check_tells_a_script_of_files_that_cannot_be_read(tmp_path, capsys):

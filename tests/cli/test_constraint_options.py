@@ -76,7 +76,9 @@ def test_all_of_them_are_kept_in_the_file(name, given, tmp_path, capsys):
     more = ["--rigid", "z>1.2", "--slide", "z<-1.3", "--symmetry", "x", "--stiffness", "x>0.8=4"]
     more += ["--turn", "fibre", "--push", "flow", "--displacement", "moved"]
     assert main(command(given, out, name, *more)) == 0
-    assert re.search(r"status +converged", capsys.readouterr().out)
+    printed = capsys.readouterr().out
+    assert re.search(r"status +converged", printed)
+    assert "approximate" not in printed
     posed = read_polydata(out)
     x = Surface(posed).mesh.vertices
     u = x - X
@@ -145,3 +147,10 @@ def test_errors_name_what_is_wrong(name, words, text, given, tmp_path, capsys):
 def test_there_is_no_other_symmetry(given, tmp_path, capsys):
     assert main(command(given, tmp_path / "posed.vtp", "pull", "--symmetry", "w")) == 2
     assert "invalid choice: 'w'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("more", [["--rigid", "z>1.2"], ["--slide", "z<-1.3"], ["--symmetry", "x"]])
+def test_without_a_finish_they_are_said_to_be_approximate(more, given, tmp_path, capsys):
+    words = command(given, tmp_path / "posed.vtp", "pull", "--no-refine", *more)
+    assert main(words) == 0
+    assert "rigid parts, slides and symmetry are approximate" in capsys.readouterr().out

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from open_meshes import combined
+from organs import surface_of
 
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
@@ -47,6 +48,7 @@ def test_deform_sets_volumes_without_a_handle(hollow, given, tmp_path, capsys):
     assert_allclose(np.divide(after, before), [0.6, 1.0], rtol=1e-12)
     printed = capsys.readouterr().out
     assert f"volume          cavity: {after[0]:.6g}, -40 % of the original" in printed
+    assert "handle error" not in printed
     wall = next(line for line in printed.splitlines() if " wall: " in line)
     assert f"wall: {after[1]:.6g}, " in wall
     assert abs(float(wall.split(",")[1].split("%")[0])) < 1e-10
@@ -72,13 +74,47 @@ def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
     assert "wall: " in capsys.readouterr().out
 
 
+def test_a_goal_that_cannot_be_met_is_an_error_although_the_mesh_is_written(
+    given, tmp_path, capsys
+):
+    out = tmp_path / "out.vtp"
+    assert main(["deform", given, "-o", str(out), "--volume", "cavity=1e9", *QUICK]) == 1
+    assert "was written, but a volume is off by" in capsys.readouterr().err
+    assert out.exists()
+
+
+def test_organs_of_a_label_map_are_called_by_their_labels(tmp_path, capsys):
+    path, out = tmp_path / "organs.vtp", tmp_path / "out.vtp"
+    labels = np.zeros((12, 12, 12), dtype=int)
+    labels[2:10, 2:10, 2:7], labels[2:10, 2:10, 7:10] = 30, 4
+    surface_of(labels).save(path)
+    assert main(["deform", str(path), "-o", str(out), "--volume", "label 4=-10%", *QUICK]) == 0
+    assert ", -10 % of the original" in capsys.readouterr().out
+    (body,) = Surface.read(path).labels()[4]
+    for goal, says in (
+        ("label 5=keep", "there is no single volume 'label 5'; there are label 4: body"),
+        (f"{body}=keep", "given twice for the same volume: label 4, "),
+    ):
+        words = ["--volume", "label 4=-10%", "--volume", goal]
+        assert main(["deform", str(path), "-o", str(out), *words, *QUICK]) == 2
+        assert says in capsys.readouterr().err
+
+
+def test_only_a_format_in_metres_has_volumes_in_ml(hollow, given, tmp_path, capsys):
+    write_mesh(tmp_path / "hollow.glb", hollow)
+    for path, has_unit in ((str(tmp_path / "hollow.glb"), True), (given, False)):
+        words = ["deform", path, "-o", str(tmp_path / "out.ply"), "--volume", "cavity=0.02"]
+        assert main([*words, *QUICK]) == 0
+        assert ("cavity: 0.02 m^3 (20000 ml), " in capsys.readouterr().out) == has_unit
+
+
 @pytest.mark.parametrize(
     ("more", "says"),
     [
         ([], "nothing would move: add --handle SEL with a motion, or --volume"),
         (["--volume", "cavity"], "--volume must be a name and a value, as whole=+10%; got"),
         (["--volume", "=keep"], "--volume must be a name and a value"),
-        (["--volume", "belly=keep"], "there is no volume 'belly'; there are whole, cavity, wall"),
+        (["--volume", "belly=keep"], "there is no volume 'belly'; there are whole, cavity"),
         (["--volume", "wall=much"], "the goal of the volume 'wall' must be keep"),
         (["--volume", "wall=-100%"], "the volume of 'wall' must be positive"),
         (["--volume", "wall=keep", "--volume", "whole=+1%"], "follows from that of 'wall'"),

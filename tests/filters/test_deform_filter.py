@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import sys
 
+import bodies
 import numpy as np
 import pytest
 import pyvista as pv
@@ -161,6 +162,28 @@ def test_given_regions_and_cages_are_used(surface):
     output(made)
     assert made.rebinds == 3
     assert made.faults == []
+
+
+def test_a_sleeve_follows_unless_it_is_free():
+    sleeve = bodies.tube(0.55, 0.62, 1.0, 3.0, n=12, step=0.4)
+    scene = bodies.bent(bodies.rod(0.5, 0.0, 4.0, n=12, step=0.4), sleeve)
+    mesh, height = scene.mesh, scene.mesh.vertices[:, 2]
+    surface = to_polydata(mesh)
+    surface.point_data["fixed"] = (height < 0.4).astype(int)
+    surface.point_data["handle"] = (height > 3.6).astype(int)
+    made = filter_of(surface, Translation=(0.8, 0.0, -0.1))
+    is_sleeve, far = mesh.components == 1, []
+    for attach in ({}, {1: "free"}, {1: 0}):
+        made.SetAttach(attach)
+        far.append(np.abs(output(made).points - mesh.vertices)[is_sleeve].max())
+    assert far[1] < 0.1 < far[0] == far[2]
+    assert made.rebinds == 3
+    made.SetAttach({1: 7})
+    assert output(made).n_points == 0
+    assert "0..1" in made.faults[-1]
+    made.SetRegionArrayName("fixed")
+    made.Update()
+    assert "SetAttach is for automatic regions only" in made.faults[-1]
 
 
 def test_polygons_are_kept_and_normals_computed_again():

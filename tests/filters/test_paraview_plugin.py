@@ -34,6 +34,9 @@ spec = importlib.util.spec_from_file_location("paraview_plugin", sys.argv[1])
 plugin = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(plugin)
 print(plugin.SegmentedCageDeform.__mro__[1].__module__)
+made = plugin.SegmentedCageDeform()
+made.SetAttach("1=0, 2=free")
+print(made._settings.attach)
 """
 DECORATORS = """
 class Decorators:
@@ -175,7 +178,7 @@ def loaded(tmp_path):
     return load
 
 
-OURS = "vtk_segdeform.filters.deform_filter"
+OURS = "vtk_segdeform.filters.deform_filter\n((1, 0), (2, 'free'))"
 
 
 def test_the_file_in_the_package_finds_the_package_that_contains_it(loaded, tmp_path):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from open_meshes import combined
 from scenes import sausage
 from scipy import optimize, sparse
 from solids import exact_volume_change, icosphere, rotation
@@ -22,7 +23,7 @@ from vtk_segdeform.finish import finisher as finishing
 from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
 from vtk_segdeform.mesh import Mesh, new_crossings
-from vtk_segdeform.solver import Bodies, Status, total_volume
+from vtk_segdeform.solver import Bodies, Status, exact_volume, total_volume
 
 SCENE = sausage(2, is_coarse=True)
 PER_CAGE = 60.0  # vertices, so that the cells are larger than a ring
@@ -505,6 +506,28 @@ def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
     x = SAUSAGE.finisher()._at_places(mesh.vertices, places)
     assert_array_equal(x[held], places)
     assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13
+
+
+def test_a_mirrored_pose_far_from_its_volume_is_not_moved_there():
+    mesh, held = SCENE.mesh, np.arange(SCENE.mesh.n_vertices) > 2
+    swollen = Problem(mesh, held, 1.5 * mesh.vertices[held], mesh.vertices)
+    finisher = swollen.finisher()
+    found = finisher.run(swollen.start, swollen.places)
+    made = finisher.made(found, lambda x: x)
+    assert np.abs(made.vertices - found.vertices).max() < mesh.diagonal
+
+
+def test_a_mirrored_pose_lands_again_where_it_misses_several_volumes(monkeypatch):
+    monkeypatch.setattr(exact_volume, "_NEWTON_STEPS", 2)
+    mesh, count = SCENE.mesh, SCENE.mesh.n_vertices
+    pair = combined(mesh, mesh.with_vertices(mesh.vertices + [0.0, 5.0, 0.0]))
+    held = np.tile(SAUSAGE.held, 2)
+    finisher = Problem(pair, held, pair.vertices[held], pair.vertices).finisher()
+    factor = np.where(held, 1.0, 1.2)[:, None]
+    found = Finish(pair.vertices * factor, (), 0, 0.0, Status.CONVERGED)
+    made = finisher.made(found, lambda x: x).vertices
+    for x, rest in ((made[:count], mesh.vertices), (made[count:], pair.vertices[count:])):
+        assert abs(exact_volume_change(rest, x, mesh.faces)) < 1e-13
 
 
 def test_what_is_within_the_length_of_held_vertices_moves_along_with_them():

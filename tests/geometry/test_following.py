@@ -46,6 +46,14 @@ def test_what_is_inside_follows():
     assert_array_equal(carriers(joined(BAR, (inner[0], inner[1][:, ::-1]))), [0, 0])
 
 
+def test_what_is_inside_follows_wherever_it_is():
+    wide = ball(2.0, [0.0, 0.0, 0.0], 3)
+    for place in ([0.0, 0.0, 0.0], [0.0, 0.0, -0.9], [0.7, 0.5, 0.4]):
+        x, faces = ball(0.5, place)
+        assert_array_equal(carriers(joined(wide, (x, faces[:, ::-1]))), [0, 0])
+    assert_array_equal(carriers(joined(wide, ball(0.5, [0.0, 0.0, 2.9]))), [0, 1])
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_followers_do_not_depend_on_the_frame(scale):
     mesh = joined(BAR, tube(0.6, 0.7, 1.0, 3.0), beside(0.1), ball(0.1, [0.0, -0.62, 3.5]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import organs
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
@@ -200,3 +201,27 @@ def test_a_surface_of_a_known_mesh_is_the_same_surface_and_others_do_not_fit(tmp
             surface.at_points(values)
     with pytest.raises(ArgumentError, match="one row for each given point, 9"):
         surface.at_vertices(np.zeros(8))
+
+
+def test_each_label_has_the_bodies_that_have_its_volume():
+    """Boxes of voxels: two that touch, one inside of another, and one in two parts."""
+    labels = np.zeros((16, 12, 24), dtype=int)
+    for label, box in (
+        (9, np.s_[1:11, 1:11, 1:11]),
+        (2, np.s_[4:7, 4:8, 5:7]),
+        (5, np.s_[1:11, 1:11, 11:14]),
+        (7, np.s_[1:4, 1:4, 17:22]),
+        (7, np.s_[8:11, 1:6, 17:22]),
+    ):
+        labels[box] = label
+    surface = sd.Surface(organs.surface_of(labels))
+    found = surface.labels()
+    assert found[2] == ("cavity 0",)
+    assert {label: len(names) for label, names in found.items()} == {9: 1, 2: 1, 5: 1, 7: 2}
+    mesh, regions = surface.mesh, sd.Regions.single(surface.mesh)
+    volumes = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 40)).volumes()
+    volumes["cavity 0"] = volumes["cavity"]
+    for label, names in found.items():
+        own = sum(volumes[name] for name in names)
+        assert own == pytest.approx(np.count_nonzero(labels == label), rel=0.25)  # round corners
+    assert sd.Surface(surface.given.copy()).labels("others") == {}

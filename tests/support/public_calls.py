@@ -143,7 +143,8 @@ def _calls_of_class(cls: type) -> Iterator[Call]:
             yield _call(label, functools.partial(_bound, cls, name), getattr(cls, name))
 
 
-ALSO_NEEDED = {"Mesh.faces"}  # without which the error says how to make one
+# Without which the error says how to make one, or what to move.
+ALSO_NEEDED = {"Mesh.faces", "deform.handle", "deform.targets"}
 
 
 def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
@@ -560,6 +561,9 @@ SPECIAL: dict[str, Callable[[], Any]] = {
 
 # The words for an argument in messages, where they are clearer than its name.
 SAID_AS: dict[str, tuple[str, ...]] = {
+    "volumes": ("volume",),
+    "symmetry": ("symmet", "mirror"),
+    "Session.set_volume.name": ("volume",),
     "Cage.require_encloses.points": ("handle 1",),
     "HandleDragger.handle.value": ("handle",),
     "HandleDragger.set_hidden.name": ("handle",),

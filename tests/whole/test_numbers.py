@@ -20,10 +20,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
     ROOT / "README.md",
-    *(ROOT / "docs" / f"{n}.rst" for n in ("comparison", "mathematics", "speed", "volumes")),
+    *(
+        ROOT / "docs" / f"{name}.rst"
+        for name in ("comparison", "constraints", "mathematics", "speed", "volumes")
+    ),
 ]
 # The percentages of the others are choices and goals.
-MEASURING = [page for page in PAGES if page.stem not in ("mathematics", "volumes")]
+MEASURING = [page for page in PAGES if page.stem not in ("constraints", "mathematics", "volumes")]
 MARK = re.compile(
     r"(?m)^\s*(?:<!--|\.\.) printed by(?P<long>, in the campaign)?: (?P<command>.+?)"
     r"(?: => (?P<printed>.+?))?(?: -->)?$"

@@ -8,6 +8,7 @@ The files, in reading order:
     tasks         meshes, handles and targets; a hand on a limb of any body
     drags         drags as a hand makes them, frame by frame
     felt          what drags feel like, for 5 to 500 thousand vertices
+    constrained   the same drag with rigid parts, slides, symmetry, volumes and followers
     opening       from opening a file to a surface that follows the pointer
     mechanisms    what each mechanism of the solver buys
     paper         tables 1 and 2 of the paper

@@ -25,7 +25,7 @@ from .drags import Drag, frames, ready, way_of_handle, way_of_tip
 from .measuring import in_own_process, timed
 from .peers import arap_iteration_seconds
 from .results import Cell, Scale, Section, Table
-from .tasks import Hand, Task, divided_bar, warm_up
+from .tasks import Hand, Task, warm_up
 
 BODIES: dict[str, Callable[[int], Mesh]] = {
     "cactus": cactus,
@@ -41,15 +41,13 @@ the widgets take (8 at most), or while the hand hesitates of \
 cores. *ARAP* is one iteration of libigl's as-rigid-as-possible deformation of the same mesh, in \
 the same process. *Away* is the largest distance of a shown pose from the converged one, in \
 diagonals, of every ninth frame: median and largest. *Jump* is the farthest that a vertex moves \
-between two frames, over how far the hand does. *Volumes* compares frames with those of the same \
-drag in which only the whole is preserved."""
+between two frames, over how far the hand does."""
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
     """Return the measurements for every size of *scale*."""
     set_up: list[tuple[Cell, ...]] = []
     rows: list[tuple[Cell, ...]] = []
-    volumes: list[tuple[Cell, ...]] = []
     section = Section("Drags as they are felt", _TEXT)
     for k, size in enumerate(scale.drag_sizes):
         for body in BODIES:
@@ -67,35 +65,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
         "steps", "most", "away", "largest", "jump", "volume change",
     )  # fmt: skip
     section.tables.append(Table(columns, rows, "frames"))
-    for k, size in enumerate(scale.drag_sizes):
-        tell(progress, k / len(scale.drag_sizes), f"drags with volumes, {size} vertices")
-        volumes += [(size, *row) for row in in_own_process(with_volumes, size, scale)]
-    names = "vertices", "volumes", "median, ms", "median / whole", "95 % / whole", "error"
-    section.tables.append(Table(names, volumes, "frames of a bar in seven parts"))
     return section
-
-
-def with_volumes(size: int, scale: Scale) -> list[tuple[Cell, ...]]:
-    """Drag the end of a bar that inner walls divide, with more and more volumes preserved."""
-    warm_up()
-    mesh = divided_bar(size)
-    own, session = Hand.on(mesh), Session(mesh)
-    session.change_options(n_cage_vertices=scale.n_cage_vertices)
-    preparation = session.preparation()
-    every = {
-        "whole": {"whole": "keep"},
-        "3": {"whole": "keep", "body 0": "keep", "body 1": "keep"},
-        "7": {},
-    }
-    rows: list[tuple[Cell, ...]] = []
-    whole: tuple[float, ...] = ()
-    for name, goals in every.items():
-        session = ready(preparation, own, handle=True, volumes=goals)
-        *_, drag = frames(session, way_of_handle(own), None)
-        whole = whole or drag.felt
-        ratios = [time / base for time, base in zip(drag.felt[:2], whole[:2], strict=True)]
-        rows.append((name, 1e3 * drag.felt[0], *ratios, max(drag.volumes)))
-    return rows
 
 
 def felt(body: str, size: int, scale: Scale) -> tuple[list[float], dict[str, Drag], float, str]:
@@ -116,8 +86,6 @@ def felt(body: str, size: int, scale: Scale) -> tuple[list[float], dict[str, Dra
     preparation = Preparation(session.regions, session.cages, deformer)
     session, bind_handle = timed(lambda: ready(preparation, own, handle=True))
     drags = {"handle": dragged(session, own, preparation, pulls=False)}
-    session = ready(preparation, own, handle=True, avoid_contact=True)
-    drags["handle, avoiding contact"] = dragged(session, own, preparation, pulls=False)
     session = ready(preparation, own, handle=False)
     drags["pull"] = dragged(session, own, preparation, pulls=True)
     arap, fault = math.nan, ""

@@ -11,13 +11,14 @@ from pathlib import Path
 from ..errors import Cancelled, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import felt, mechanisms, opening, paper, peers
+from . import constrained, felt, mechanisms, opening, paper, peers
 from .measuring import conditions
 from .results import Scale, Section
 from .tasks import warm_up
 
 EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "drag": felt.run,
+    "constraints": constrained.run,
     "open": opening.run,
     "mechanisms": mechanisms.run,
     "paper": paper.run,

@@ -9,6 +9,8 @@ With ``--json`` it prints one object with these keys:
     encloses                    whether each component encloses a volume
     volume_under_lids           whether some volume is preserved under lids over holes
     volume                      the volume in words
+    volumes                     of bodies and cavities, by the names that --volume takes
+    labels                      these names, by the labels of a label map
     workarounds                 what the mesh has differently: objects with kind, text and count,
                                 the number of given points there
     faults, notes               of the triangles as given: objects with kind, text and count; the
@@ -33,9 +35,10 @@ from ..geometry import lids_of
 from ..io import Surface, repair_surface, triangles_of
 from ..mesh import Mesh, counted, find_faults, self_intersections
 from ..progress import Progress
+from ..solver import Bodies, total_volume
 from .outputs import Say
 
-_MOST_HOLES = 10  # listed one by one
+_MOST = 10  # holes or volumes that are listed
 _SINGLE = "single precision"  # the kind of a note
 _COARSE = 1e-3  # of the median edge: larger steps between coordinates are worth a note
 
@@ -86,6 +89,7 @@ def described(given: Any, name: str) -> dict[str, Any]:
     return {
         **found,
         **_of_mesh(mesh),
+        "labels": surface.labels(),
         "workarounds": [
             {
                 "kind": each.kind.name.lower() if each.kind else "",
@@ -111,11 +115,17 @@ def _unread(name: str) -> dict[str, Any]:
         "can_be_deformed": False,
         "reason": None,
         "volume": None,
+        "volumes": {},
+        "labels": {},
     }
 
 
 def _of_mesh(mesh: Mesh) -> dict[str, Any]:
     lids = lids_of(mesh)
+    bodies = Bodies(mesh, total_volume(mesh, lids), lids)
+    volumes = {f"body {k}": float(each) for k, each in enumerate(bodies.volumes) if each > 0.0}
+    for k, component in enumerate(bodies.cavities.tolist()):
+        volumes[f"cavity {k}"] = abs(bodies.component(component).target)
     return {
         "vertices": mesh.n_vertices,
         "faces": mesh.n_faces,
@@ -127,6 +137,7 @@ def _of_mesh(mesh: Mesh) -> dict[str, Any]:
         "encloses": lids.encloses.tolist(),
         "volume_under_lids": bool(lids.used.any()),
         "volume": lids.summary(),
+        "volumes": volumes,
         "self_intersections": len(self_intersections(mesh.vertices, mesh.faces)),
     }
 
@@ -179,15 +190,21 @@ def _print(found: dict[str, Any], say: Say) -> None:
         if each["kind"] != "hole":
             say(f"  {each['text']}")
     _print_precision(found, say)
+    labels = {name: f" (label {k})" for k, names in found["labels"].items() for name in names}
+    volumes = [f"{name}{labels.get(name, '')} {v:.6g}" for name, v in found["volumes"].items()]
+    if len(volumes) > 1:
+        say(f"  volumes: {', '.join(_some(volumes))}")
     holes = found["holes"]
     if holes:
-        most = ", ".join(map(str, holes[:_MOST_HOLES])) + (
-            ", ..." if len(holes) > _MOST_HOLES else ""
-        )
+        most = ", ".join(_some(list(map(str, holes))))
         say(f"  {counted(len(holes), 'border', 'borders')} of {most} edges")
     if found["self_intersections"]:
         pairs = counted(found["self_intersections"], "pair", "pairs")
         say(f"  {pairs} of faces intersect; this does not prevent a deformation")
+
+
+def _some(texts: list[str]) -> list[str]:
+    return texts if len(texts) <= _MOST else [*texts[:_MOST], "..."]
 
 
 def _print_precision(found: dict[str, Any], say: Say) -> None:

@@ -29,7 +29,7 @@ from ..deformer import (
     solved_along,
 )
 from ..errors import ArgumentError, ConstraintError, MeshError
-from ..geometry import lids_of
+from ..geometry import checked_attach, lids_of
 from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
@@ -38,11 +38,11 @@ from ..session import Session, load_session
 from . import motion
 from .main import AS_IN_PYTHON
 from .outputs import (
-    HANDLE_TOLERANCE,
     LIDS,
     Say,
     coloured_cages,
     coloured_regions,
+    report_approximate,
     report_cages,
     report_goals,
     report_pose,
@@ -50,6 +50,7 @@ from .outputs import (
     report_session,
     report_solution,
     report_surface,
+    require_met,
     written,
 )
 from .selection import Role, parse_selection
@@ -98,18 +99,15 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options)
-    report_solution(stored, seconds, say)
-    report_goals(stored, say)
+    report_solution(stored, seconds, say, has_handle=len(handle) > 0)
+    report_goals(stored, surface, options.input, say)
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
         say(f"written         {options.picture}")
-    if solution.handle_error > HANDLE_TOLERANCE:
-        raise MeshError(
-            f"{options.output} was written, but a handle misses its target by "
-            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
-        )
+    require_met(solution, options.output, "a handle")
     _require_turns(options, surface, fixed, solution.vertices)
     return True
 
@@ -130,6 +128,8 @@ def edit(options: Namespace, say: Say, progress: Progress) -> bool:
     if options.output is not None:
         io.require_writable(options.output)
     session = opened(options.input)
+    if attach := checked_attach(dict(options.attach), int(session.mesh.components.max()) + 1):
+        session.change_options(attach=attach)
     require_screen()
     session = plugin.edit(
         session,
@@ -227,6 +227,10 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
     """Return the options of the command line that `Deformer` has, as it takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
+    names = {name: name if name in parts else _labelled(name, surface) for name in goals}
+    if twice := [name for name in goals if list(names.values()).count(names[name]) > 1]:
+        raise ConstraintError(f"--volume is given twice for the same volume: {', '.join(twice)}")
+    goals = {names[name]: goal for name, goal in goals.items()}
     try:  # before the pose is solved, not when it is written
         surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
     except ArgumentError as fault:
@@ -240,6 +244,19 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
         "stiffness": _stiffness(options, surface),
         "slides": [_slide(text, surface) for text in options.slide],
     }
+
+
+def _labelled(name: str, surface: Surface) -> str:
+    """Return the name of the volume that is called *name*, which may be a label, as "label 3"."""
+    kind, _, number = name.partition(" ")
+    if kind != "label":
+        return name
+    labels = surface.labels()
+    volumes = labels.get(int(number), ()) if number.isdecimal() else ()
+    if len(volumes) == 1:
+        return volumes[0]
+    known = "; ".join(f"label {k}: {' and '.join(each)}" for k, each in sorted(labels.items()))
+    raise ConstraintError(f"there is no single volume {name!r}; there are {known or 'no labels'}")
 
 
 def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:

@@ -54,7 +54,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "open", "mechanisms", "paper", "peers")
+EXPERIMENTS = ("drag", "constraints", "open", "mechanisms", "paper", "peers")
 
 _SELECTION = """\
 selections (SEL):
@@ -87,6 +87,7 @@ exit codes:
        and pull also where the report says that the pose has crossings, folds or not converged
   1    the command failed; for check: it cannot be deformed, or the repair left it open; for deform
        and pull also where the mesh was written, but a handle misses its target by 0.1 % of its size
+       or a volume its goal
   2    usage error
   130  interrupted by Ctrl+C
 """
@@ -284,6 +285,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = add_command("edit", "deform a mesh or a saved session in a window")
     text = "the deformed mesh, written when the window is closed"
     _input_output(sub, text, session=True)
+    _attach(sub)
 
     sub = add_command("app", "open the desktop program")
     sub.add_argument("input", type=Path, nargs="?", metavar="FILE", help="mesh or session file")
@@ -436,8 +438,8 @@ def _constraints(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     text = (
         "a volume: keep, free, 2.5 (in the mesh's unit, cubed), 40%%, +10%% or -40%%, also after "
-        "'at least' or 'at most'; NAME is whole, body 0, cavity, wall, component 0, region 0, or a "
-        "part; may be repeated"
+        "'at least' or 'at most'; NAME is whole, body 0, cavity, wall, component 0, region 0, a "
+        "part, or label 3 of a label map; may be repeated"
     )
     add("--volume", action="append", default=[], metavar="NAME=GOAL", help=text)
     text = "a part of the surface, whose volume is that under a lid; may be repeated"

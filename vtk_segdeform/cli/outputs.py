@@ -19,6 +19,7 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
+from ..errors import MeshError
 from ..io import Surface, polydata_of, stored_vertices, to_polydata, volume_change
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
@@ -30,6 +31,7 @@ Say = Callable[[str], None]
 """Prints one line."""
 
 HANDLE_TOLERANCE = 1e-3  # handle error, in mesh diagonals, above which a command fails
+_VOLUME_TOLERANCE = 1e-9  # the same of a volume with a goal, relative
 _ADVICE = "move less, or add cage vertices"
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
@@ -54,19 +56,30 @@ def report_cages(cages: Sequence[Cage], say: Say) -> None:
     say(f"cages           {' + '.join(map(str, counts))} = {sum(counts)} vertices")
 
 
-def report_solution(solution: Solution, seconds: float, say: Say) -> None:
-    """Print the volume change, the handle error and the time of a solution."""
+def report_solution(
+    solution: Solution, seconds: float, say: Say, *, has_handle: bool = True
+) -> None:
+    """Print the volume change, the error of a handle, if there is one, and the time."""
     each = 1e3 * seconds / max(solution.steps, 1)
     report_volume(solution.volume_change, say)
-    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
+    if has_handle:
+        say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
     say(f"solve           {solution.steps} steps, {1e3 * seconds:.0f} ms, {each:.1f} ms per step")
 
 
-def report_goals(solution: Solution, say: Say) -> None:
-    """Print the volumes with goals, and their changes, by name."""
+def report_goals(solution: Solution, surface: Surface, path: Path, say: Say) -> None:
+    """Print the volumes with goals, and their changes, by name and label.
+
+    Of the formats of *path*, glTF alone tells its unit, the metre.
+    """
+    labels = {volume: k for k, volumes in surface.labels().items() for volume in volumes}
+    is_in_metres = path.suffix.lower() in (".glb", ".gltf")
     for name, change in solution.volume_changes.items():
         volume = solution.volumes[name]
-        say(f"volume          {name}: {volume:.6g}, {100 * change:+.4g} % of the original")
+        unit = f" m^3 ({1e6 * volume:.6g} ml)" if is_in_metres else ""
+        label = f"label {labels[name]}, " if name in labels else ""
+        text = f"{label}{name}: {volume:.6g}{unit}"
+        say(f"volume          {text}, {100 * change:+.4g} % of the original")
 
 
 def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:
@@ -89,6 +102,29 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
     say(f"folds           {folded}")
     if len(solution.unmoved):
         say(f"parts           {solution.unmoved_summary(mesh)}")
+
+
+def require_met(solution: Solution, path: Path, what: str) -> None:
+    """Raise a MeshError if *what* is moved misses its target, or a volume its goal.
+
+    *solution* is that in memory; the one in the file at *path* may be rounded.
+    """
+    if solution.handle_error > HANDLE_TOLERANCE:
+        raise MeshError(
+            f"{path} was written, but {what} misses its target by "
+            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
+        )
+    if solution.volumes and solution.volume_error > _VOLUME_TOLERANCE:
+        raise MeshError(
+            f"{path} was written, but a volume is off by "
+            f"{100 * solution.volume_error:.3g} %: {solution.status}"
+        )
+
+
+def report_approximate(solution: Solution, options: Namespace, say: Say) -> None:
+    """Print if the pose has constraints that only a finish places exactly, and is not finished."""
+    if (options.rigid or options.slide or options.symmetry) and not solution.is_finished:
+        say("constraints     rigid parts, slides and symmetry are approximate: pose not finished")
 
 
 def written(surface: Surface, solution: Solution, options: Namespace) -> Solution:

@@ -9,7 +9,7 @@ from .. import io
 from ..arrays import FloatArray
 from ..deformer import checked_place, checked_radius, fault_of_grab, place_text
 from ..deformer import pull as pulled
-from ..errors import ConstraintError, MeshError
+from ..errors import ConstraintError
 from ..geometry import lids_of
 from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
@@ -18,13 +18,14 @@ from ..progress import Progress
 from .commands import constraints_of
 from .motion import parse_vector
 from .outputs import (
-    HANDLE_TOLERANCE,
     LIDS,
     Say,
+    report_approximate,
     report_goals,
     report_pose,
     report_surface,
     report_volume,
+    require_met,
     written,
 )
 
@@ -62,21 +63,18 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     seconds = time.perf_counter() - start
     stored = written(surface, solution, options)
     report_volume(stored.volume_change, say)
-    report_goals(stored, say)
+    report_goals(stored, surface, options.input, say)
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
     report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(
             options.picture, mesh, solution.vertices, fixed=pinned, handle=point.corners
         )
         say(f"written         {options.picture}")
-    if solution.handle_error > HANDLE_TOLERANCE:
-        raise MeshError(
-            f"{options.output} was written, but the point misses its target by "
-            f"{100 * solution.handle_error:.3f} % of model size: {solution.status}"
-        )
+    require_met(solution, options.output, "the point")
     return True
 
 

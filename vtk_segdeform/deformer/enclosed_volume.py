@@ -193,7 +193,10 @@ class EnclosedVolume:
             raise ConstraintError(f"the part {name!r} encloses no volume under a lid")
         if found is None or not found.target:
             known = ", ".join([*self.volume_names, *parts])
-            raise ConstraintError(f"there is no volume {shown(name)}; there are {known or 'none'}")
+            raise ConstraintError(
+                f"there is no volume {shown(name)}; there are {known or 'none'}. Define others as "
+                "parts of the surface"
+            )
         if found.target < 0.0:
             found = replace(found, faces=found.faces[:, [0, 2, 1]], target=-found.target)
         return replace(found, name=name)

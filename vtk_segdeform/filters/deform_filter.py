@@ -133,7 +133,7 @@ class SegmentedCageDeformFilter(FilterSettings):
         """Return a deformer without constraints: that of the last execution, if still valid."""
         settings, key = self._settings, hashlib.blake2b()
         choices = settings.n_regions, settings.n_cage_vertices, settings.overlap, settings.stretch
-        key.update(repr((choices, labels is None, len(cages))).encode())
+        key.update(repr((choices, settings.attach, labels is None, len(cages))).encode())
         arrays = [mesh.vertices, mesh.faces, *([] if labels is None else [labels])]
         arrays.append(np.unique(mesh.components[held]))  # others may follow these
         for cage in cages:
@@ -150,6 +150,8 @@ class SegmentedCageDeformFilter(FilterSettings):
         self, mesh: Mesh, labels: Any, cages: Sequence[Cage], held: IntArray
     ) -> Deformer:
         settings, progress = self._settings, self._progress()
+        if settings.attach and (labels is not None or cages):
+            raise ConstraintError("SetAttach is for automatic regions only; leave it out")
         if labels is not None:
             regions = Regions.from_labels(mesh, labels, settings.overlap)
         elif len(cages) == 1:
@@ -160,7 +162,8 @@ class SegmentedCageDeformFilter(FilterSettings):
             )
         else:
             number, share = settings.n_regions or None, part(progress, 0.0, 0.2)
-            regions = segment(mesh, number, held=held, progress=share)
+            attach = dict(settings.attach)
+            regions = segment(mesh, number, attach=attach, held=held, progress=share)
         if not cages:
             size = settings.n_cage_vertices or suggested_size(regions)
             cages = fit_cages(mesh, regions, size, progress=part(progress, 0.2, 0.7))

@@ -131,6 +131,12 @@ class SegmentedCageDeform(SegmentedCageDeformFilter):
     def SetOverlap(self, rings: int) -> None:  # noqa: N802
         super().SetOverlap(rings)
 
+    @smproperty.stringvector(name="Attach", default_values="")
+    def SetAttach(self, text: str) -> None:  # noqa: N802
+        """Set the components that others follow, as 1=0 2=free."""
+        pairs = (each.partition("=")[::2] for each in text.replace(",", " ").split())
+        super().SetAttach({int(k): int(on) if on.isdecimal() else on for k, on in pairs})
+
     @smproperty.intvector(name="PreserveVolume", default_values=1)
     @smdomain.xml('<BooleanDomain name="bool"/>')
     def SetPreserveVolume(self, on: int) -> None:  # noqa: N802

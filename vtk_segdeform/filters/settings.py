@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,8 +11,9 @@ from numpy.typing import ArrayLike
 from vtkmodules.util.vtkAlgorithm import VTKPythonAlgorithmBase
 
 from ..arrays import is_number, is_whole, plain
-from ..checks import as_switch, as_text, shown
+from ..checks import as_switch, as_text, require, shown
 from ..errors import ArgumentError
+from ..geometry import Attach, checked_attach
 
 
 @dataclass(frozen=True)
@@ -21,6 +23,7 @@ class Settings:
     n_regions: int = 0
     n_cage_vertices: int = 0
     overlap: int = 4
+    attach: tuple[tuple[int, int | str], ...] = ()
     region_array: str = ""
     fixed_array: str = "fixed"
     handle_array: str = "handle"
@@ -58,6 +61,12 @@ class FilterSettings(VTKPythonAlgorithmBase):  # type: ignore[misc]
     def SetOverlap(self, rings: int) -> None:  # noqa: N802
         """Set the overlap of regions from labels, in edge rings; see `Regions.from_labels`."""
         self._set(overlap=_integer(rings, "rings"))
+
+    def SetAttach(self, attach: Attach | None) -> None:  # noqa: N802
+        """Set the components that others follow, as {1: 0, 2: "free"}; see `deform`."""
+        given = {} if attach is None else dict(require(attach, Mapping, "attach"))
+        largest = max([k for pair in given.items() for k in pair if is_whole(k, 0)], default=0)
+        self._set(attach=tuple(sorted(checked_attach(given, largest + 1).items())))
 
     def SetFixedArrayName(self, name: str) -> None:  # noqa: N802
         """Set the name of the point array that is nonzero at fixed vertices; it may be missing."""

@@ -44,6 +44,7 @@ from ..solver import (
     Status,
     Step,
     VolumeConstraint,
+    are_met,
     constrained_step,
     minimise,
     moved_along,
@@ -57,6 +58,7 @@ _STEPS = 200  # at most
 _TOLERANCE = 0.03 * CONVERGED  # diagonals; a step that moves less is the last
 # Where something comes to cross: rounds, factor of w, and rings around the faces, of a hold.
 _HOLDS, _FIRMER, _RINGS = 8, 10.0, 2
+_LANDINGS = 3  # on several volumes, of which the first is inexact where the surface is crumpled
 _WINDOW, _ROWS = 6, 10_000  # steps that the acceleration remembers, and rows of their residuals
 
 
@@ -165,8 +167,12 @@ class Finisher:
         """
         x = found.vertices.copy()
         x[self._free] = change(x)[self._free]
-        directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
-        return replace(found, vertices=self._landed(x, directions))
+        for _ in range(_LANDINGS):
+            directions = [self._at_free(change(x + d) - change(x)) for d in self._directions(x)]
+            x = self._landed_near(x, directions)
+            if are_met(self._constraints, x):
+                break
+        return replace(found, vertices=x)
 
     def _apart(self, found: Finish, progress: Progress | None) -> Finish:
         """Return *found* with w raised around faces that do not cross in y, until they do not."""
@@ -205,9 +211,7 @@ class Finisher:
         if not len(self._free):
             return x
         x[self._free] -= self._solve(self._to_held @ offsets)
-        landed = self._landed(x, self._directions(x))
-        is_near = np.isfinite(landed).all() and np.ptp(landed - x, axis=0).max() < self._diagonal
-        return landed if is_near else x
+        return self._landed_near(x, self._directions(x))
 
     def _descend(self, begin: FloatArray, progress: Progress | None) -> Finish:
         """Return *begin* after as many steps as it takes, at most `_STEPS`."""
@@ -276,6 +280,12 @@ class Finisher:
         away = x - self._y
         pull = self._weights * away
         return _Evaluated(x, value + float(np.vdot(pull, away)), self._at_free(slope + pull))
+
+    def _landed_near(self, x: FloatArray, directions: Sequence[FloatArray]) -> FloatArray:
+        """Return *x* moved along *directions* onto the volumes; as it is if they are far away."""
+        landed = self._landed(x, directions)
+        is_near = np.isfinite(landed).all() and np.ptp(landed - x, axis=0).max() < self._diagonal
+        return landed if is_near else x
 
     def _landed(self, x: FloatArray, directions: Sequence[FloatArray]) -> FloatArray:
         """Return *x* moved along *directions* onto the volumes.

@@ -8,7 +8,7 @@ A component *follows* another, its *carrier*, if it lies against it or is around
     around       the directions u from points of the smaller one to the nearest points of the other
                  go all around at least in a plane.  With the weights w = 1 / gap^4, |sum w u| is
                  less than half of sum w, and the second largest eigenvalue of sum w u u^T at least
-                 a fifth of it
+                 a fifth of it; or all of one is inside of the other, wherever
 
 Components that are linked so form a tree.  Its root is the largest of them, or each that has fixed
 vertices or handles.  Each other one is carried by the one of those nearer to the root to which it
@@ -41,7 +41,7 @@ from scipy.spatial import cKDTree
 from ..arrays import BoolArray, FloatArray, IntArray, is_whole
 from ..checks import require, shown
 from ..errors import ArgumentError
-from ..mesh import Mesh, nearest_on_triangles
+from ..mesh import Mesh, inside_points, nearest_on_triangles
 
 Attach = Mapping[int, "int | str"]
 """For components by number: the number of the carrier, or `FREE`."""
@@ -217,6 +217,10 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
         (low, high), (lower, higher) = boxes[i], boxes[j]
         if (low <= higher + far).all() and (lower <= high + far).all():
             gap = _linked(samples[i], samples[j], far)
+            if gap is None and (low > lower).all() and (high < higher).all():
+                one = samples[i].points[:: 1 + len(samples[i].points) // _FEW]
+                if inside_points(one, mesh.vertices, mesh.faces[own[j]]).all():
+                    gap = float(samples[j].nearest(samples[i].points).gaps.min())
             found += [] if gap is None else [_Link(gap, i, j)]
     if len(small):
         every = np.concatenate([own[k] for k in large])

@@ -22,11 +22,13 @@ from numpy.typing import ArrayLike
 from ..arrays import FloatArray, IntArray, as_points, plain
 from ..checks import Described, as_text, require
 from ..errors import ArgumentError, MeshError
+from ..geometry import lids_of
 from ..mesh import Mesh, Soup, Workaround, mesh_of
+from ..solver import Bodies, total_volume
 from .convert import as_polydata, read_polydata, write_mesh
 from .fields import follow
 from .moving import MovingSurface
-from .polygons import triangles_of
+from .polygons import cells_of, cut_into_triangles, polygons_of, triangles_of
 
 
 def read_mesh(path: str | Path) -> Mesh:
@@ -148,6 +150,44 @@ class Surface(Described):
     def workarounds(self) -> tuple[Workaround, ...]:
         """What the mesh has differently, as sentences with the given points concerned."""
         return self._soup.workarounds
+
+    def labels(self, name: str = "boundary_labels") -> dict[int, tuple[str, ...]]:
+        """Return the names of the volumes, for `Deformer`, that each label of an image has.
+
+        Parameters
+        ----------
+        name : str
+            A cell array (m, 2) of the labels on both sides of each face, of which 0 is outside, as
+            of `pyvista.ImageData.contour_labels`; without it there are no labels.
+
+        Returns
+        -------
+        labels : dict of int to tuple of str
+            The body of each label, or its bodies if it has several parts, or the cavity if it is
+            inside of another label, as ``{1: ("body 0",), 2: ("body 1", "body 2")}``.
+        """
+        sides = np.asarray(self._given.cell_data.get(as_text(name, "name"), ()))
+        if sides.ndim != 2 or sides.shape[1] != 2 or sides.dtype.kind not in "iu":
+            return {}
+        triangles, polygon = cut_into_triangles(self._soup.points, *polygons_of(self._given))
+        of_face: dict[tuple[int, ...], set[int]] = {}
+        pairs = sides[cells_of(self._given)[polygon]].tolist()
+        corners = np.sort(self.vertex_of[triangles], axis=1).tolist()
+        for face, pair in zip(corners, pairs, strict=True):
+            of_face[tuple(face)] = set(pair) - {0}
+        lids = lids_of(self.mesh)
+        bodies = Bodies(self.mesh, total_volume(self.mesh, lids), lids)
+        own_volumes = np.flatnonzero(bodies.volumes > 0.0).tolist()
+        around = {f"body {k}": bodies.body(k) for k in own_volumes}
+        around |= {f"cavity {k}": bodies.component(c) for k, c in enumerate(bodies.cavities)}
+        found: dict[int, tuple[str, ...]] = {}
+        for volume, constraint in around.items():
+            faces = np.sort(constraint.faces, axis=1).tolist()
+            common = set.intersection(*(of_face.get(tuple(face), set()) for face in faces))
+            own = common - found.keys() if len(common) > 1 else common
+            for label in own if len(own) == 1 else ():
+                found[label] = (*found.get(label, ()), volume)
+        return found
 
     def vertices_at(self, points: ArrayLike) -> IntArray:
         """Return the vertices (k,) of the mesh that given *points* (mask or ids) are, sorted.

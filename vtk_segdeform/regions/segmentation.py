@@ -80,7 +80,8 @@ def segment(
         *attach* has another carrier for them.
     apart : (j,) int
         Components whose volumes will change.  In the cage of another one they could not, so all
-        that follow each other with one of them get regions of their own, and follow in these.
+        that follow each other with one of them get regions of their own, and follow in these; then
+        there are at least as many regions as components that nothing carries.
     seed : int
         Seed for sampling the vertices of the coarse surface.
     progress : Progress, optional
@@ -117,6 +118,8 @@ def segment(
     whole, kept = mesh, np.arange(n)
     carrier = carriers(mesh, attach, roots=mesh.components[as_ids(held, n, "held")])
     carrier, leader = with_regions_apart(carrier, apart)
+    if leader is not None and n_regions is not None:
+        n_regions = max(int(n_regions), np.count_nonzero(carrier == np.arange(len(carrier))))
     main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)
