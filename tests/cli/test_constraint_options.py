@@ -10,8 +10,10 @@ import pyvista as pv
 from limbed import torso
 from numpy.testing import assert_allclose
 
+from vtk_segdeform.cli import commands, pulling
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.deformer import Mirror, Stiffness
+from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.io import Surface, read_polydata, write_mesh
 
@@ -44,6 +46,28 @@ def command(given, out, name: str, *more: str) -> list[str]:
     """Return the words of a command with few cages."""
     few = ["--regions", "1", "--cage-vertices", "80"]
     return [name, given, "-o", str(out), *MOTIONS[name], *more, *few]
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "more"),
+    [
+        ("deform", (commands, "Deformer"), {"stretch": 3.0, "rotation_groups": 7}),
+        ("pull", (pulling, "pulled"), {}),
+    ],
+)
+def test_options_named_as_in_python_are_passed_on(name, place, more, given, tmp_path, monkeypatch):
+    passed = {}
+
+    def refuse(*_, **options):
+        passed.update(options)
+        raise ConstraintError("enough")
+
+    monkeypatch.setattr(*place, refuse)
+    expected = {"avoid_contact": True, "symmetry": "x", **more}
+    words = ["--avoid-contact", "--symmetry", "x"]
+    words += [w for k, v in more.items() for w in (f"--{k.replace('_', '-')}", str(v))]
+    assert main(command(given, tmp_path / "out.vtp", name, *words)) == 2
+    assert {key: passed[key] for key in expected} == expected
 
 
 @pytest.mark.parametrize("name", ["deform", "pull"])

@@ -102,7 +102,7 @@ def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatc
 
     convert.write_mesh("vast.obj", BAR)
     os.truncate("vast.obj", 1_400_000_000)
-    monkeypatch.setitem(convert._READERS, ".obj", read)
+    monkeypatch.setitem(convert._FORMATS, ".obj", (read, convert.write_obj))
     assert main(["check", "vast.obj"]) == 1
     told = capsys.readouterr().err
     assert told == "segdeform check: vast.obj: not enough memory to read this file (1.4 GB)\n"

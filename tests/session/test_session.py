@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import itertools
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -474,6 +474,14 @@ def test_other_cages_are_carried_to_the_pose(by_pull):
     assert_array_equal(session.vertices, before)
     session.reset_pose()
     assert session.carried(cages) is None
+
+
+def test_flags_of_a_session_reach_its_deformer():
+    flags = {each.name: not each.default for each in fields(Options) if each.type == "bool"}
+    assert len(flags) > 2
+    session = ready(**flags)
+    held = session.poses.constrained(session.state)._options
+    assert {name: getattr(held, name) for name in flags} == flags
 
 
 def test_options_of_fitting_need_no_new_binding_and_others_do():

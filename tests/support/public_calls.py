@@ -1,8 +1,8 @@
 """Every public callable of the package, discovered automatically, with a valid call of each.
 
 Functions and classes of the modules below, public methods of these classes, and the setters of
-their properties.  `ARGUMENTS` has a valid value for each parameter name; where a name has several
-meanings, `SPECIAL` has the value under "Class.method.name".
+their properties.  `ARGUMENTS` has a valid value for each parameter name, but for flags; where a
+name has several meanings, `SPECIAL` has the value under "Class.method.name".
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import functools
 import importlib
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +154,9 @@ def _call(label: str, bound: Callable[[], Any], signed: Any) -> Call:
         for p in signature.parameters.values()
         if p.name != "self" and p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY)
     ]
+    for p in plain:
+        if isinstance(p.default, bool):
+            ARGUMENTS.setdefault(p.name, lambda: True)
     names = tuple(p.name for p in plain)
     needed = tuple(
         p.name for p in plain if p.default is p.empty or f"{label}.{p.name}" in ALSO_NEEDED
@@ -331,11 +334,8 @@ MADE_BY_HAND = {
     sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
 }  # fmt: skip
 EXTRA = {
-    "Session.change_options": (
-        "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-        "rotation_groups", "lids", "volumes", "symmetry",
-    ),
-}  # fmt: skip
+    "Session.change_options": tuple(field.name for field in fields(sd.Options)),
+}
 
 
 @functools.cache
@@ -355,7 +355,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "along": lambda: "plane",
     "arrays": lambda: (),
     "attach": dict,
-    "avoid_contact": lambda: True,
     "blend": lambda: regions().weights,
     "cage_faces": lambda: cages()[0].faces,
     "cage_vertices": lambda: [cage.vertices for cage in cages()],
@@ -418,8 +417,6 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "polydata": surface,
     "preparation": _preparation,
     "position": lambda: 0,
-    "preserve_region_volumes": lambda: False,
-    "preserve_volume": lambda: True,
     "progress": lambda: lambda _fraction, _message: None,
     "radius": lambda: 1.0,
     "region": lambda: 0,

@@ -205,6 +205,17 @@ def test_the_formats_on_the_page_of_files_are_readable():
     assert all(is_mesh_file(f"mesh{suffix}") for suffix in suffixes)
 
 
+def test_the_places_of_changes_have_what_the_guide_names():
+    guide = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = guide.split("## Where a change goes\n")[1].split("\n## ")[0]
+    places = re.findall(r"(?m)\d\. `(\S+\.py)`(.*?)(?=\d\. `|$)", section)
+    known = [(path, text) for path, text in places if "NAME" not in path]
+    assert {path.split("/")[0] for path, _ in known} == {"vtk_segdeform", "widgets", "tests"}
+    for path, text in known:
+        source = (ROOT / path).read_text(encoding="utf-8")
+        assert [name for name in re.findall(r"`([^`]+)`", text) if name not in source] == [], path
+
+
 @pytest.mark.parametrize("page", ["architecture", "mathematics", "speed"])
 def test_the_files_that_a_page_names_are_there(page):
     named = set(re.findall(r"[\w/]+/\w+\.py", PAGES[page]))

@@ -114,10 +114,13 @@ def _all(modules: tuple[str, ...]) -> list[Call]:
 
 
 def _draws(seed: int, these: list[Call], each: int) -> Iterator[tuple[Call, dict[str, str]]]:
-    """Yield *each* random bad calls per parameter; one in five has a second bad argument."""
-    rng = np.random.default_rng(seed)
+    """Yield *each* random bad calls per parameter; one in five has a second bad argument.
+
+    Those of a callable are the same whatever others there are.
+    """
     kinds = [*BAD, "fd"]
     for call in these:
+        rng = np.random.default_rng([seed, *call.name.encode()])
         for name in call.parameters:
             for kind in rng.choice(kinds, min(each, len(kinds)), replace=False):
                 bad = {name: str(kind)}

@@ -36,6 +36,7 @@ from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..session import Session, load_session
 from . import motion
+from .main import AS_IN_PYTHON
 from .outputs import (
     LIDS,
     Say,
@@ -90,7 +91,7 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     report_cages(cages, say)
     deformer = Deformer(
         mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.6, 0.9),
-        **_settings(options), **constraints,
+        preserve_volume=not options.no_volume, **constraints,
     )  # fmt: skip
     progress(0.9, "solving")
     start = time.perf_counter()
@@ -222,22 +223,8 @@ def _selected(text: str, surface: Surface, role: Role) -> IntArray:
     return vertices
 
 
-def _settings(options: Namespace) -> dict[str, Any]:
-    """Return the options of `Deformer` that are given on the command line."""
-    settings: dict[str, Any] = {
-        "preserve_volume": not options.no_volume,
-        "lids": LIDS[options.lids],
-        "avoid_contact": options.avoid_contact,
-    }
-    if options.stretch is not None:
-        settings["stretch"] = options.stretch
-    if options.rotation_groups is not None:
-        settings["rotation_groups"] = options.rotation_groups
-    return settings
-
-
 def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
-    """Return volumes, stiffness and slides of the command line, as `Deformer` takes them."""
+    """Return the options of the command line that `Deformer` has, as it takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
     names = {name: name if name in parts else _labelled(name, surface) for name in goals}
@@ -248,12 +235,14 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
         surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
     except ArgumentError as fault:
         raise ConstraintError(f"--turn or --push: {fault}") from None
+    own = {name: getattr(options, name, None) for name in AS_IN_PYTHON}
     return {
+        **{name: value for name, value in own.items() if value is not None},
+        "lids": LIDS[options.lids],
         "volumes": goals or None,
         "parts": {name: _selected(text, surface, "handle") for name, text in parts.items()},
         "stiffness": _stiffness(options, surface),
         "slides": [_slide(text, surface) for text in options.slide],
-        "symmetry": options.symmetry,
     }
 
 
@@ -294,7 +283,7 @@ def _stiffness(options: Namespace, surface: Surface) -> FloatArray | None:
 
 def _slide(text: str, surface: Surface) -> Slide:
     selection, colon, along = text.rpartition(":")
-    if not colon or along not in ("plane", "line", "surface"):
+    if not colon or along not in Slide.KINDS:
         selection, along = text, "plane"
     return Slide(_selected(selection, surface, "handle"), along)
 

@@ -30,6 +30,8 @@ from ..version import __version__
 from .progress_bar import ProgressBar
 
 _VECTOR_OPTIONS = ("--rotate", "--pivot", "--translate", "--at", "--to", "--pin")
+# Options with the name and the values of the parameter of `Deformer` that they set.
+AS_IN_PYTHON = ("avoid_contact", "symmetry", "stretch", "rotation_groups")
 # Parameters of Python whose options have other names.
 _OPTIONS_OF = {
     "locality": ("local",),

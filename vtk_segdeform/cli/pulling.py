@@ -38,10 +38,10 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     at, to = parse_vector(options.at, "at"), parse_vector(options.to, "to")
     pins = [parse_vector(text, "pin") for text in options.pin]
     surface = Surface.read(options.input)
-    mesh, lids = surface.mesh, LIDS[options.lids]
+    mesh = surface.mesh
     report_surface(surface, say)
     if not mesh.is_closed:
-        say(f"volume          {lids_of(mesh, lids).summary(preserved=True)}")
+        say(f"volume          {lids_of(mesh, LIDS[options.lids]).summary(preserved=True)}")
     point, radius = checked_place(mesh, at, "--at"), checked_radius(mesh, options.radius)
     say(f"grabbed         {_named(point)} of the mesh at {place_text(mesh, point)}")
     pinned = [_pinned(mesh, pin, radius, say) for pin in pins]
@@ -55,9 +55,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         locality=options.local,
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
-        lids=lids,
         **constraints_of(options, surface),
-        avoid_contact=options.avoid_contact,
         attach=dict(options.attach),
         refine=options.refine,
         progress=progress,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +25,6 @@ from .symmetry import Mirror
 
 _MOST_POINTS = 500  # vertices of one slide in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for the nearest point of a surface
-_KINDS = "plane", "line", "surface"
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +47,8 @@ class Slide:
     along: str = "plane"
     direction: ArrayLike | None = None
 
+    KINDS: ClassVar[tuple[str, ...]] = ("plane", "line", "surface")
+
 
 class Guide(NamedTuple):
     """A checked slide, or some of its vertices."""
@@ -67,10 +68,9 @@ def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
     found = []
     for each in slides:
         slide = require(each, Slide, "slides")
-        if not isinstance(slide.along, str) or slide.along not in _KINDS:
-            raise ConstraintError(
-                f"a slide must be along a plane, line or surface; got {shown(slide.along)}"
-            )
+        if not isinstance(slide.along, str) or slide.along not in Slide.KINDS:
+            kinds = f"{', '.join(Slide.KINDS[:-1])} or {Slide.KINDS[-1]}"
+            raise ConstraintError(f"a slide must be along a {kinds}; got {shown(slide.along)}")
         try:
             ids = as_ids(slide.vertices, mesh.n_vertices, "vertices of a slide")
         except ValueError as fault:

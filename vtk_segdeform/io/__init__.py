@@ -24,8 +24,7 @@ The files, in reading order:
     repaired           repair of PolyData with its polygons and arrays
     meshlab            PyMeshLab: conversion, simplification, file formats
     meshlab_layers     MeshLab's layers as PolyData
-    meshlab_shown      colours of layers, and cages as wires
-    meshlab_project    MeshLab projects: a mesh and its cages
+    meshlab_project    MeshLab projects: a mesh and its cages, coloured and as wires
 """
 
 from .array_names import IS_ROUNDING

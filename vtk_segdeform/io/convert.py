@@ -21,6 +21,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -47,29 +48,30 @@ from .wavefront import read_obj, write_obj
 
 _log = logging.getLogger(__name__)
 
-_READERS: dict[str, Callable[[Path], pv.PolyData]] = {
-    ".glb": read_gltf, ".gltf": read_gltf, ".obj": read_obj, ".off": read_off, ".ply": read_ply,
-    ".stl": read_stl,
-}  # fmt: skip
-_WRITERS: dict[str, Callable[[Path, pv.PolyData], None]] = {
-    ".glb": write_gltf, ".gltf": write_gltf, ".obj": write_obj, ".off": write_off,
-    ".ply": write_ply, ".stl": write_stl,
-}  # fmt: skip
-_VTK_READS = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
-_VTK_WRITES = frozenset({".vtk", ".vtp", ".vtu", ".vtkhdf"})
+_VTK = dict.fromkeys((".vtk", ".vtp", ".vtu", ".vtkhdf"), (read_with_vtk, write_with_vtk))
+_Format: TypeAlias = tuple[Callable[[Path], pv.PolyData], Callable[[Path, pv.PolyData], None]]
+# The reader and the writer of each format; PyMeshLab has others.
+_FORMATS: dict[str, _Format] = {
+    ".glb": (read_gltf, write_gltf),
+    ".gltf": (read_gltf, write_gltf),
+    ".obj": (read_obj, write_obj),
+    ".off": (read_off, write_off),
+    ".ply": (read_ply, write_ply),
+    ".stl": (read_stl, write_stl),
+    **_VTK,
+}
 _SHORT = 200  # characters of a name in messages
-# Formats of point arrays of any name and colours.
-_STORE_ARRAYS = frozenset({".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"})
+_STORE_ARRAYS = frozenset({".ply", *_VTK})  # formats of point arrays of any name and colours
 
 
 def is_mesh_file(path: str | Path) -> bool:
     """Return whether *path* has the suffix of a format that can be read."""
-    return as_path(path).suffix.lower() in {*_READERS, *_VTK_READS, *meshlab.READS}
+    return as_path(path).suffix.lower() in {*_FORMATS, *meshlab.READS}
 
 
 def writable_suffixes() -> tuple[str, ...]:
     """Return the suffixes that `write_mesh` can write without PyMeshLab, in order."""
-    return tuple(sorted({*_WRITERS, *_VTK_WRITES}))
+    return tuple(sorted(_FORMATS))
 
 
 def read_polydata(path: str | Path) -> pv.PolyData:
@@ -104,13 +106,12 @@ def read_polydata(path: str | Path) -> pv.PolyData:
         raise MeshError(f"{path}: the file is empty (0 bytes); copy or export it again")
     suffix = path.suffix.lower()
     if not is_mesh_file(path):
-        known = {*_READERS, *_VTK_READS, *meshlab.READS}
+        known = {*_FORMATS, *meshlab.READS}
         raise MeshError(f"{path}: {_files(suffix)} cannot be read; use one of {_listed(known)}")
     try:
-        if suffix in _READERS:
-            surface = _READERS[suffix](path)
-        elif suffix in _VTK_READS:
-            surface = read_with_vtk(path)
+        if suffix in _FORMATS:
+            read, _ = _FORMATS[suffix]
+            surface = read(path)
         else:
             vertices, faces = meshlab.read_faces(path)
             surface = polydata_of(vertices, np.full(len(faces), 3), faces.ravel())
@@ -163,10 +164,9 @@ def write_mesh(
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
-            if suffix in _WRITERS:
-                _WRITERS[suffix](draft, surface)
-            elif suffix in _VTK_WRITES:
-                write_with_vtk(draft, surface)
+            if suffix in _FORMATS:
+                _, write = _FORMATS[suffix]
+                write(draft, surface)
             else:
                 warn_left_out(f"{suffix} written by PyMeshLab", surface, {})
                 _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
@@ -204,7 +204,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
     path = as_path(path)
     suffix = path.suffix.lower()
     as_flag(arrays, "arrays")
-    known = {*_STORE_ARRAYS} if arrays else {*_WRITERS, *_VTK_WRITES, *meshlab.WRITES}
+    known = {*_STORE_ARRAYS} if arrays else {*_FORMATS, *meshlab.WRITES}
     if suffix not in known:
         verb = "cannot store arrays and colours" if arrays else "cannot be written"
         raise MeshError(f"{path}: {_files(suffix)} {verb}; use one of {_listed(known)}")

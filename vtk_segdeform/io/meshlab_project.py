@@ -4,8 +4,8 @@
     work.layers/*.ply     the layers, with selection, quality, colours and texture coordinates
 
 A layer with quality and without colours is coloured by it, since MeshLab shows the quality only in
-colours.  The cages of a session are hidden, and shown as wires by a layer beside each
-(`meshlab_shown`); its local volume change is hidden as well.
+colours.  The cages of a session are hidden, and shown by a layer of their edges beside each, which
+MeshLab draws as lines since that file has no faces; the local volume change is hidden as well.
 
 PyMeshLab is not required.  MeshLab stores a selection in a PLY file as bit 32 of the property
 ``flags``; here it is the array "selection", as in `meshlab_layers`.
@@ -24,6 +24,7 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -35,16 +36,22 @@ from ..errors import MeshError
 from ..files import file_inside, open_regular, replacing, require_place
 from .convert import read_polydata, with_vertices, write_mesh
 from .meshlab_layers import HasLayers, Layer, as_layers, free_name
-from .meshlab_shown import coloured, is_cage, wires_of
+from .polygons import polygons_of
 
 _SELECTED = 0x20  # of MeshLab's flags
 _GENERATED = re.compile(r"\d+-[0-9a-f]{12}(-wires)?\.ply")
+_CAGE = re.compile(r"cage \d+")  # the name of the layer of a cage
 _WIRES = "-wires.ply"  # the end of the name of a file that only shows the edges of another layer
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
 _LARGEST = 10_000_000  # bytes of the .mlp
 _DEEPEST = 32  # nesting levels; MeshLab's projects have four
 _MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # in total, also if a file is listed several times
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
+# The colours of regions in pictures and in the editor.
+_REGIONS = ["E69F00", "56B4E9", "009E73", "CC79A7", "F0E442", "0072B2", "D55E00"]
+_LOSS, _NONE, _GAIN = [0, 114, 178], [255, 255, 255], [213, 94, 0]
+_WIRE = (40, 40, 40, 255)
+_COLOURS = {"RGB", "RGBA"}
 
 
 def read_project(path: str | Path) -> dict[str, pv.PolyData]:
@@ -131,14 +138,14 @@ def write_project(path: str | Path, what: Layer | HasLayers | Mapping[str, Layer
         names = set()
         for number, (label, surface) in enumerate(layers.items()):
             name = f"{number}-{_digest(surface)}.ply"
-            write_mesh(folder / name, _with_flags(coloured(surface)))
+            write_mesh(folder / name, _with_flags(_coloured(surface)))
             shown = not isinstance(what, HasLayers) or label == "mesh"
             _add(group, label, f"{folder.name}/{name}", visible=shown)
             names.add(name)
-            if not shown and is_cage(label):
+            if not shown and _CAGE.fullmatch(label):
                 name = name.removesuffix(".ply") + _WIRES
                 with replacing(folder / name) as draft:
-                    draft.write_bytes(wires_of(surface))
+                    draft.write_bytes(_wires_of(surface))
                 _add(group, f"{label}, wires", f"{folder.name}/{name}", visible=True)
                 names.add(name)
         ElementTree.SubElement(project, "RasterGroup")
@@ -251,3 +258,55 @@ def _matrix(path: Path, element: ElementTree.Element) -> FloatArray:
         label = element.get("label", "")[:80]
         raise MeshError(f"{path}: the matrix of layer {label!r} is not affine")
     return matrix
+
+
+def _coloured(surface: pv.PolyData) -> pv.PolyData:
+    """Return a surface with colours of its quality, unless it has colours or no quality.
+
+    Whole numbers, such as regions, get distinct colours; other numbers blue below and red above 0.
+    """
+    points = surface.point_data
+    if "quality" not in points or _COLOURS & {*points.keys(), *surface.cell_data.keys()}:
+        return surface
+    surface = surface.copy(deep=False)
+    colours = _colours_of_quality(np.asarray(points["quality"], dtype=np.float64))
+    surface.point_data["RGBA"] = colours
+    return surface
+
+
+def _colours_of_quality(quality: FloatArray) -> Any:
+    """Return colours (n, 4) uint8 of a quality (n,).
+
+    >>> _colours_of_quality(np.array([0.0, 1.0, 7.0]))[:, :3].tolist()
+    [[230, 159, 0], [86, 180, 233], [230, 159, 0]]
+    >>> _colours_of_quality(np.array([-0.5, 0.0, 0.25]))[:, :3].tolist()
+    [[0, 114, 178], [255, 255, 255], [234, 174, 128]]
+    """
+    quality = np.nan_to_num(quality, nan=0.0, posinf=0.0, neginf=0.0)
+    if (quality == np.rint(quality)).all():
+        palette = np.array([list(bytes.fromhex(colour)) for colour in _REGIONS])
+        colours = palette[quality.astype(np.int64) % len(palette)]
+    else:
+        share = (quality / np.abs(quality).max())[:, None]
+        towards = np.where(share < 0.0, _LOSS, _GAIN)
+        colours = _NONE + np.abs(share) * (towards - np.array(_NONE))
+    opaque = np.full((len(quality), 1), 255)
+    return np.rint(np.hstack([colours, opaque])).astype(np.uint8)
+
+
+def _wires_of(surface: pv.PolyData) -> bytes:
+    """Return a PLY file of the edges of a surface, without faces."""
+    counts, corners = polygons_of(surface)
+    counts = counts[counts > 0]
+    ends = np.roll(corners, -1)
+    last = np.cumsum(counts) - 1
+    ends[last] = corners[last - counts + 1]
+    edges = np.unique(np.sort(np.stack([corners, ends], axis=1), axis=1), axis=0)
+    vertex = np.zeros(surface.n_points, [("x", "<f8", 3), ("colour", "u1", 4)])
+    vertex["x"], vertex["colour"] = surface.points, _WIRE
+    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertex)}"]
+    header += [f"property double {name}" for name in "xyz"]
+    header += [f"property uchar {name}" for name in ("red", "green", "blue", "alpha")]
+    header += [f"element edge {len(edges)}", "property int vertex1", "property int vertex2"]
+    data = "\n".join([*header, "end_header", ""]).encode()
+    return bytes(data + vertex.tobytes() + edges.astype("<i4").tobytes())

@@ -37,8 +37,7 @@ def read_mesh(path: str | Path) -> Mesh:
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
-        .dae, .x3d, .wrl and others.
+        Of any format that `read_polydata` reads.
 
     Returns
     -------

@@ -39,6 +39,10 @@ from .memo import Memo
 from .state import Cages, Pose, State
 
 _KEPT = 3  # bound deformers, rotations and surfaces of the last poses
+# The options that are not those of `Deformer.hold`: of cages, regions and the binding.
+_NOT_HELD = {
+    "n_cage_vertices", "offset", "attach", "stretch", "rotation_groups", "symmetry",
+}  # fmt: skip
 VOLUME_TOLERANCE = 1e-9  # relative; a pose with a larger error does not meet a new constraint
 
 
@@ -314,8 +318,7 @@ def _binding(state: State) -> tuple[Any, ...]:
 
 def _volumes(state: State) -> dict[str, Any]:
     """Return the options of *state* for `Deformer.hold`."""
-    names = "preserve_volume", "preserve_region_volumes", "lids", "avoid_contact"
-    given = {name: getattr(state.options, name) for name in names}
+    given = {name: value for name, value in vars(state.options).items() if name not in _NOT_HELD}
     return {
         **given,
         "volumes": dict(state.options.volumes),

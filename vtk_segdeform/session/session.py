@@ -900,7 +900,7 @@ class Session(Described):
 
     def commit(self, label: str | None = None, *, join: bool = False) -> str | None:
         """End the drag as one step, and return its label; see `Timeline.commit`."""
-        return self.history.commit(label, join=join)
+        return self.history.commit(label, join=as_flag(join, "join"))
 
     def revert(self) -> None:
         """Cancel the drag and restore the state before it."""

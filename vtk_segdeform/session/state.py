@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -48,14 +48,12 @@ Cages: TypeAlias = tuple[FloatArray, ...]
 _NO_PIVOTS: Mapping[str, FloatArray] = MappingProxyType({})
 _TINY = float(np.finfo(np.float64).tiny)
 _FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
-# The options, as undo steps name them.
+# The options, as undo steps name them; others by their own names.
 _WORDS = {
     "n_cage_vertices": "total cage vertices",
     "offset": "cage offset",
     "preserve_volume": "volume preservation",
     "preserve_region_volumes": "volume preservation per region",
-    "volumes": "volumes",
-    "symmetry": "symmetry",
     "lids": "volume of open parts",
     "stretch": "stretch resistance",
     "rotation_groups": "rotation clusters",
@@ -115,11 +113,10 @@ class Options:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "volumes", _pairs(self.volumes))
-        flags = "preserve_volume", "preserve_region_volumes", "avoid_contact"
-        for name in flags:
-            value = getattr(self, name)
-            if not isinstance(value, bool):
-                raise SessionError(f"{name} must be True or False; got {shown(value)}")
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if each.type == "bool" and not isinstance(value, bool):
+                raise SessionError(f"{each.name} must be True or False; got {shown(value)}")
         object.__setattr__(self, "attach", _checked_attach(self.attach))
         if self.lids is not None and not isinstance(self.lids, bool):
             raise SessionError(f"lids must be True, False or None; got {shown(self.lids)}")
@@ -140,7 +137,7 @@ def _checked_attach(attach: Any) -> Attachments:
     try:
         pairs = dict(attach)
         return tuple(sorted(checked_attach(pairs, 1 + max(_numbers(pairs), default=0)).items()))
-    except (ArgumentError, TypeError, ValueError):
+    except (ArgumentError, TypeError, ValueError, RuntimeError):
         raise SessionError(
             f"attach must map components to others or {FREE!r}; got {shown(attach)}"
         ) from None
@@ -162,10 +159,10 @@ def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
 
 def label_of_change(before: Options, after: Options) -> str:
     """Return the label of an undo step that changes options: "volume preservation off"."""
-    names = [name for name in _WORDS if getattr(before, name) != getattr(after, name)]
+    names = [name for name, value in vars(before).items() if value != getattr(after, name)]
     if len(names) != 1:
         return "change options"
-    value, words = getattr(after, names[0]), _WORDS[names[0]]
+    value, words = getattr(after, names[0]), _WORDS.get(names[0], names[0].replace("_", " "))
     return f"{words} {'on' if value else 'off'}" if isinstance(value, bool) else f"change {words}"
 
 

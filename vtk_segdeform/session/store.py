@@ -73,13 +73,11 @@ if TYPE_CHECKING:
 FORMAT = "vtk_segdeform session"
 VERSION = 3
 
-_LATER: dict[str, Any] = {
-    "attach": (),
-    "lids": None,
-    "avoid_contact": False,
-    "volumes": (),
-    "symmetry": None,
-}  # options that version 1 does not have, and their defaults
+# The options of version 1; a file has others only if they are not at their defaults.
+_FIRST = {
+    "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
+    "rotation_groups",
+}  # fmt: skip
 
 # Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
 _ERRORS = (zipfile.BadZipFile, ValueError, EOFError, RuntimeError, struct.error, OSError)
@@ -175,8 +173,9 @@ def _write(
     mesh, state = session.mesh, session.state
     regions, pose = state.regions, state.pose
     options = {name: _plain(value) for name, value in asdict(state.options).items()}
-    options = {k: v for k, v in options.items() if k not in _LATER or v != _LATER[k]}
-    is_simple = given is None and mesh.is_closed and not _LATER.keys() & options.keys()
+    defaults = asdict(Options())
+    options = {k: v for k, v in options.items() if k in _FIRST or v != defaults[k]}
+    is_simple = given is None and mesh.is_closed and options.keys() <= _FIRST
     is_new = state.stiffness is not None or bool(state.slides)
     is_new |= regions is not None and regions.leader is not None
     is_new |= bool(state.parts) or (state.locality is not None and not state.locality.reach)

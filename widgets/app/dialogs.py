@@ -10,7 +10,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import READABLE_FILES, Autosaves, Slot
+from ..editor import Autosaves, Slot, file_types
 
 Qt = QtCore.Qt
 
@@ -29,7 +29,8 @@ class Answer(enum.Enum):
 
 def ask_file(parent: Any, folder: Path) -> Path | None:
     """Ask for a mesh or a session to open, starting in *folder*."""
-    name, _ = QtWidgets.QFileDialog.getOpenFileName(parent, "Open", str(folder), READABLE_FILES)
+    types = file_types(sessions=True)
+    name, _ = QtWidgets.QFileDialog.getOpenFileName(parent, "Open", str(folder), types)
     return Path(name) if name else None
 
 

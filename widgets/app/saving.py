@@ -16,7 +16,7 @@ from qtpy import QtCore, QtWidgets
 from vtk_segdeform.errors import SessionError
 from vtk_segdeform.files import replacing
 
-from ..editor import MESH_FILES, Action, Controller, Kind, error_text, exporting, saving
+from ..editor import Action, Controller, Kind, error_text, exporting, file_types, saving
 from .dialogs import Answer, ask_replace, ask_save, show_error
 from .documents import SUFFIX
 
@@ -51,7 +51,7 @@ def save_mesh_as(window: Any) -> bool:
     """Ask for a file and save the posed mesh there, in the format of its suffix."""
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
-    path = _path(window, "Save mesh", MESH_FILES, suffix)
+    path = _path(window, "Save mesh", file_types(sessions=False), suffix)
     return path is not None and _done(window, exporting(path, lambda: _mesh_saved(window, path)))
 
 

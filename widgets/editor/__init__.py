@@ -37,10 +37,9 @@ from .messages import error_text
 from .notices import Notice, Notices, notices_of
 from .queue import Kind, Queue, Task
 from .session_file import (
-    MESH_FILES,
-    READABLE_FILES,
     SessionFile,
     WrittenMesh,
+    file_types,
     is_mesh,
     read_session,
     write_posed,
@@ -49,10 +48,8 @@ from .widget_set import Mode
 
 __all__ = [
     "INTERVAL",
-    "MESH_FILES",
     "MOUSE",
     "PRESETS",
-    "READABLE_FILES",
     "TOOLS",
     "About",
     "Action",
@@ -75,6 +72,7 @@ __all__ = [
     "actions",
     "error_text",
     "exporting",
+    "file_types",
     "hint",
     "is_mesh",
     "jumping_to",

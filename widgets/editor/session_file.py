@@ -33,10 +33,6 @@ if TYPE_CHECKING:
 _SUFFIX = ".segdeform"
 _LARGE = 8 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
 _READ = 0.3  # share of reading in the progress of opening a mesh; the rest is checking it
-_MESHES = "*.ply *.obj *.off *.stl *.glb *.gltf *.vtk *.vtp *.vtu *.vtkhdf"
-# Types of files in dialogs.
-MESH_FILES = f"Meshes ({_MESHES})"
-READABLE_FILES = f"Meshes and sessions (*{_SUFFIX} {_MESHES});;All files (*)"
 
 
 class SessionFile:
@@ -183,6 +179,17 @@ def _shortened(warning: str) -> str:
     """Return a *warning* about arrays for the status line: their names only."""
     text = re.sub(r"\b(point|cell|field) array ", "", warning)
     return text[:1].upper() + text[1:]
+
+
+def file_types(*, sessions: bool) -> str:
+    """Return the types of files in a dialog: meshes, and with *sessions* these and all others."""
+    imported("vtk_segdeform.io")  # imports pyvista
+    from vtk_segdeform.io import writable_suffixes
+
+    meshes = " ".join(f"*{suffix}" for suffix in writable_suffixes())
+    if not sessions:
+        return f"Meshes ({meshes})"
+    return f"Meshes and sessions (*{_SUFFIX} {meshes});;All files (*)"
 
 
 def is_mesh(path: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 from qtpy import QtCore, QtWidgets
 
-from ..editor import MESH_FILES, READABLE_FILES, DeformEditor, actions
+from ..editor import DeformEditor, actions, file_types
 from ..panel import Field, toolbar, tooltip
 from .controls import Press, highlighted, tool_button
 from .icons import icon
@@ -172,7 +172,7 @@ class Toolbar(QtWidgets.QWidget):
     def ask_and_open(self) -> None:
         """Ask for a file and open it."""
         path, _ = QtWidgets.QFileDialog.getOpenFileName(
-            self, "Open", str(self._editor.path.parent), READABLE_FILES
+            self, "Open", str(self._editor.path.parent), file_types(sessions=True)
         )
         if path and self.may_discard():
             self._editor.do(actions.opening(Path(path)))
@@ -204,7 +204,7 @@ class Toolbar(QtWidgets.QWidget):
     def ask_and_export(self) -> None:
         """Ask for a file and write the posed mesh there."""
         proposed = str(self._editor.path.with_suffix(".ply"))
-        path = self._path_to_write("Save mesh", proposed, MESH_FILES)
+        path = self._path_to_write("Save mesh", proposed, file_types(sessions=False))
         if path is not None:
             self._editor.do(actions.exporting(path if path.suffix else path.with_suffix(".ply")))
 
