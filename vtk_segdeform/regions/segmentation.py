@@ -119,7 +119,8 @@ def segment(
     carrier = carriers(mesh, attach, roots=mesh.components[as_ids(held, n, "held")])
     carrier, leader = with_regions_apart(carrier, apart)
     if leader is not None and n_regions is not None:
-        n_regions = max(int(n_regions), np.count_nonzero(carrier == np.arange(len(carrier))))
+        roots = int(np.count_nonzero(carrier == np.arange(len(carrier))))
+        n_regions = max(int(n_regions), roots)
     main = _main_components(mesh, n_regions, carrier)
     if not main.all():
         mesh, kept = mesh.of_components(main)
