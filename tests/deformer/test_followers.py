@@ -69,7 +69,7 @@ def check(scene: Scene, solution: Solution) -> None:
 HOLLOW = "lining", "rod in a tube"
 
 
-OFTEN = "sleeve", "lining", "beads"
+OFTEN = "sleeve", "lining"
 RARE = sorted({*SCENES} - {*OFTEN})
 
 
@@ -79,7 +79,8 @@ RARE = sorted({*SCENES} - {*OFTEN})
 def test_followers_keep_their_place_on_a_body_that_is_bent(name):
     scene = SCENES[name]()
     given = scene.mesh, scene.fixed, scene.handle
-    for angle, is_finished in ((60.0, False), (50.0 if name in HOLLOW else 60.0, True)):
+    for is_finished in (True,) if name in HOLLOW else (False, True):
+        angle = 50.0 if name in HOLLOW and is_finished else 60.0
         solution = deform(*given, scene.targets(angle), refine=is_finished)
         check(scene, solution)
         assert solution.is_finished == is_finished

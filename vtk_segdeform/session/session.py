@@ -751,8 +751,7 @@ class Session(Described):
         SessionError, ConstraintError
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
-        as_text(name, "name")
-        goals = {**dict(self.options.volumes), name: goal}
+        goals = self._goals_with(name, goal)
         state = apart(self.poses, self.state, goals)
         state = pulls.kept(state, self.poses.vertices(state))
         options = replace(state.options, volumes=tuple(goals.items()))
@@ -762,15 +761,18 @@ class Session(Described):
 
     def needs_cages(self, name: str, goal: str | float) -> bool:
         """Whether `set_volume` has to fit new cages first, which may take a second or more."""
-        goals = {**dict(self.options.volumes), name: goal}
+        goals = self._goals_with(name, goal)
         return separated_by(self.poses, self.state, goals) is not None
 
     def with_cages_for(
         self, name: str, goal: str | float, progress: Progress | None = None
     ) -> State:
         """Return the state with these cages; this may run in another thread."""
-        goals = {**dict(self.options.volumes), name: goal}
-        return apart(self.poses, self.state, goals, progress)
+        return apart(self.poses, self.state, self._goals_with(name, goal), progress)
+
+    def _goals_with(self, name: str, goal: str | float) -> dict[str, str | float]:
+        goals = {**dict(self.options.volumes), as_text(name, "name"): goal}
+        return dict(replace(self.options, volumes=tuple(goals.items())).volumes)  # checked
 
     def refine(
         self,
