@@ -150,7 +150,7 @@ def bodies_section(editor: DeformEditor) -> Section:
                 tuple(_row(editor, each, c, is_chosen=each == name) for each, c in shown.items()),
                 "The closed parts of the mesh, the largest first. "
                 "The selected one is that of the section Volumes as well",
-                n_rows=4,
+                n_rows=5,
                 acts={"select": lambda keys: _choosing(next(iter(keys), ""))},
             ),
             Field(
