@@ -28,8 +28,7 @@ from .growth import VOLUME_LEG
 from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
-_SOLVES_PER_SCALING = 4  # at most
-_RENEWALS = 12  # of the planes of slides in one solve, at most
+_MORE_SOLVES = 4  # at most, after a scaling or with other planes of slides
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
 _VANISHED = 1e-12  # length of a direction of a volume, relative to the longest, that is rounding
@@ -109,8 +108,7 @@ class Path:
                 max_steps=min(options.max_steps, _CONTACT_STEPS),
             )
         released: set[int] = set()
-        renewals = _RENEWALS if self.solver.terms else 0
-        for _ in range(1 + _SOLVES_PER_SCALING + renewals + 2 * self.constraints.n_bounds):
+        for _ in range(1 + _MORE_SOLVES + 2 * self.constraints.n_bounds):
             result = self._minimise(goal, options)
             steps += result.steps
             x, scaled_by = self._with_exact_volume(result)

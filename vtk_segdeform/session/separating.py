@@ -1,4 +1,4 @@
-"""Components that follow others, and those that deform by themselves.
+"""Which components follow others, and which have regions and cages of their own.
 
 Automatic regions are made before there are handles.  Until two components that belong together have
 fixed vertices or handles each, one of them may follow the other, whichever has them, in the same

@@ -79,7 +79,7 @@ class Notices:
 
     @property
     def offers(self) -> tuple[str, ...]:
-        """The buttons for this session, without those that every session has."""
+        """The buttons that only some sessions have, this one among them."""
         session = self._session
         offers = self._offers.items()
         return tuple(label for label, (_, suits) in offers if session and suits(session))
