@@ -194,6 +194,12 @@ def bound_once() -> Iterator[None]:
 
 
 @pytest.fixture
+def rng() -> np.random.Generator:
+    """Random numbers that do not depend on the tests before: modules share no generator."""
+    return np.random.default_rng(5)
+
+
+@pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compute the volume of small meshes over a coarse surface in each step, as of larger ones."""
     from vtk_segdeform import sizes

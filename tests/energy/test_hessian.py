@@ -15,7 +15,6 @@ from vtk_segdeform.subspace.subspace import cage_subspace
 
 SCENE = sausage()
 REST = np.concatenate([cage.vertices for cage in SCENE.cages])
-RNG = np.random.default_rng(5)
 
 
 def energy_of(n_clusters):
@@ -43,9 +42,9 @@ def slope(energy, p):
 
 
 @pytest.mark.parametrize("n_clusters", [40, SCENE.mesh.n_vertices])
-def test_it_is_the_derivative_of_the_gradient_to_second_order(n_clusters):
+def test_it_is_the_derivative_of_the_gradient_to_second_order(n_clusters, rng):
     energy, p = energy_of(n_clusters), bent(REST)
-    dp = RNG.normal(size=p.shape)
+    dp = rng.normal(size=p.shape)
     exact = hessian_times(energy, p, dp)
     errors = []
     for step in (1e-2, 1e-3):
@@ -80,19 +79,19 @@ def test_a_rotation_of_the_whole_mesh_costs_nothing():
         assert abs(cost) < 1e-9 * np.vdot(turn, energy.quadratic @ turn)
 
 
-def test_the_hessian_rotates_with_the_pose():
+def test_the_hessian_rotates_with_the_pose(rng):
     energy, p = energy_of(40), bent(REST)
     turn = rotation([1.0, 2.0, 0.5], 1.1)
-    dp = RNG.normal(size=p.shape)
+    dp = rng.normal(size=p.shape)
     turned = hessian_times(energy, p @ turn.T, dp @ turn.T)
     expected = hessian_times(energy, p, dp) @ turn.T
     assert_allclose(turned, expected, atol=1e-9 * np.abs(expected).max())
 
 
-def test_both_forms_of_the_factor_solve():
+def test_both_forms_of_the_factor_solve(rng):
     energy, p = energy_of(40), bent(REST)
     held = energy.quadratic + np.eye(len(p)) * np.trace(energy.quadratic)
-    y = RNG.normal(size=p.shape)
+    y = rng.normal(size=p.shape)
     plain = quadratic_factor(held)
     assert_allclose(held @ plain.solve(y), y, atol=1e-9)
     curved = full_factor(held, rotation_term(energy, p))
@@ -101,10 +100,10 @@ def test_both_forms_of_the_factor_solve():
     assert_allclose(back, y, atol=2e-3 * np.abs(y).max())  # a thousandth of the term is left out
 
 
-def test_the_hessian_of_the_volumes_is_added():
+def test_the_hessian_of_the_volumes_is_added(rng):
     energy, p, m = energy_of(40), bent(REST), len(REST)
     held = energy.quadratic + np.eye(m) * np.trace(energy.quadratic)
-    g = 1e-3 * np.trace(energy.quadratic) / m * RNG.normal(size=(3, m, m))
+    g = 1e-3 * np.trace(energy.quadratic) / m * rng.normal(size=(3, m, m))
     g -= np.swapaxes(g, 1, 2)
     with_it, without = (full_factor(held, rotation_term(energy, p), volumes=of) for of in (g, None))
     added = with_it.triangle @ with_it.triangle.T - without.triangle @ without.triangle.T

@@ -31,7 +31,6 @@ from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 
 BALL = models.sphere(1500)
-RNG = np.random.default_rng(0)
 
 
 def scaled(mesh: Mesh, *factors: float) -> Mesh:
@@ -39,7 +38,8 @@ def scaled(mesh: Mesh, *factors: float) -> Mesh:
 
 
 def shaken(mesh: Mesh, size: float) -> Mesh:
-    return mesh.with_vertices(mesh.vertices + size * RNG.normal(size=mesh.vertices.shape))
+    steps = np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    return mesh.with_vertices(mesh.vertices + size * steps)
 
 
 BODIES = {
@@ -262,12 +262,12 @@ def test_the_winding_of_few_faces_is_summed_over_pairs_of_them():
         assert abs(one - mean_winding(each.vertices, each.faces)) < 0.12
 
 
-def test_thousands_of_leaves_and_cups_are_told_apart_soon():
+def test_thousands_of_leaves_and_cups_are_told_apart_soon(rng):
     leaf = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0.3], [0, 1, -0.2]], [[0, 1, 2], [0, 2, 3]])
     spike = Mesh(SPIKE, [[0, 1, 3], [0, 3, 2], [1, 2, 3]])
     cup = cut(models.sphere(42), 2, 0.8)
     kinds = [leaf] * 1500 + [spike] * 1500 + [cup] * 150
-    mesh = together(*(kinds[k] for k in RNG.permutation(len(kinds))))
+    mesh = together(*(kinds[k] for k in rng.permutation(len(kinds))))
     began = time.process_time()
     lids = lids_of(mesh)
     assert time.process_time() - began < 5.0

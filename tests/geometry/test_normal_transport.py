@@ -9,7 +9,6 @@ from solids import icosphere, rotation
 
 from vtk_segdeform.geometry import NormalTransport
 
-RNG = np.random.default_rng(3)
 AFFINE = np.array([[1.2, 0.4, -0.3], [0.1, 0.7, 0.5], [-0.2, 0.3, 1.5]])
 TURN = rotation(np.array([1.0, 2.0, -1.0]), 1.1)
 
@@ -43,26 +42,26 @@ def bumpy(level=2):
     return points * (1 + 0.2 * rng.random((len(points), 1))), faces
 
 
-def test_at_rest_nothing_changes_whatever_the_normals_are():
+def test_at_rest_nothing_changes_whatever_the_normals_are(rng):
     points, faces = bumpy()
-    normals = RNG.normal(size=points.shape) * RNG.choice([0.0, 0.5, 3.0], (len(points), 1))
+    normals = rng.normal(size=points.shape) * rng.choice([0.0, 0.5, 3.0], (len(points), 1))
     carried = transport_of(points, faces, normals)
     assert_allclose(carried.normals(points), normals, atol=1e-13)
-    tangents = RNG.normal(size=points.shape)
+    tangents = rng.normal(size=points.shape)
     assert_allclose(carried.tangents(tangents, points), tangents, atol=1e-13)
 
 
-def test_any_normals_and_tangents_follow_a_rotation_and_a_scale():
+def test_any_normals_and_tangents_follow_a_rotation_and_a_scale(rng):
     points, faces = bumpy()
-    normals, tangents = RNG.normal(size=(2, *points.shape))
+    normals, tangents = rng.normal(size=(2, *points.shape))
     carried, moved = transport_of(points, faces, normals), 2.5 * points @ TURN.T + [5, 0, 1]
     assert_allclose(carried.normals(moved), normals @ TURN.T, atol=1e-12)
     assert_allclose(carried.tangents(tangents, moved), tangents @ TURN.T, atol=1e-12)
 
 
-def test_any_normals_of_cells_follow_a_rotation():
+def test_any_normals_of_cells_follow_a_rotation(rng):
     points, faces = bumpy()
-    normals = RNG.normal(size=faces.shape)
+    normals = rng.normal(size=faces.shape)
     carried = NormalTransport(
         points, np.full(len(faces), 3), faces.ravel(), normals,
         of_corner=np.repeat(np.arange(len(faces)), 3), place=None,

@@ -11,7 +11,6 @@ from solids import rotation
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.io import Surface
 
-RNG = np.random.default_rng(0)
 TURN = rotation([1.0, -2.0, 0.5], 2.2)
 
 
@@ -27,15 +26,16 @@ def block(kind: str) -> pv.PolyData:
     )
     block = grid.triangulate() if kind == "triangles" else grid
     block.clear_data()
+    rng = np.random.default_rng(0)
     for data, count in ((block.point_data, block.n_points), (block.cell_data, block.n_cells)):
-        full = RNG.normal(size=(count, 3, 3))
-        data["vector"] = RNG.normal(size=(count, 3))
-        data["single"] = RNG.normal(size=(count, 3)).astype(np.float32)
-        data["whole"] = RNG.integers(-5, 5, (count, 3))
+        full = rng.normal(size=(count, 3, 3))
+        data["vector"] = rng.normal(size=(count, 3))
+        data["single"] = rng.normal(size=(count, 3)).astype(np.float32)
+        data["whole"] = rng.integers(-5, 5, (count, 3))
         data["tensor"] = full.reshape(-1, 9)
         data["six"] = symmetric_six(full + full.transpose(0, 2, 1))
-        data["scalar"] = RNG.normal(size=count)
-        data["pair"] = RNG.normal(size=(count, 2))
+        data["scalar"] = rng.normal(size=count)
+        data["pair"] = rng.normal(size=(count, 2))
     return block
 
 

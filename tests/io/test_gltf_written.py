@@ -20,7 +20,6 @@ from vtk_segdeform.io.gltf.buffers import Document
 from vtk_segdeform.io.polygons import polygons_of
 
 VERTICES, FACES = icosphere(2)
-RNG = np.random.default_rng(7)
 PNG = b"\x89PNG\r\n\x1a\n" + bytes(range(40))
 
 
@@ -31,14 +30,14 @@ def bent(points):
 
 def seamed():
     """Return a sphere cut along its faces, with everything a renderer wants."""
-    document = Gltf()
+    document, rng = Gltf(), np.random.default_rng(7)
     points = VERTICES[FACES].reshape(-1, 3)
     tangents = np.cross([0.1, 0.2, 1.0], points)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     attributes = {
         "NORMAL": document.array(points),
         "TANGENT": document.array(np.column_stack([tangents, np.full(len(points), -1.0)])),
-        "TEXCOORD_0": document.array(RNG.random((len(points), 2))),
+        "TEXCOORD_0": document.array(rng.random((len(points), 2))),
         "_HEAT": document.array(np.arange(len(points))),
     }
     faces = np.arange(len(points)).reshape(-1, 3)
@@ -57,7 +56,7 @@ def seamed():
                  scale=[1, 2, 3])  # fmt: skip
     times = document.array(np.arange(3.0)[:, None])
     channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
-    sampler = {"input": times, "output": document.array(RNG.random((3, 3)))}
+    sampler = {"input": times, "output": document.array(rng.random((3, 3)))}
     document.add("animations", samplers=[sampler], channels=[channel])
     document.head |= {"scene": 0, "scenes": [{"nodes": [0]}], "extras": {"any": "thing"}}
     return document
@@ -170,10 +169,10 @@ def test_nodes_that_share_a_mesh_get_their_own_where_they_differ(tmp_path):
     assert 0 not in {node["mesh"] for node in head["nodes"][2:]}
 
 
-def test_positions_that_are_interleaved_sparse_or_shared_are_moved(tmp_path):
+def test_positions_that_are_interleaved_sparse_or_shared_are_moved(tmp_path, rng):
     document = Gltf()
     rows = np.zeros(6, [("p", "<f4", 3), ("n", "<f4", 3), ("t", "<f4", 2)])
-    rows["p"], rows["n"], rows["t"] = OCTAHEDRON[0], OCTAHEDRON[0], RNG.random((6, 2))
+    rows["p"], rows["n"], rows["t"] = OCTAHEDRON[0], OCTAHEDRON[0], rng.random((6, 2))
     view = document.view(rows.tobytes(), byteStride=rows.itemsize)
     common = {"bufferView": view, "componentType": 5126, "count": 6}
     bounds = {"min": [-1, -1, -1], "max": [1, 1, 1]}
@@ -447,15 +446,15 @@ def test_positions_that_are_also_the_normals_are_moved_apart(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
-def test_skins_and_morph_targets_show_the_new_positions(tmp_path, suffix, caplog):
+def test_skins_and_morph_targets_show_the_new_positions(tmp_path, suffix, caplog, rng):
     document = Gltf()
-    weights = RNG.random((len(VERTICES), 4))
+    weights = rng.random((len(VERTICES), 4))
     attributes = {
         "NORMAL": document.array(VERTICES),
-        "JOINTS_0": document.array(RNG.integers(0, 2, (len(VERTICES), 4)), "u1"),
+        "JOINTS_0": document.array(rng.integers(0, 2, (len(VERTICES), 4)), "u1"),
         "WEIGHTS_0": document.array(weights / weights.sum(axis=1, keepdims=True)),
     }
-    target = document.array(0.1 * RNG.random((len(VERTICES), 3)))
+    target = document.array(0.1 * rng.random((len(VERTICES), 3)))
     mesh = document.mesh(VERTICES, FACES, attributes=attributes, targets=[{"POSITION": target}])
     document.head["meshes"][mesh]["weights"] = [0.5]
     joints = [document.add("nodes", rotation=[0, 0, 0.1, 0.99], translation=[0, k, 0])
@@ -515,13 +514,13 @@ def test_a_surface_with_other_faces_or_a_damaged_document_becomes_a_new_document
         write_mesh(tmp_path / "b.glb", surface)
 
 
-def test_a_new_document_has_positions_normals_texture_and_colours(tmp_path):
+def test_a_new_document_has_positions_normals_texture_and_colours(tmp_path, rng):
     ball = to_polydata(sd.Mesh(VERTICES, FACES))
     ball.point_data["Normals"] = VERTICES
     ball.point_data.active_normals_name = "Normals"
-    ball.point_data["uv"] = RNG.random((len(VERTICES), 2))
+    ball.point_data["uv"] = rng.random((len(VERTICES), 2))
     ball.point_data.active_texture_coordinates_name = "uv"
-    ball.point_data["RGB"] = RNG.integers(0, 256, (len(VERTICES), 3)).astype("u1")
+    ball.point_data["RGB"] = rng.integers(0, 256, (len(VERTICES), 3)).astype("u1")
     ball.point_data["_heat"] = np.arange(len(VERTICES), dtype="f4")
     for suffix in (".glb", ".gltf"):
         write_mesh(tmp_path / f"a{suffix}", ball)

@@ -117,11 +117,11 @@ def test_small_arrays_do_not_wait_for_late_kernels(monkeypatch):
     assert dispatch.compiled_kernels(sizes.COMPILED - 1) is None
 
 
-def test_a_product_stays_the_same_when_late_kernels_are_loaded(monkeypatch):
+def test_a_product_stays_the_same_when_late_kernels_are_loaded(monkeypatch, rng):
     pytest.importorskip("numba")
-    block = RNG.random((900, 60))
+    block = rng.random((900, 60))
     subspace = Subspace(900, (np.arange(900),), (block,))
-    p = RNG.normal(size=(60, 3))
+    p = rng.normal(size=(60, 3))
     monkeypatch.setattr(dispatch, "_is_late", [True])
     before = subspace.map(p)
     monkeypatch.setattr(dispatch, "_is_late", [False])
@@ -215,11 +215,11 @@ def test_the_same_faces_intersect(twin, monkeypatch, soup, seed, far):
     assert_array_equal(quick, slow)
 
 
-def test_energies_of_cells_agree(twin, monkeypatch):
+def test_energies_of_cells_agree(twin, monkeypatch, rng):
     monkeypatch.setattr("vtk_segdeform.finish.cell_energy._PIECE", 500)
     mesh = models.cactus(1500)  # its vertices have different degrees
     energy = CellEnergy.of(mesh, 100.0)  # two rounds
-    x = mesh.vertices + 0.05 * RNG.normal(size=mesh.vertices.shape)
+    x = mesh.vertices + 0.05 * rng.normal(size=mesh.vertices.shape)
     (quick, steep), (slow, steeper) = twin(lambda: energy.value_and_slope(x))
     assert quick == pytest.approx(slow, rel=1e-12)
     assert_allclose(steep, steeper, atol=1e-12)
@@ -227,13 +227,13 @@ def test_energies_of_cells_agree(twin, monkeypatch):
 
 @pytest.mark.parametrize("spread", [0.0, 3.0])
 @pytest.mark.parametrize("n", [0, 1, 700])
-def test_sparse_factors_solve_their_matrix(twin, monkeypatch, n, spread):
+def test_sparse_factors_solve_their_matrix(twin, monkeypatch, n, spread, rng):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
     links = sparse.random_array((n, n), density=0.01, rng=np.random.default_rng(0))
     ring = links + links.T
-    scale = sparse.diags_array(10.0 ** RNG.uniform(-spread, spread, size=n))
+    scale = sparse.diags_array(10.0 ** rng.uniform(-spread, spread, size=n))
     matrix = (scale @ (sparse.diags_array(ring.sum(axis=1) + 1e-3) - ring) @ scale).tocsr()
-    right = scale @ RNG.normal(size=(n, 3))
+    right = scale @ rng.normal(size=(n, 3))
     quick, slow = twin(lambda: scale @ factored(matrix)(right))
     assert_allclose(quick, slow, rtol=1e-9, atol=1e-9)
     assert_allclose(quick, scale @ np.linalg.solve(matrix.toarray(), right), rtol=1e-9, atol=1e-9)
@@ -276,14 +276,14 @@ def test_on_open_meshes_volumes_and_normals_agree(twin, name, monkeypatch):
             assert_allclose(quick, plain, rtol=1e-12, atol=1e-12)
 
 
-def test_motions_along_directions_of_several_volumes_agree(twin, monkeypatch):
+def test_motions_along_directions_of_several_volumes_agree(twin, monkeypatch, rng):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
     mesh = Surface(bottle(5, 3)).mesh
     labels = np.digitize(mesh.vertices[:, 2], np.quantile(mesh.vertices[:, 2], [0.3, 0.6]))
     constraints = region_volumes(mesh, labels)
     assert len(constraints) == 3
-    paths = np.hstack([mesh.vertices, RNG.normal(size=(mesh.n_vertices, 9))])
-    x = mesh.vertices + 0.01 * RNG.normal(size=mesh.vertices.shape)
+    paths = np.hstack([mesh.vertices, rng.normal(size=(mesh.n_vertices, 9))])
+    x = mesh.vertices + 0.01 * rng.normal(size=mesh.vertices.shape)
     for call in (
         partial(slopes_along, constraints, x, paths),
         partial(moved_along, paths, np.array([0.3, -2.0, 0.7])),
@@ -340,10 +340,10 @@ def test_rotations_are_rotations_and_equally_close(twin, kind):
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 @pytest.mark.parametrize("columns", [3, 6, 9])
-def test_products_agree_and_accumulate_in_double_precision(twin, dtype, columns):
-    rows = np.sort(RNG.permutation(6000)[:4000])
-    block, p = RNG.normal(size=(4000, 37)).astype(dtype), RNG.normal(size=(37, columns))
-    y = RNG.normal(size=(6000, 3))
+def test_products_agree_and_accumulate_in_double_precision(twin, dtype, columns, rng):
+    rows = np.sort(rng.permutation(6000)[:4000])
+    block, p = rng.normal(size=(4000, 37)).astype(dtype), rng.normal(size=(37, columns))
+    y = rng.normal(size=(6000, 3))
 
     def product():
         x = np.ones((6000, columns))
@@ -362,11 +362,11 @@ def test_products_agree_and_accumulate_in_double_precision(twin, dtype, columns)
 
 @pytest.mark.parametrize(("coupled", "n"), [(True, 3 * 60), (False, 180)])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_triangular_solves_agree(twin, coupled, n, count):
-    spread = RNG.normal(size=(n, n))
+def test_triangular_solves_agree(twin, coupled, n, count, rng):
+    spread = rng.normal(size=(n, n))
     hessian = spread @ spread.T + np.eye(n)
     factor = Factor(np.linalg.cholesky(hessian), coupled)
-    ys = [RNG.normal(size=(n // 3 if coupled else n, 3)) for _ in range(count)]
+    ys = [rng.normal(size=(n // 3 if coupled else n, 3)) for _ in range(count)]
     exact = np.linalg.inv(hessian)
     for quick, plain, y in zip(*twin(lambda: factor.solve_all(ys)), ys, strict=True):
         solved = (exact @ y.T.ravel()).reshape(3, -1).T if coupled else exact @ y
@@ -426,27 +426,27 @@ def test_an_exception_in_a_task_reaches_the_caller(monkeypatch):
         threads.in_parallel(work, 100, 10)
 
 
-def test_mean_value_coordinates_agree_at_any_point(twin):
+def test_mean_value_coordinates_agree_at_any_point(twin, rng):
     cage = models.sphere(162)
     p, corners = cage.vertices, cage.vertices[cage.faces]
-    share = RNG.dirichlet(np.ones(3), len(corners))[:, :, None]
+    share = rng.dirichlet(np.ones(3), len(corners))[:, :, None]
     on_faces, on_edges = (share * corners).sum(axis=1), corners[:, :2].mean(axis=1)
     in_planes = 2.0 * corners[:, 0] - corners[:, 1]
-    places = [p, on_faces, on_edges, in_planes, on_faces * (1.0 - 1e-9), RNG.normal(size=(2000, 3))]
+    places = [p, on_faces, on_edges, in_planes, on_faces * (1.0 - 1e-9), rng.normal(size=(2000, 3))]
     points = np.concatenate(places)
     quick, plain = twin(lambda: mean_value_coordinates(points, p, cage.faces))
     assert_allclose(quick, plain, atol=1e-11)
     assert_allclose(quick @ p, points, atol=1e-11)
 
 
-def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
+def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals(rng):
     pytest.importorskip("numba")
     from vtk_segdeform.kernels.compiled import add_adjoint, solve_factored
     from vtk_segdeform.kernels.compiled.text import _number
 
     rows = np.arange(2500), np.arange(1500, 4000)
-    subspace = Subspace(4000, rows, tuple(RNG.random((2, 2500, 40))))
-    p, y = RNG.normal(size=(80, 3)), RNG.normal(size=(4000, 3))
+    subspace = Subspace(4000, rows, tuple(rng.random((2, 2500, 40))))
+    p, y = rng.normal(size=(80, 3)), rng.normal(size=(4000, 3))
     for one in (subspace, copy.deepcopy(subspace)):
         one.map(p)
         one.map(*dispatch.inputs(p, y))
@@ -465,11 +465,11 @@ def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals():
 
 
 @pytest.mark.parametrize("regions", [1, 5, 70])
-def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions):
+def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions, rng):
     n = 400
-    rows = [np.sort(RNG.permutation(n)[: RNG.integers(0, 30)]) for _ in range(regions)]
+    rows = [np.sort(rng.permutation(n)[: rng.integers(0, 30)]) for _ in range(regions)]
     rows[0] = np.arange(n)
-    subspace = Subspace(n, tuple(rows), tuple(RNG.normal(size=(len(own), 2)) for own in rows))
+    subspace = Subspace(n, tuple(rows), tuple(rng.normal(size=(len(own), 2)) for own in rows))
     dense = subspace.map(np.eye(2 * regions))
     membership = np.array([np.isin(np.arange(n), own) for own in rows])
     alike = subspace.sets_by_cages()
@@ -480,7 +480,7 @@ def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions):
         columns, w = subspace.nonzeros(ids)
         assert_array_equal(columns, np.flatnonzero(np.repeat(kind, 2)))
         assert_array_equal(w, dense[np.ix_(ids, columns)])
-    some = np.sort(RNG.permutation(n)[:50])
+    some = np.sort(rng.permutation(n)[:50])
     columns, w = subspace.nonzeros(some)
     assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
     assert_array_equal(w, dense[np.ix_(some, columns)])

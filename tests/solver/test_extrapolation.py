@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose
 from vtk_segdeform.solver.extrapolation import End, Way
 
 PLACES = np.zeros((2, 3))
-RNG = np.random.default_rng(0)
-TERMS = RNG.normal(size=(4, 5, 3))  # of the path of five cage vertices
+TERMS = np.random.default_rng(0).normal(size=(4, 5, 3))  # of the path of five cage vertices
 
 
 def path(t: float, degree: int) -> np.ndarray:

@@ -16,17 +16,17 @@ REST = RNG.normal(size=(7, 3))
 TERM = MirrorTerm.of(ROWS, MATES, normal=NORMAL, rest=REST, weight=3.0)
 
 
-def test_it_is_the_sum_of_squares_of_what_is_not_mirrored():
-    u = RNG.normal(size=REST.shape)
+def test_it_is_the_sum_of_squares_of_what_is_not_mirrored(rng):
+    u = rng.normal(size=REST.shape)
     off = ROWS @ u - (MATES @ u) @ REFLECTION
     assert TERM.value_and_slope(REST + u)[0] == pytest.approx(3.0 * np.vdot(off, off))
 
 
-def test_mirrored_motions_cost_nothing():
+def test_mirrored_motions_cost_nothing(rng):
     """Each row and its mate have the same cage vertices but for a swap, as have the motions."""
     swap = [1, 0, 3, 2, 5, 4, 6]
     term = MirrorTerm.of(ROWS, ROWS[:, swap], normal=NORMAL, rest=REST, weight=3.0)
-    u = RNG.normal(size=REST.shape)
+    u = rng.normal(size=REST.shape)
     u = u + u[swap] @ REFLECTION
     value, slope = term.value_and_slope(REST + u)
     assert value < 1e-25
@@ -34,8 +34,8 @@ def test_mirrored_motions_cost_nothing():
     assert term.value_and_slope(REST + u[::-1])[0] > 1.0
 
 
-def test_its_gradient_is_that_of_its_value_and_its_hessian_that_of_its_gradient():
-    u, step = RNG.normal(size=(2, *REST.shape))
+def test_its_gradient_is_that_of_its_value_and_its_hessian_that_of_its_gradient(rng):
+    u, step = rng.normal(size=(2, *REST.shape))
     value, slope = TERM.value_and_slope(REST + u)
     there, turned = TERM.value_and_slope(REST + u + step)
     curvature = np.dot(TERM.hessian(u) @ step.T.ravel(), step.T.ravel())

@@ -29,16 +29,16 @@ def test_mesh_vertices_as_passengers_stay_on_the_mesh(bent):
     assert_allclose(deformer.carry(MESH.vertices), solution.vertices, rtol=0, atol=1e-12)
 
 
-def test_an_affine_map_of_the_cages_is_an_affine_map_of_the_passengers(bent):
+def test_an_affine_map_of_the_cages_is_an_affine_map_of_the_passengers(bent, rng):
     passengers = bent[0].passengers(INSIDE)
-    matrix = rotation([1, 2, 3], 0.7) @ np.diag([1.0, 1.4, 0.6]) + 0.1 * RNG.normal(size=(3, 3))
+    matrix = rotation([1, 2, 3], 0.7) @ np.diag([1.0, 1.4, 0.6]) + 0.1 * rng.normal(size=(3, 3))
     shift = np.array([3.0, -1.0, 2.0])
     moved = passengers.moved([cage.vertices @ matrix.T + shift for cage in SCENE.cages])
     assert_allclose(moved, INSIDE @ matrix.T + shift, rtol=0, atol=1e-9)
     assert_allclose(passengers.moved([c.vertices for c in SCENE.cages]), INSIDE, atol=1e-11)
 
 
-def test_blend_weights_in_space_sum_to_one_and_are_continuous():
+def test_blend_weights_in_space_sum_to_one_and_are_continuous(rng):
     weights = SCENE.regions.weights
     line = np.linspace([-2.5, 0.1, 0.05], [2.5, -0.1, 0.02], 4001)
     alpha = blend_at(MESH.vertices, weights, line)
@@ -47,7 +47,7 @@ def test_blend_weights_in_space_sum_to_one_and_are_continuous():
     coarse = np.abs(np.diff(alpha[:, ::4], axis=1)).max()
     fine = np.abs(np.diff(alpha, axis=1)).max()
     assert fine < 0.6 * coarse  # a discontinuity would not become smaller
-    near = MESH.vertices + 1e-7 * RNG.normal(size=MESH.vertices.shape)
+    near = MESH.vertices + 1e-7 * rng.normal(size=MESH.vertices.shape)
     assert_allclose(blend_at(MESH.vertices, weights, near), weights, atol=1e-5)
 
 

@@ -20,8 +20,6 @@ from vtk_segdeform.widgets.region_selector.strokes import Lasso
 from vtk_segdeform.widgets.scene.gestures import Phase, Pointer
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
-RNG = np.random.default_rng(3)
-
 
 @functools.cache
 def cactus():
@@ -55,10 +53,10 @@ def first_crossing(points, faces, near, far):
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_a_hit_is_the_first_intersection_of_the_line_of_sight(parallel):
+def test_a_hit_is_the_first_intersection_of_the_line_of_sight(parallel, rng):
     view, session, surface, picker = over(cactus(), parallel=parallel)
     met = 0
-    for x, y in RNG.uniform(60, 340, (30, 2)):
+    for x, y in rng.uniform(60, 340, (30, 2)):
         pointer = Pointer(Phase.HOVER, x, y)
         near, far = view.ray(pointer)
         face, share = first_crossing(surface.points, session.mesh.faces, near, far)
@@ -184,14 +182,14 @@ def test_a_component_is_a_connected_part():
     assert np.array_equal(np.flatnonzero(second), np.arange(len(vertices) // 2, len(vertices)))
 
 
-def test_visible_vertices_agree_with_ray_casting():
+def test_visible_vertices_agree_with_ray_casting(rng):
     mesh = cactus()
     view, _, surface, _ = over(mesh, (500, 500))
     display = view.to_display(surface.points)
     seen = visible_vertices(display, mesh.faces)
     eye = np.array(view.camera.GetPosition())
     exact = np.zeros(len(seen), dtype=bool)
-    sample = RNG.choice(mesh.n_vertices, 200, replace=False)
+    sample = rng.choice(mesh.n_vertices, 200, replace=False)
     for k in sample:
         elsewhere = mesh.faces[~(mesh.faces == k).any(axis=1)]
         _, share = first_crossing(surface.points, elsewhere, eye, surface.points[k])
@@ -237,9 +235,9 @@ def crossings_above(point, corners):
     return count
 
 
-def test_a_lasso_selects_by_the_even_odd_rule():
+def test_a_lasso_selects_by_the_even_odd_rule(rng):
     _, _, _, picker = over(cactus())
-    corners = (200 + 170 * RNG.uniform(-1, 1, (9, 2))).tolist()  # a line that crosses itself
+    corners = (200 + 170 * rng.uniform(-1, 1, (9, 2))).tolist()  # a line that crosses itself
     lasso = Lasso(picker, Pointer(Phase.PRESS, *corners[0]), through=True)
     for corner in corners[1:]:
         lasso.extend(Pointer(Phase.MOVE, *corner))
@@ -274,7 +272,7 @@ def test_visible_vertices_are_cached_until_the_camera_or_the_pose_changes():
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_a_test_of_some_vertices_agrees_with_the_test_of_all(parallel):
+def test_a_test_of_some_vertices_agrees_with_the_test_of_all(parallel, rng):
     mesh = cactus()
     view, _, surface, picker = over(mesh, parallel=parallel)
     view.camera.Zoom(3.0)  # some vertices are outside the window
@@ -283,7 +281,7 @@ def test_a_test_of_some_vertices_agrees_with_the_test_of_all(parallel):
     nowhere = np.zeros(mesh.n_vertices, dtype=bool)
     assert not picker.visible(nowhere).any()
     for share in (0.005, 0.1, 0.5):
-        some = RNG.random(mesh.n_vertices) < share
+        some = rng.random(mesh.n_vertices) < share
         assert np.array_equal(picker.visible(some), everything & some)
     near = view.to_display(surface.points)
     near = np.hypot(*(near - near[7])[:, :2].T) < 25.0
@@ -292,11 +290,11 @@ def test_a_test_of_some_vertices_agrees_with_the_test_of_all(parallel):
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_a_point_is_seen_unless_the_surface_is_in_front_of_it(parallel):
+def test_a_point_is_seen_unless_the_surface_is_in_front_of_it(parallel, rng):
     mesh = cactus()
     view, _, surface, picker = over(mesh, parallel=parallel)
     seen = visible_vertices(view.to_display(surface.points), mesh.faces)
-    sample = RNG.choice(mesh.n_vertices, 60, replace=False)
+    sample = rng.choice(mesh.n_vertices, 60, replace=False)
     found = [picker.sees(surface.points[k], within=1e-6) for k in sample]
     assert 0.2 < np.mean(found) < 0.8
     assert np.mean(found == seen[sample]) > 0.95  # at a silhouette a vertex is beside its faces

@@ -19,8 +19,6 @@ from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 from vtk_segdeform.widgets.scene.view import View
 from vtk_segdeform.widgets.scene.widget import Widget
 
-RNG = np.random.default_rng(7)
-
 
 class Scribble(Widget):
     """A widget that draws strokes in the left half of the view and records its input."""
@@ -65,13 +63,13 @@ def scribble():
 
 
 @pytest.mark.parametrize("parallel", [False, True])
-def test_to_display_and_to_world_are_inverses(parallel):
+def test_to_display_and_to_world_are_inverses(parallel, rng):
     view = plain_view((320, 240))
     SurfaceDisplay(view, Session(models.sphere(200)))
     view.camera.SetParallelProjection(parallel)
     view.camera.SetPosition(3.0, 2.0, 1.0)
     view.renderer.ResetCamera()
-    points = RNG.normal(size=(20, 3)) * 0.5
+    points = rng.normal(size=(20, 3)) * 0.5
     there = view.to_display(points)
     assert np.allclose(view.to_world(there), points, atol=1e-9)
     view.renderer.SetWorldPoint(*points[0], 1.0)

@@ -33,8 +33,6 @@ from vtk_segdeform.widgets.volume_overlay.volume_overlay import VolumeOverlay
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
-RNG = np.random.default_rng(5)
-
 
 @pytest.fixture
 def overlay(request):
@@ -109,8 +107,8 @@ def test_lightness_falls_evenly_and_alike_on_both_sides():
 
 
 @pytest.mark.parametrize("half_range", HALF_RANGES)
-def test_the_colour_bar_has_the_colours_of_the_mesh(half_range):
-    shares = RNG.uniform(-1.3 * half_range, 1.3 * half_range, 500)
+def test_the_colour_bar_has_the_colours_of_the_mesh(half_range, rng):
+    shares = rng.uniform(-1.3 * half_range, 1.3 * half_range, 500)
     table, got = lookup_table(half_range), np.zeros(3)
     for share, colour in zip(shares, colours_of(shares, half_range), strict=True):
         table.GetColor(share, got)
