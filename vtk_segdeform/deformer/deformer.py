@@ -25,6 +25,7 @@ Long because every option of the method is explained in the docstring of `Deform
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -48,6 +49,8 @@ from ..regions import Regions, require_regions
 from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
+    LOCALITY,
+    SPREAD,
     as_lids,
     check_distance,
     check_options,
@@ -340,6 +343,23 @@ class Deformer:
         other = self._shared()
         other._path = Path.begin(near, path.p, path.targets)
         return other
+
+    def reach_of_pull(
+        self, point: SurfacePoint, radius: float, locality: float
+    ) -> tuple[float, float]:
+        """Return *reach* and *follows* of `local` for a pull, by its *locality* from 0 to 1.
+
+        The reach is ``radius / sqrt(locality)``.  From the default locality on it ends with the
+        limb of the *point* if that is shorter; limbs within the spread do not count.
+        """
+        if not locality:
+            return math.inf, 1.0
+        reach = radius / math.sqrt(locality)
+        if locality >= LOCALITY:
+            size = self._problem.frame.size
+            limb = self._problem.samples.limb(point, SPREAD * radius / size, reach / size)
+            reach = size * limb
+        return reach, 1.0 - locality
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
