@@ -700,12 +700,15 @@ class Deformer:
         return (self._missed(solution) if status is Status.CONVERGED else None) or status
 
     def _missed(self, solution: Solution) -> Status | None:
-        """Return the status of a *solution* whose handles or volumes are off, or None."""
+        """Return the status of a *solution* with a handle, a volume or a contact that is off."""
         if max(solution.handle_error, solution.fixed_error) > _MET:
             is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
             return Status.MISSED if is_free else Status.ALL_HELD
         is_off = self._constraints.has_goals and solution.volume_error > VOLUME_MET
-        return Status.VOLUME_MISSED if is_off else None
+        if is_off:
+            return Status.VOLUME_MISSED
+        has_contact = self._constraints.contact is not None
+        return Status.CROSSED if has_contact and len(solution.crossings()) else None
 
 
 def _counting(progress: Progress | None) -> Progress | None:
