@@ -17,6 +17,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..geometry import corner_and_edges
+from ..kernels import compiled_kernels, inputs
 from .volume_constraints import VolumeConstraint
 
 
@@ -74,11 +75,21 @@ class CentroidConstraint(VolumeConstraint):
 
     def value(self, points: FloatArray) -> float:
         """Return C_a."""
+        if kernels := compiled_kernels(len(self.faces)):
+            sums = np.empty(2)
+            kernels.moment_sums(*inputs(points, self.faces, np.array(self.axis)), sums)
+            return float(sums[1] / sums[0]) / 4.0 + self.origin
         volumes, means, _ = self._tetrahedra(points)
         return float(volumes @ means) / float(volumes.sum()) + self.origin
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Return dC_a/dx, (n, 3)."""
+        if kernels := compiled_kernels(len(self.faces)):
+            given, sums = inputs(points, self.faces, np.array(self.axis)), np.empty(2)
+            kernels.moment_sums(*given, sums)
+            found = np.zeros(points.shape)
+            kernels.moment_gradient(*given, sums[1] / sums[0] / 4.0, found)
+            return np.asarray(found * (6.0 / sums[0]))
         volumes, means, corners = self._tetrahedra(points)
         total, a = float(volumes.sum()), np.array(self.axis)
         away = (means - float(volumes @ means) / total) / total

@@ -1,7 +1,8 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
     volumes         `volume.signed_volumes`, `volume.volume_along_path`, `volume.volume_gradients`,
-                    `exact_volume.moved_along`, `exact_volume.slopes_along`
+                    `exact_volume.moved_along`, `exact_volume.slopes_along`,
+                    `other_measures.CentroidConstraint`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -48,6 +49,8 @@ from .text import (
 from .volumes import (
     add_slopes,
     determinants,
+    moment_gradient,
+    moment_sums,
     move_along,
     volume_along_sums,
     volume_gradient,
@@ -74,6 +77,8 @@ __all__ = [
     "interpolated_rows",
     "link",
     "may_meet",
+    "moment_gradient",
+    "moment_sums",
     "move_along",
     "number_trees",
     "numbers_of_lines",

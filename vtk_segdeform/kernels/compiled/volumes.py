@@ -82,6 +82,54 @@ def volume_gradient(x, faces, out):
             out[corner, 2] += nz
 
 
+@_compile_sums(
+    "const f8[:,:], const i8[:,:], const f8[:], f8[:]",
+    "const f8[:,:], const i4[:,:], const f8[:], f8[:]",
+)
+def moment_sums(x, faces, a, out):
+    """Put the sums of det and of det a . (x_i + x_j + x_k) over all faces into *out* (2,)."""
+    total = moment = 0.0
+    for f in range(len(faces)):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        det = x[i, 0] * (ey * gz - ez * gy)
+        det += x[i, 1] * (ez * gx - ex * gz) + x[i, 2] * (ex * gy - ey * gx)
+        along = 0.0
+        for c in range(3):
+            along += a[c] * (x[i, c] + x[j, c] + x[k, c])
+        total += det
+        moment += det * along
+    out[0], out[1] = total, moment
+
+
+@_compile(
+    "const f8[:,:], const i8[:,:], const f8[:], f8, f8[:,:]",
+    "const f8[:,:], const i4[:,:], const f8[:], f8, f8[:,:]",
+)
+def moment_gradient(x, faces, a, centre, out):
+    """Add the derivative of sum det (a . (x_i + x_j + x_k) - 4 centre) / 24 to *out* (n, 3)."""
+    for f in range(len(faces)):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        along = -4.0 * centre
+        for c in range(3):
+            along += a[c] * (x[i, c] + x[j, c] + x[k, c])
+        along /= 24.0
+        det = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            of_i = x[j, d] * x[k, e] - x[j, e] * x[k, d]
+            det += x[i, c] * of_i
+            out[i, c] += along * of_i
+            out[j, c] += along * (x[k, d] * x[i, e] - x[k, e] * x[i, d])
+            out[k, c] += along * (x[i, d] * x[j, e] - x[i, e] * x[j, d])
+        for c in range(3):
+            own = det * a[c] / 24.0
+            out[i, c] += own
+            out[j, c] += own
+            out[k, c] += own
+
+
 @_compile_sums("f8[:,:], const f8[:,:], f8[:]")
 def add_slopes(gradient, paths, out):
     """Add the product of *gradient* (n, 3) and each three columns of *paths* to *out*."""
