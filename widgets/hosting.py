@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pyvista as pv
 
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import Surface, as_polydata
+from vtk_segdeform.io import of_its_kind, surface_of
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 
@@ -15,20 +15,11 @@ if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
 
 
-def session_of(
-    mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface | Mesh | Session,
-) -> Session:
-    """Return a session over *mesh*; a session is returned itself.
-
-    The blocks of a MultiBlock, as `pyvista.read` returns of a glTF file, become one surface, and
-    so do the cells of an UnstructuredGrid.
-    """
+def session_of(mesh: Any) -> Session:
+    """Return a session over a mesh, a path or any surface; a session is returned itself."""
     if isinstance(mesh, Session):
         return mesh
-    if isinstance(mesh, Mesh | Surface):
-        return Session(mesh)
-    expected = "a PolyData, a MultiBlock of PolyData, a Surface, a Mesh or a Session"
-    return Session(Surface(as_polydata(mesh, "mesh", expected)))
+    return Session(mesh if isinstance(mesh, Mesh) else surface_of(mesh))
 
 
 def edited(mesh: Any, session: Session) -> Any:
@@ -37,7 +28,7 @@ def edited(mesh: Any, session: Session) -> Any:
         return session
     if isinstance(mesh, Mesh):
         return session.mesh.with_vertices(session.vertices)
-    return session.deformed
+    return of_its_kind(mesh, session.deformed)
 
 
 def add_editor(plotter: pv.BasePlotter, session: Session, *, keys: KeyChoice) -> DeformEditor:

@@ -83,6 +83,14 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
 
 
+def test_a_surface_with_a_pulled_point_is_a_copy_with_its_arrays(bar):
+    to = bar.points[-1] + [0.1, 0.1, 0.2]
+    pulled = bar.segdeform.pull(bar.n_points - 1, to, 0.5, pins=[0])
+    assert np.abs(pulled.points[-1] - to).max() < 1e-6
+    assert np.abs(pulled.points[0] - bar.points[0]).max() < 1e-3
+    assert_array_equal(pulled["number"], bar["number"])
+
+
 @pytest.mark.parametrize("name", every(2, ["soup", "tube"]))
 def test_any_surface_is_deformed_by_its_own_points(name):
     given = GIVEN[name]()
@@ -394,12 +402,14 @@ def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):
     assert mesh.n_vertices == 2 * bar.n_points
     assert_allclose(mesh.vertices.max(axis=0), np.max(bar.points + [9.0, 0.0, 0.0], axis=0))
     for wrong in (pv.MultiBlock([bar, pv.ImageData()]), pv.MultiBlock()):
-        with pytest.raises(ValueError, match="a MultiBlock of PolyData, a Surface"):
+        with pytest.raises(ValueError, match="mesh must be a PolyData, a Surface"):
             session_of(wrong)
 
 
 def test_other_types_are_refused():
-    with pytest.raises(ValueError, match="a Mesh or a Session; got 'cactus'"):
+    with pytest.raises(ValueError, match="cactus: there is no such file"):
         sd.edit("cactus")
+    with pytest.raises(ValueError, match=r"mesh must be .* holds a surface; got 3"):
+        sd.edit(3)
     with pytest.raises(MissingDependencyError, match="off-screen"):
         canvas.require_screen()
