@@ -11,12 +11,15 @@
 pyvista finds this module by its entry points when ``segdeform`` is first used.  pyvistaqt hides
 those of plotters: there, and if the package is not installed, ``import vtk_segdeform`` after
 pyvista or ``import vtk_segdeform.widgets.plugin``.
+
+Long because every option of `edit` and of the tools is in their signatures and docstrings.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
@@ -35,17 +38,17 @@ from vtk_segdeform.any_mesh import (
     pull,
     segment,
 )
-from vtk_segdeform.arrays import FloatArray, IntArray
-from vtk_segdeform.checks import as_path, as_text, shown
+from vtk_segdeform.arrays import FloatArray, IntArray, plain
+from vtk_segdeform.checks import as_callable, as_path, as_text, shown
 from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import Surface, repair_surface, triangles_of
+from vtk_segdeform.io import Surface, as_polydata, repair_surface, triangles_of
 from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
 
-from .hosting import add_editor, edited, session_of
+from .hosting import add_editor, call_with_poses, edited, require_no_editor, session_of
 from .web import add_to_notebook, edit_in_notebook, shows_in_notebook
 
 if TYPE_CHECKING:
@@ -198,11 +201,14 @@ class PlotterTools:
         *,
         path: _Path = None,
         keys: KeyChoice = "pyvista",
+        scalars: str | ArrayLike | None = None,
+        cmap: str | Sequence[str] | None = None,
+        callback: Callable[[Any], object] | None = None,
     ) -> DeformEditor:
         """Add the editor to the current subplot of the plotter, and switch it on.
 
-        Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself; not
-        those of a MultiBlock, whose blocks pyvista copies.
+        Actors of *mesh* in the plotter show the pose, with their colours and textures; not those of
+        a MultiBlock, which pyvista draws by its blocks.
 
         Parameters
         ----------
@@ -213,16 +219,30 @@ class PlotterTools:
             The file that the editor's keys save and open.
         keys : str or mapping of str to str or sequence of str
             As in `edit`.
+        scalars : str or array, optional
+            The array of the mesh, or the values (n,), to colour the mesh by, with a scalar bar.
+            For other options, or a texture, call ``plotter.add_mesh`` first.
+        cmap : str or sequence of str, optional
+            The colour map, or its colours, of *scalars*.
+        callback : callable, optional
+            Called with the deformed mesh, of the type that was given, after each change of the
+            pose; not during a drag.
+
+        Raises
+        ------
+        ArgumentError
+            If the subplot has an editor already.
 
         In a notebook ``plotter.show()`` shows the page of the editor, with pyvista's backends
         "trame", "server" and "client"; with the others a picture.
         """
         session = session_of(mesh)
         path = None if path is None else as_path(path)
-        if isinstance(mesh, pv.DataSet):
-            for actor in self._plotter.renderer.actors.values():
-                if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
-                    actor.visibility = False
+        require_no_editor(self._plotter)
+        if scalars is not None:
+            self._show(session, scalars, cmap)
+        if callback is not None:
+            call_with_poses(as_callable(callback, "callback"), mesh, session)
         # A QtInteractor has no such attribute.
         is_shown_in_notebook = getattr(self._plotter, "notebook", False)
         if is_shown_in_notebook and shows_in_notebook(self._plotter.theme):
@@ -232,6 +252,15 @@ class PlotterTools:
         if path is not None:
             editor.path = path
         return editor
+
+    def _show(self, session: Session, scalars: Any, cmap: Any) -> None:
+        """Add the surface of *session* to the plotter, coloured by *scalars*."""
+        shown = as_polydata(session.mesh if session.surface is None else session.surface.given)
+        values = scalars if isinstance(scalars, str) else plain(scalars, "scalars")
+        try:
+            self._plotter.add_mesh(shown, scalars=values, cmap=cmap, copy_mesh=True)
+        except (ValueError, TypeError, LookupError, AttributeError) as fault:
+            raise ArgumentError(f"scalars or cmap cannot be shown: {fault!s:.200}") from None
 
     def add_volume_overlay(self, session: Session) -> VolumeOverlay:
         """Show the mesh of *session*, coloured by its local volume change, with a colour scale."""

@@ -498,6 +498,9 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
 }
 
 SPECIAL: dict[str, Callable[[], Any]] = {
+    "PlotterTools.edit.callback": lambda: lambda _: None,
+    "PlotterTools.edit.cmap": lambda: "magma",
+    "PlotterTools.edit.scalars": lambda: mesh().vertices[:, 2],
     "Cage.faces": lambda: cages()[0].faces,
     "Deformer.volume.name": lambda: "whole",
     "Session.volume.name": lambda: "whole",

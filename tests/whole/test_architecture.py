@@ -67,7 +67,7 @@ GRANTED = {
     "filters.paraview_plugin": {"paraview"},
     **{room: VTK for room in ROOMS if room.startswith("widgets")},
     "widgets.scene.qt_events": {"qtpy"},
-    "widgets.hosting": {"pyvista"},
+    "widgets.hosting": VTK | {"pyvista"},
     "widgets.plugin": {"pyvista"},
     "widgets.qt": VTK | {"qtpy"},
     "widgets.qt.widget": {"pyvista", "pyvistaqt"},

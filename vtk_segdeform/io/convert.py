@@ -22,7 +22,7 @@ import copy
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
@@ -294,8 +294,9 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
         data = pv.from_trimesh(mesh, pass_data=("point", "cell"))
     elif line == "Surface(mesh)":
         if is_meshio(mesh):
-            mesh = copy.copy(mesh)
-            mesh.cell_sets = {}  # pyvista would turn those of *mesh* itself into cell arrays
+            plain: Any = copy.copy(mesh)
+            plain.cell_sets = {}  # pyvista would turn those of *mesh* itself into cell arrays
+            mesh = plain
         data = pv.wrap(mesh)
     if isinstance(data, pv.PolyData):
         return data
