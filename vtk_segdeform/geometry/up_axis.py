@@ -57,12 +57,12 @@ def _some(points: FloatArray, most: int) -> FloatArray:
 
 def _mirror_distances(points: FloatArray) -> tuple[float, float]:
     """Return the mean distances of the images mirrored in y and in z from the points."""
-    tree, some, middle = cKDTree(points), _some(points, _MIRRORED), bounds_of(points).mean(axis=0)
+    tree, some, (low, high) = cKDTree(points), _some(points, _MIRRORED), bounds_of(points)
     means = []
     for axis in (1, 2):
         image = some.copy()
-        image[:, axis] = 2.0 * middle[axis] - image[:, axis]
-        means.append(float(tree.query(image)[0].mean()))
+        image[:, axis] = low[axis] + high[axis] - image[:, axis]
+        means.append(float(np.mean(tree.query(image)[0])))
     return means[0], means[1]
 
 

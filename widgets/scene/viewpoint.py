@@ -6,6 +6,9 @@ view: three-quarter front, with the up axis vertical on the screen.
 
 A named view is reached in a short animation, except off-screen.  What was framed is framed again
 when the window takes another size, until the camera is moved.
+
+Long because views, movements by the mouse and saved settings all end in the placement of one
+camera, with the same limits.
 """
 
 from __future__ import annotations
