@@ -15,7 +15,7 @@ from .convert import as_polydata, from_polydata, is_meshio, is_trimesh
 from .polygons import triangles_of
 from .surface import Surface
 
-_EXPECTED = "a PolyData, a Surface, a Mesh, a path, or another object that holds a surface"
+_EXPECTED = "a PolyData, a Mesh, a pair (vertices, faces), a path, or another surface"
 
 
 def surface_of(mesh: Any) -> Surface:
