@@ -159,6 +159,8 @@ class HostActors:
         view = self._editor.view
         line = self._editor.controller.messages.height / max(view.renderer.GetSize()[1], 1)
         for name, bar in self._bars.items():
+            if not view.renderer.HasViewProp(bar):  # of another subplot
+                continue
             x, y = bar.GetPosition()
             y = self._heights.setdefault(name, y)
             bar.SetPosition(x, max(y, line + _GAP) if line else y)
