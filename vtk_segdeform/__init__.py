@@ -51,14 +51,15 @@ if _TYPE_CHECKING:
         subspace,
         widgets,
     )
+    from .any_mesh import Deformed, deform, pull, segment
     from .cages import Cage, fit_cages, mean_value_coordinates
-    from .deformer import Deformer, Slide, deform, pull
+    from .deformer import Deformer, Slide
     from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
-    from .regions import Regions, segment
+    from .regions import Regions
     from .session import Change, Options, Session, load_session, save_session
     from .solver import Solution, Status
     from .widgets.plugin import edit
@@ -68,6 +69,7 @@ _MODULE_OF = {
     "Cage": "cages",
     "Cancelled": "errors",
     "Change": "session",
+    "Deformed": "any_mesh",
     "Deformer": "deformer",
     "Mesh": "mesh",
     "Options": "session",
@@ -77,18 +79,18 @@ _MODULE_OF = {
     "Solution": "solver",
     "Status": "solver",
     "Surface": "io",
-    "deform": "deformer",
+    "deform": "any_mesh",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
     "fit_cages": "cages",
     "load_session": "session",
     "local_volume_change": "geometry",
     "mean_value_coordinates": "cages",
-    "pull": "deformer",
+    "pull": "any_mesh",
     "read_mesh": "io",
     "repair": "mesh_repair",
     "save_session": "session",
-    "segment": "regions",
+    "segment": "any_mesh",
     "volume_summary": "geometry",
     "write_mesh": "io",
 }
@@ -101,6 +103,7 @@ __all__ = [
     "Cage",
     "Cancelled",
     "Change",
+    "Deformed",
     "Deformer",
     "Mesh",
     "Options",

@@ -3,6 +3,7 @@
     plotter.segdeform.edit(mesh)                     the editor, in an existing plotter
     plotter.segdeform.add_volume_overlay(session)    the local volume change, in colours
     mesh.segdeform.deform(fixed, handle, targets)    a deformed copy with all arrays
+    mesh.segdeform.pull(vertex, to)                  the same, by one point
     mesh.segdeform.regions(3)                        a copy with arrays of its regions
     mesh.segdeform.check()                           its faults and borders
     mesh.segdeform.repair()                          a closed copy, with its arrays
@@ -10,12 +11,15 @@
 pyvista finds this module by its entry points when ``segdeform`` is first used.  pyvistaqt hides
 those of plotters: there, and if the package is not installed, ``import vtk_segdeform`` after
 pyvista or ``import vtk_segdeform.widgets.plugin``.
+
+Long because every option of `edit` and of the tools is in their signatures and docstrings.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
@@ -23,19 +27,28 @@ import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from vtk_segdeform.arrays import as_ids
-from vtk_segdeform.checks import as_path, as_text, shown
-from vtk_segdeform.deformer import deform
+from vtk_segdeform.any_mesh import (
+    AnyMesh,
+    AsPolyData,
+    Deformed,
+    LikeMeshio,
+    LikeTrimesh,
+    Pair,
+    deform,
+    pull,
+    segment,
+)
+from vtk_segdeform.arrays import FloatArray, IntArray, plain
+from vtk_segdeform.checks import as_callable, as_path, as_text, shown
 from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import Surface, repair_surface, triangles_of
+from vtk_segdeform.io import Surface, as_polydata, repair_surface, triangles_of
 from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.regions import segment
 from vtk_segdeform.session import Session
 
-from .hosting import add_editor, edited, session_of
+from .hosting import add_editor, call_with_poses, edited, require_no_editor, session_of
 from .web import add_to_notebook, edit_in_notebook, shows_in_notebook
 
 if TYPE_CHECKING:
@@ -51,12 +64,30 @@ class Removable(Protocol):
 
 
 _Path = str | os.PathLike[str] | None
-_SameType = TypeVar("_SameType", Mesh, Session)
+_SameType = TypeVar("_SameType", bound=Mesh | pv.PolyData | LikeTrimesh | LikeMeshio | Session)
 _log = logging.getLogger(__name__)
 
 _HANDLE_MET = 1e-3  # of the diagonal
 
 
+@overload
+def edit(
+    mesh: AsPolyData,
+    *,
+    path: _Path = None,
+    title: str = ...,
+    keys: KeyChoice = ...,
+    progress: Progress | None = ...,
+) -> pv.PolyData: ...
+@overload
+def edit(
+    mesh: Pair,
+    *,
+    path: _Path = None,
+    title: str = ...,
+    keys: KeyChoice = ...,
+    progress: Progress | None = ...,
+) -> tuple[FloatArray, IntArray]: ...
 @overload
 def edit(
     mesh: _SameType,
@@ -66,15 +97,6 @@ def edit(
     keys: KeyChoice = ...,
     progress: Progress | None = ...,
 ) -> _SameType: ...
-@overload
-def edit(
-    mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface,
-    *,
-    path: _Path = None,
-    title: str = ...,
-    keys: KeyChoice = ...,
-    progress: Progress | None = ...,
-) -> pv.PolyData: ...
 def edit(
     mesh: Any,
     *,
@@ -93,9 +115,9 @@ def edit(
 
     Parameters
     ----------
-    mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
-        Any surface, or a session to continue.  The surfaces of a MultiBlock are edited as one, and
-        an UnstructuredGrid of triangles and polygons as a PolyData.
+    mesh : PolyData, Mesh, trimesh.Trimesh, meshio.Mesh, pair of arrays, path, Surface or Session
+        Any surface, as in `vtk_segdeform.deform`, or a session to continue.  The surfaces of a
+        MultiBlock are edited as one.
     path : path, optional
         The file that the editor's keys save and open.  In a notebook only its name is shown: the
         page downloads.
@@ -109,10 +131,9 @@ def edit(
     Returns
     -------
     deformed : of the type of *mesh*, or NotebookEditor
-        A deformed copy.  Of a PolyData or a Surface it is what was given, apart from coordinates
-        and normals; of a MultiBlock or a grid it is one PolyData.  A session is returned itself,
-        unless another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes
-        at once.
+        A deformed copy: what was given, apart from coordinates and normals.  It is one PolyData if
+        a path, a Surface, a MultiBlock or a grid was given.  A session is returned itself, unless
+        another one was opened in the editor.  With pyvista's OFF_SCREEN the window closes at once.
 
     Raises
     ------
@@ -176,34 +197,52 @@ class PlotterTools:
 
     def edit(
         self,
-        mesh: pv.PolyData | pv.UnstructuredGrid | pv.MultiBlock | Surface | Mesh | Session,
+        mesh: AnyMesh | Session,
         *,
         path: _Path = None,
         keys: KeyChoice = "pyvista",
+        scalars: str | ArrayLike | None = None,
+        cmap: str | Sequence[str] | None = None,
+        callback: Callable[[Any], object] | None = None,
     ) -> DeformEditor:
         """Add the editor to the current subplot of the plotter, and switch it on.
 
-        Actors of *mesh* in the plotter are hidden, because the editor draws the mesh itself; not
-        those of a MultiBlock, whose blocks pyvista copies.
+        Actors of *mesh* in the plotter show the pose, with their colours and textures; not those of
+        a MultiBlock, which pyvista draws by its blocks.
 
         Parameters
         ----------
-        mesh : pyvista.PolyData, pyvista.MultiBlock, Surface, Mesh or Session
-            What to edit; not changed.  ``editor.session.deformed`` is the deformed surface.
+        mesh : any surface, or Session
+            What to edit, as in `edit`; not changed.  ``editor.session.deformed`` is the deformed
+            surface.
         path : path, optional
             The file that the editor's keys save and open.
         keys : str or mapping of str to str or sequence of str
             As in `edit`.
+        scalars : str or array, optional
+            The array of the mesh, or the values (n,), to colour the mesh by, with a scalar bar.
+            For other options, or a texture, call ``plotter.add_mesh`` first.
+        cmap : str or sequence of str, optional
+            The colour map, or its colours, of *scalars*.
+        callback : callable, optional
+            Called with the deformed mesh, of the type that was given, after each change of the
+            pose; not during a drag.
+
+        Raises
+        ------
+        ArgumentError
+            If the subplot has an editor already.
 
         In a notebook ``plotter.show()`` shows the page of the editor, with pyvista's backends
         "trame", "server" and "client"; with the others a picture.
         """
         session = session_of(mesh)
         path = None if path is None else as_path(path)
-        if isinstance(mesh, pv.DataSet):
-            for actor in self._plotter.renderer.actors.values():
-                if getattr(getattr(actor, "mapper", None), "dataset", None) is mesh:
-                    actor.visibility = False
+        require_no_editor(self._plotter)
+        if scalars is not None:
+            self._show(session, scalars, cmap)
+        if callback is not None:
+            call_with_poses(as_callable(callback, "callback"), mesh, session)
         # A QtInteractor has no such attribute.
         is_shown_in_notebook = getattr(self._plotter, "notebook", False)
         if is_shown_in_notebook and shows_in_notebook(self._plotter.theme):
@@ -213,6 +252,15 @@ class PlotterTools:
         if path is not None:
             editor.path = path
         return editor
+
+    def _show(self, session: Session, scalars: Any, cmap: Any) -> None:
+        """Add the surface of *session* to the plotter, coloured by *scalars*."""
+        shown = as_polydata(session.mesh if session.surface is None else session.surface.given)
+        values = scalars if isinstance(scalars, str) else plain(scalars, "scalars")
+        try:
+            self._plotter.add_mesh(shown, scalars=values, cmap=cmap, copy_mesh=True)
+        except (ValueError, TypeError, LookupError, AttributeError) as fault:
+            raise ArgumentError(f"scalars or cmap cannot be shown: {fault!s:.200}") from None
 
     def add_volume_overlay(self, session: Session) -> VolumeOverlay:
         """Show the mesh of *session*, coloured by its local volume change, with a colour scale."""
@@ -278,19 +326,55 @@ class PolyDataTools:
         MeshError, ConstraintError
             As in `vtk_segdeform.deform`; MeshError if no mesh can be made of the surface.
         """
-        surface = Surface(self._given)
-        n_points = self._given.n_points
-        stays = surface.vertices_at(as_ids(fixed, n_points, "fixed"))
-        vertices, ends = surface.targets_at(as_ids(handle, n_points, "handle"), targets)
-        solution = deform(
-            surface.mesh, stays, vertices, ends,
-            n_regions=n_regions, n_cage_vertices=n_cage_vertices,
-            preserve_volume=preserve_volume, lids=lids, refine=refine, progress=progress,
+        return self._moved(
+            deform(
+                self._given, fixed, handle, targets,
+                n_regions=n_regions, n_cage_vertices=n_cage_vertices,
+                preserve_volume=preserve_volume, lids=lids, refine=refine, progress=progress,
+            )
         )  # fmt: skip
+
+    def pull(
+        self,
+        vertex: int | ArrayLike,
+        to: ArrayLike,
+        radius: float | None = None,
+        *,
+        pins: ArrayLike = (),
+        locality: float | None = None,
+        lids: bool | None = None,
+        progress: Progress | None = None,
+    ) -> pv.PolyData:
+        """Return a copy with one point pulled to another place.
+
+        Parameters
+        ----------
+        vertex : int or (3,) float
+            The grabbed point, or a position on the surface.
+        to : (3,) float
+            Where it is pulled to.
+        radius, pins, locality, lids, progress
+            As in `vtk_segdeform.pull`, which has more options and also returns the solver's status;
+            here a missed target is only logged.
+
+        Raises
+        ------
+        MeshError, ConstraintError
+            As in `vtk_segdeform.pull`; MeshError if no mesh can be made of the surface.
+        """
+        return self._moved(
+            pull(
+                self._given, vertex, to, radius,
+                pins=pins, locality=locality, lids=lids, progress=progress,
+            )
+        )  # fmt: skip
+
+    @staticmethod
+    def _moved(solution: Deformed[pv.PolyData]) -> pv.PolyData:
         if solution.handle_error > _HANDLE_MET:
             error = 100.0 * solution.handle_error
             _log.warning("handle error %.2g %% of model size: %s", error, solution.status)
-        return surface.moved(solution.vertices)
+        return solution.mesh
 
     def regions(
         self, n_regions: int | None = None, progress: Progress | None = None

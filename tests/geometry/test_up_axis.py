@@ -40,8 +40,13 @@ def test_a_body_stands_on_its_larger_end_or_else_along_its_longer_side(turn):
     up, other = (1, 2) if turn else (2, 1)
     assert guess(pyramid(1.0, 0.5, 2.0)) == up
     assert guess(pyramid(1.0, 0.9, 2.0)) == up
-    upside_down = pyramid(1.0, 0.5, 2.0) * [1.0, 1.0, -1.0]
+    uneven = pyramid(1.0, 0.5, 2.0)
+    uneven[..., 1] += 0.4 * uneven[..., 2] ** 2  # no mirror image in y
+    upside_down = [1.0, 1.0, 0.0] - uneven
+    assert guess(uneven) == up
     assert guess(upside_down) == other
+    assert guess(upside_down - upside_down.min(axis=(0, 1)) * [0.0, 0.0, 1.0]) == up  # on z = 0
+    assert guess(pyramid(1.0, 0.5, 2.0) * [1.0, 1.0, -1.0]) == up  # left and right are alike
     bar = pyramid(1.0, 1.0, 5.0)
     assert guess(bar) == up
     assert guess(bar[..., [0, 2, 1]]) == other

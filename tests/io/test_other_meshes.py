@@ -1,7 +1,4 @@
-"""Objects of VTK are taken as surfaces; those of other libraries are refused with the line to use.
-
-trimesh and meshio are not installed for the tests: classes of the same names stand in for them.
-"""
+"""Objects of VTK, trimesh and meshio, pairs of arrays and meshes are taken as surfaces."""
 
 from __future__ import annotations
 
@@ -24,26 +21,6 @@ from vtk_segdeform.io.array_names import get_names
 from vtk_segdeform.io.convert import read_polydata, write_mesh
 
 
-class Trimesh:
-    """Stands in for trimesh.Trimesh."""
-
-    __module__ = "trimesh.base"
-    vertices, faces = CUBE
-
-
-class Scene(Trimesh):
-    """Stands in for trimesh.Scene."""
-
-    __module__ = "trimesh.scene.scene"
-
-
-class Mesh:
-    """Stands in for meshio.Mesh."""
-
-    __module__ = "meshio._mesh"
-    points, cells = CUBE[0], [("triangle", CUBE[1])]
-
-
 def ball():
     return to_polydata(sd.Mesh(*icosphere(1)))
 
@@ -62,6 +39,20 @@ def blocks():
     return pv.MultiBlock({"inlet": inlet, "more": pv.MultiBlock({"wall": wall, "none": None})})
 
 
+def trimesh_ball():
+    trimesh = pytest.importorskip("trimesh")
+    mesh = trimesh.Trimesh(*icosphere(1), process=False, metadata={"made by": object()})
+    mesh.vertex_attributes["heat"] = np.arange(18.0)
+    return mesh
+
+
+def meshio_ball():
+    meshio = pytest.importorskip("meshio")
+    vertices, faces = icosphere(1)
+    heat = {"heat": np.arange(18.0)}
+    return meshio.Mesh(vertices, [("triangle", faces)], point_data=heat, cell_sets={"some": [[3]]})
+
+
 TAKEN = {
     "PolyData": ball,
     "vtkPolyData": lambda: raw(ball(), vtkPolyData),
@@ -69,11 +60,16 @@ TAKEN = {
     "vtkUnstructuredGrid": lambda: raw(ball().cast_to_unstructured_grid(), vtkUnstructuredGrid),
     "MultiBlock": blocks,
     "vtkMultiBlockDataSet": lambda: raw(blocks(), vtkMultiBlockDataSet),
+    "Mesh": lambda: sd.Mesh(*icosphere(1)),
+    "pair": lambda: icosphere(1),
+    "lists": lambda: tuple(each.tolist() for each in icosphere(1)),
+    "trimesh": lambda: trimesh_ball(),
+    "meshio": lambda: meshio_ball(),
 }
 
 
 @pytest.mark.parametrize("name", list(TAKEN))
-def test_objects_of_vtk_are_taken_everywhere(tmp_path, name):
+def test_what_holds_a_surface_is_taken_everywhere(tmp_path, name):
     given = TAKEN[name]()
     n = 2 if "Multi" in name else 1
     surface = sd.Surface(given)
@@ -83,9 +79,11 @@ def test_objects_of_vtk_are_taken_everywhere(tmp_path, name):
     assert with_vertices(given, surface.mesh.vertices + 1.0).n_points == n * 18
     write_mesh(tmp_path / "a.vtp", given)
     assert read_polydata(tmp_path / "a.vtp").n_cells == n * 32
-    with pytest.raises(MeshError, match=r"Make one with .* or Surface\(polydata\)\.mesh$"):
-        sd.segment(given, 2)
-    with pytest.raises(ArgumentError, match=r"faces \(m, 3\); got .*Surface\(polydata\)\.mesh"):
+    if name in ("Mesh", "pair", "lists"):
+        return
+    with pytest.raises(MeshError, match=r"Make one with Surface\(mesh\)\.mesh$"):
+        sd.Session(given)
+    with pytest.raises(ArgumentError, match=r"faces \(m, 3\); got .*Surface\(mesh\)\.mesh"):
         sd.Mesh(given)
 
 
@@ -124,34 +122,27 @@ def test_names_of_blocks_are_groups_and_lost_arrays_are_told(tmp_path, caplog):
     assert alone.cell_data.keys() == []
 
 
-REFUSED = {
-    "trimesh": (Trimesh, "Surface(pyvista.wrap(mesh))"),
-    "scene": (Scene, "Surface(pyvista.wrap(mesh.to_mesh()))"),
-    "meshio": (Mesh, "Surface(pyvista.wrap(mesh))"),
-    "image": (pv.ImageData, "Surface(pyvista.wrap(mesh).extract_surface(algorithm=None))"),
-}
-
-
-@pytest.mark.parametrize("name", list(REFUSED))
-def test_other_meshes_are_refused_with_the_line_that_converts_them(tmp_path, name):
-    kind, line = REFUSED[name]
+def test_an_image_is_refused_with_the_line_that_converts_it(tmp_path):
+    image, line = pv.ImageData(), "Surface(pyvista.wrap(mesh).extract_surface(algorithm=None))"
     for call in (
         sd.Surface, from_polydata, repair_surface, lambda it: with_vertices(it, CUBE[0]),
-        lambda it: write_mesh(tmp_path / "a.ply", it),
+        lambda it: write_mesh(tmp_path / "a.ply", it), sd.segment,
+        lambda it: sd.pull(it, 0, [0, 0, 0]),
     ):  # fmt: skip
         with pytest.raises(ArgumentError) as fault:
-            call(kind())
+            call(image)
         assert str(fault.value).endswith(f". Convert it: {line}")
-    for call in (sd.segment, sd.Session, lambda it: sd.deform(it, [0], [1], [[0, 0, 0]])):
-        with pytest.raises(MeshError) as fault:
-            call(kind())
-        assert str(fault.value).endswith(f". Make one with {line}.mesh")
-    with pytest.raises(ArgumentError) as fault:
-        sd.Mesh(kind())
+    with pytest.raises(MeshError) as fault:
+        sd.Session(image)
     assert str(fault.value).endswith(f". Make one with {line}.mesh")
-    if name == "meshio":
-        with pytest.raises(MeshError, match=r"must be a Mesh; got meshio\.Mesh\."):
-            sd.segment(kind())
+
+
+def test_a_scene_is_refused_with_the_line_that_converts_it():
+    trimesh = pytest.importorskip("trimesh")
+    scene = trimesh.Scene([trimesh_ball()])
+    with pytest.raises(ArgumentError, match=r"Convert it: Surface\(mesh.to_mesh\(\)\)$"):
+        sd.Surface(scene)
+    assert sd.Surface(scene.to_mesh()).mesh.n_vertices == 18
 
 
 def test_the_lines_for_grids_and_images_work():
@@ -165,7 +156,8 @@ def test_the_lines_for_grids_and_images_work():
 
 
 @pytest.mark.parametrize(
-    "wrong", [pv.MultiBlock(), pv.MultiBlock([None]), vtkPartitionedDataSetCollection(), 3, None]
+    "wrong",
+    [pv.MultiBlock(), pv.MultiBlock([None]), vtkPartitionedDataSetCollection(), 3, None, "a.ply"],
 )
 def test_anything_else_is_refused(wrong):
     with pytest.raises(ArgumentError, match="polydata must be a PolyData; got"):

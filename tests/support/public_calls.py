@@ -104,9 +104,9 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
 def expensive(call: Call) -> bool:
     """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
-        "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.regions", "cactus", "deform",
-        "dinosaur", "edit", "fit_cages", "film", "picture_before_after", "picture_distortion",
-        "picture_regions_and_cages", "picture_volume_change", "pull",
+        "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.pull", "PolyDataTools.regions",
+        "cactus", "deform", "dinosaur", "edit", "fit_cages", "film", "picture_before_after",
+        "picture_distortion", "picture_regions_and_cages", "picture_volume_change", "pull",
     }  # fmt: skip
 
 
@@ -272,6 +272,16 @@ def shared_session() -> Session:
 made_widgets: list[Any] = []
 
 
+def solution() -> sd.Solution:
+    """Return a pose of the bound mesh."""
+    return bound().copy().solve(_targets())
+
+
+def vars_of(thing: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass, by name."""
+    return {each.name: getattr(thing, each.name) for each in fields(thing)}
+
+
 def _widget(cls: type) -> Any:
     widgets = sd.widgets
     if cls is widgets.View:
@@ -307,7 +317,8 @@ def instance(cls: type) -> Any:
         "Painting": lambda: session().painting,
         "Surface": given,
         "Passengers": passengers,
-        "Solution": lambda: bound().copy().solve(_targets()),
+        "Solution": solution,
+        "Deformed": lambda: sd.Deformed(**vars_of(solution()), mesh=mesh()),
         "Options": sd.Options,
         "LocalVolume": lambda: sd.geometry.LocalVolume(mesh()),
         "SegmentedCageDeformFilter": sd.filters.SegmentedCageDeformFilter,
@@ -487,6 +498,9 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
 }
 
 SPECIAL: dict[str, Callable[[], Any]] = {
+    "PlotterTools.edit.callback": lambda: lambda _: None,
+    "PlotterTools.edit.cmap": lambda: "magma",
+    "PlotterTools.edit.scalars": lambda: mesh().vertices[:, 2],
     "Cage.faces": lambda: cages()[0].faces,
     "Deformer.volume.name": lambda: "whole",
     "Session.volume.name": lambda: "whole",

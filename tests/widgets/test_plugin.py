@@ -24,14 +24,15 @@ import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.progress_bar import ProgressBar
-from vtk_segdeform.errors import MeshError, MissingDependencyError
+from vtk_segdeform.errors import ArgumentError, MeshError, MissingDependencyError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert
 from vtk_segdeform.pictures import canvas
 from vtk_segdeform.session.finishing import Finish
 from vtk_segdeform.solver import Status
-from vtk_segdeform.widgets import plugin
+from vtk_segdeform.widgets import Mode, plugin
 from vtk_segdeform.widgets.hosting import session_of
+from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 from vtk_segdeform.widgets.scene.view import View
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -81,6 +82,14 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     faces = bar.regular_faces
     volumes = [signed_volume(np.asarray(s.points, float), faces) for s in (bar, bent)]
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
+
+
+def test_a_surface_with_a_pulled_point_is_a_copy_with_its_arrays(bar):
+    to = bar.points[-1] + [0.1, 0.1, 0.2]
+    pulled = bar.segdeform.pull(bar.n_points - 1, to, 0.5, pins=[0])
+    assert np.abs(pulled.points[-1] - to).max() < 1e-6
+    assert np.abs(pulled.points[0] - bar.points[0]).max() < 1e-3
+    assert_array_equal(pulled["number"], bar["number"])
 
 
 @pytest.mark.parametrize("name", every(2, ["soup", "tube"]))
@@ -178,12 +187,108 @@ def test_the_editor_replaces_the_mesh_and_is_removed_with_the_plotter(plotter, b
     plotter.show(auto_close=False, interactive=False)
     assert editor.GetEnabled()
     assert editor.path == Path("bar.segdeform")
-    assert not actor.visibility
+    assert actor.visibility
+    assert not editor.widgets.surface.polydata.n_cells  # the actor shows all of it
     assert other.visibility
     assert_array_equal(editor.session.vertices, bar.points)
     plotter.close()
     assert not editor.GetEnabled()
     editor.session.segment(2)  # no longer shown
+
+
+def colours_of(plotter: pv.Plotter) -> set[tuple[int, ...]]:
+    """Return the vivid colours of a picture's top half, each as its strong channels (r, g, b)."""
+    pixels = plotter.screenshot(return_img=True)[:150].reshape(-1, 3).astype(int)
+    vivid = pixels[np.ptp(pixels, axis=1) > 100]
+    return set(map(tuple, (vivid > vivid.mean(axis=1, keepdims=True)).astype(int).tolist()))
+
+
+RED, GREEN, BLUE = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+
+
+def turned(session: sd.Session) -> np.ndarray:
+    """Turn the pose about a pin at its first vertex, by a pull of the last; return its vertices."""
+    session.accept(session.preparation())
+    x = session.mesh.vertices
+    session.handles.pin(0)
+    session.pull(len(x) - 1, x[-1] + [0.7, 0.0, -0.3], locality=0.0)
+    session.commit("pull")
+    return session.vertices
+
+
+@pytest.mark.parametrize("smooth", every(2, [True, False]))
+def test_colours_and_their_bar_stay_and_the_editor_draws_only_what_it_colours(plotter, bar, smooth):
+    actor = plotter.add_mesh(
+        bar, scalars="half", cmap=["red", "blue"], lighting=False, smooth_shading=smooth
+    )
+    before = actor.mapper.dataset
+    editor = plotter.segdeform.edit(bar)
+    plotter.show(auto_close=False, interactive=False)
+    assert colours_of(plotter) == {RED, BLUE}
+    lowest = plotter.scalar_bars["half"].GetPosition()[1] * plotter.window_size[1]
+    assert lowest > editor.controller.messages.height > 0.0
+    vertices = turned(editor.session)
+    plotter.render()
+    shown = actor.mapper.dataset
+    assert np.abs(shown.points - vertices).max() < 1e-6
+    assert np.abs(vertices - bar.points).max() > 0.5
+    if smooth:
+        expected = pv.PolyData(vertices, bar.faces).compute_normals(split_vertices=False)
+        off = 1.0 - (shown.point_data.active_normals * expected.point_data["Normals"]).sum(axis=1)
+        assert off.max() < 5e-3  # pyvista weights faces differently
+    editor.session.history.jump(0)
+    editor.session.set_fixed(bar.points[:, 2] < 0.3)
+    plotter.render()
+    drawn = editor.widgets.surface.polydata
+    assert 0 < drawn.n_cells < bar.n_cells / 2
+    editor.mode = Mode.REGIONS
+    plotter.render()
+    assert drawn.n_cells == bar.n_cells
+    editor.mode = Mode.PULL
+    editor.widgets.surface.style = SurfaceStyle.WIREFRAME
+    plotter.render()
+    assert not actor.visibility
+    assert drawn.n_cells == bar.n_cells
+    plotter.close()
+    assert actor.mapper is None or actor.mapper.dataset is before
+
+
+def test_a_texture_stays(plotter, bar):
+    bar.active_texture_coordinates = np.ascontiguousarray(bar.points[:, :2])
+    green = pv.numpy_to_texture(np.full((8, 8, 3), [0, 255, 0], dtype=np.uint8))
+    plotter.add_mesh(bar, texture=green, lighting=False)
+    plotter.segdeform.edit(bar)
+    plotter.show(auto_close=False, interactive=False)
+    assert colours_of(plotter) == {GREEN}
+
+
+def test_an_editor_has_scalars_and_a_callback_as_widgets_of_pyvista_do(plotter, bar):
+    got = []
+    x = np.asarray(bar.points, float)
+    given = sd.Mesh(x, bar.regular_faces)
+    editor = plotter.segdeform.edit(
+        given, scalars=np.arange(len(x)) % 2, cmap=["red", "blue"], callback=got.append
+    )
+    plotter.show(auto_close=False, interactive=False)
+    assert {RED, BLUE} <= colours_of(plotter)
+    vertices = turned(editor.session)
+    assert [type(each) for each in got] == [sd.Mesh]  # not during a drag
+    assert_array_equal(got[0].vertices, vertices)
+    editor.session.undo()
+    assert_array_equal(got[1].vertices, x)
+
+
+def test_a_second_editor_in_a_subplot_is_refused_until_the_first_one_is_removed(bar):
+    plotter = pv.Plotter(off_screen=True, shape=(1, 2), window_size=(300, 150))
+    first = plotter.segdeform.edit(bar)
+    with pytest.raises(ArgumentError, match="this subplot has an editor already; remove it"):
+        plotter.segdeform.edit(bar)
+    plotter.subplot(0, 1)
+    assert plotter.segdeform.edit(bar).view.renderer is not first.view.renderer
+    plotter.subplot(0, 0)
+    first.remove()
+    plotter.segdeform.edit(bar)
+    plotter.close()
 
 
 # Registration.
@@ -233,7 +338,7 @@ def test_the_window_returns_the_edited_session(session, monkeypatch):
     show, failures = pv.Plotter.show, []
 
     def show_and_work(plotter):
-        (editor,) = plotter.segdeform.added
+        editor, _ = plotter.segdeform.added
         show(plotter, auto_close=False, interactive=False)
         hand = Hand(editor.view)
         pull(hand, editor)
@@ -283,7 +388,7 @@ def closed_early(tmp_path, session, monkeypatch):
         seen = []
 
         def show_and_work(plotter):
-            (editor,) = plotter.segdeform.added
+            editor, _ = plotter.segdeform.added
             show(plotter, auto_close=False, interactive=False)
             hand = Hand(editor.view)
             pull(hand, editor, (-40, 90))
@@ -394,12 +499,14 @@ def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):
     assert mesh.n_vertices == 2 * bar.n_points
     assert_allclose(mesh.vertices.max(axis=0), np.max(bar.points + [9.0, 0.0, 0.0], axis=0))
     for wrong in (pv.MultiBlock([bar, pv.ImageData()]), pv.MultiBlock()):
-        with pytest.raises(ValueError, match="a MultiBlock of PolyData, a Surface"):
+        with pytest.raises(ValueError, match="mesh must be a PolyData, a Mesh"):
             session_of(wrong)
 
 
 def test_other_types_are_refused():
-    with pytest.raises(ValueError, match="a Mesh or a Session; got 'cactus'"):
+    with pytest.raises(ValueError, match="cactus: there is no such file"):
         sd.edit("cactus")
+    with pytest.raises(ValueError, match="or another surface; got 3"):
+        sd.edit(3)
     with pytest.raises(MissingDependencyError, match="off-screen"):
         canvas.require_screen()

@@ -3,6 +3,7 @@
 The files, in reading order:
 
     surface            `Surface`: what is given, and the mesh that is deformed
+    kinds              what was given, of its own type
     stored             what a file has lost, as it is read again
     convert            `read_polydata`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
@@ -39,6 +40,7 @@ from .convert import (
     writable_suffixes,
     write_mesh,
 )
+from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
@@ -54,6 +56,7 @@ __all__ = [
     "from_polydata",
     "is_mesh_file",
     "loss_of",
+    "of_its_kind",
     "polydata_of",
     "read_mesh",
     "read_polydata",
@@ -62,6 +65,7 @@ __all__ = [
     "require_writable",
     "simplify",
     "stored_vertices",
+    "surface_of",
     "to_meshset",
     "to_polydata",
     "triangles_of",

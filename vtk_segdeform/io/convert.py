@@ -18,16 +18,17 @@ warning is logged (`array_names`).
 
 from __future__ import annotations
 
+import copy
 import logging
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
-from ..arrays import as_points
+from ..arrays import as_faces, as_points
 from ..cages import Cage
 from ..checks import as_flag, as_path, as_text, require, shown
 from ..errors import ArgumentError, MeshError
@@ -157,7 +158,7 @@ def write_mesh(
     """
     path = as_path(path)
     is_mesh = isinstance(mesh, Mesh)
-    surface = to_polydata(mesh) if is_mesh else as_polydata(mesh, "mesh", "a Mesh or a PolyData")
+    surface = as_polydata(mesh, "mesh", "a Mesh or a PolyData")
     require_writable(path)
     if not is_mesh:
         surface = with_storable_texts(surface)
@@ -259,9 +260,10 @@ def with_vertices(polydata: pv.PolyData, vertices: ArrayLike) -> pv.PolyData:
 def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") -> pv.PolyData:
     """Return the surface that *mesh* is; a PolyData is returned itself.
 
-    Other objects of VTK are accepted as well: an UnstructuredGrid of triangles, polygons, strips,
-    lines and vertices, and a MultiBlock, whose blocks become one surface, and their names groups of
-    its cells.
+    It may be a `Mesh`, a pair of vertices (n, 3) and faces (m, 3), a ``trimesh.Trimesh``, a
+    ``meshio.Mesh`` of surface cells, or another object of VTK: an UnstructuredGrid of triangles,
+    polygons, strips, lines and vertices, and a MultiBlock, whose blocks become one surface, and
+    their names groups of its cells.
 
     Parameters
     ----------
@@ -280,8 +282,22 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
     if isinstance(mesh, pv.PolyData):
         return mesh
     name, expected = as_text(name, "name", _SHORT), as_text(expected, "expected", _SHORT)
+    if isinstance(mesh, Mesh):
+        return to_polydata(mesh)
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        points = as_points(mesh[0], f"vertices of {name}")
+        faces = as_faces(mesh[1], len(points), f"faces of {name}")
+        return polydata_of(points, np.full(len(faces), 3), faces.ravel())
     line = conversion_of(mesh)
-    data = pv.wrap(mesh) if line == "Surface(mesh)" else None
+    data = None
+    if line == "Surface(mesh)" and is_trimesh(mesh):
+        data = pv.from_trimesh(mesh, pass_data=("point", "cell"))
+    elif line == "Surface(mesh)":
+        if is_meshio(mesh):
+            plain: Any = copy.copy(mesh)
+            plain.cell_sets = {}  # pyvista would turn those of *mesh* itself into cell arrays
+            mesh = plain
+        data = pv.wrap(mesh)
     if isinstance(data, pv.PolyData):
         return data
     if isinstance(data, pv.UnstructuredGrid):
@@ -299,6 +315,16 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
         raise ArgumentError(f"{name} must be {expected}; got {shown(mesh)}{how}")
     of_block = f"{expected}; of a MultiBlock all blocks must be surfaces"
     return _joined([(key, as_polydata(block, name, of_block)) for key, block in blocks])
+
+
+def is_trimesh(mesh: object) -> bool:
+    """Return whether *mesh* is a ``trimesh.Trimesh``, by the name of its class."""
+    return "Trimesh" in {each.__name__ for each in type(mesh).__mro__}
+
+
+def is_meshio(mesh: object) -> bool:
+    """Return whether *mesh* is of a class of meshio."""
+    return type(mesh).__module__.partition(".")[0] == "meshio"
 
 
 def _joined(blocks: list[tuple[str | None, pv.PolyData]]) -> pv.PolyData:

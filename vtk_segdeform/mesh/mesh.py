@@ -267,9 +267,7 @@ def require_mesh(mesh: object) -> None:
 
 
 def _made_with(mesh: object) -> str:
-    line = conversion_of(mesh)
-    if line in ("", "Surface(mesh)"):
-        return "Make one with Mesh(vertices, faces), read_mesh(path) or Surface(polydata).mesh"
+    line = conversion_of(mesh) or "Mesh(vertices, faces), read_mesh(path) or Surface(polydata)"
     return f"Make one with {line}.mesh"
 
 
@@ -281,14 +279,13 @@ def conversion_of(mesh: object) -> str:
     >>> class Trimesh:
     ...     __module__ = "trimesh.base"
     >>> conversion_of(Trimesh())
-    'Surface(pyvista.wrap(mesh))'
+    'Surface(mesh)'
     """
-    kinds = {each.__name__ for each in type(mesh).__mro__}
-    library = str(type(mesh).__module__).partition(".")[0]
-    if kinds & _OF_VTK:
+    classes = type(mesh).__mro__
+    kinds = {each.__name__ for each in classes}
+    full = {f"{str(each.__module__).partition('.')[0]}.{each.__name__}" for each in classes}
+    if kinds & _OF_VTK or full & {"trimesh.Trimesh", "meshio.Mesh"}:
         return "Surface(mesh)"
     if "vtkDataSet" in kinds:
         return "Surface(pyvista.wrap(mesh).extract_surface(algorithm=None))"
-    if library == "trimesh" and "Scene" in kinds:
-        return "Surface(pyvista.wrap(mesh.to_mesh()))"
-    return "Surface(pyvista.wrap(mesh))" if library in ("trimesh", "meshio") else ""
+    return "Surface(mesh.to_mesh())" if "trimesh.Scene" in full else ""

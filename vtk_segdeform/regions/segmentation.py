@@ -62,7 +62,8 @@ def segment(
     Parameters
     ----------
     mesh : Mesh
-        n vertices, one or several components.
+        n vertices, one or several components.  ``sd.segment`` takes any surface, as ``sd.deform``
+        does; the regions are those of its mesh.
     n_regions : int, optional
         Number of regions, 1 to n.  None separates every limb and nothing else: one region for
         a sphere, three for a cactus with two arms, six for a man: head, arms, legs and trunk.

@@ -124,4 +124,5 @@ class Camera:
     def remove(self) -> None:
         """Remove the cube, and leave the camera to the interactor style."""
         self.cube.hide()
+        self.viewpoint.remove()
         self.navigation.Off()

@@ -4,7 +4,11 @@ The camera orbits like a turntable about the up axis, so it is never upside down
 a distance of the model at which both projections are accurate.  `Viewpoint.home` is the initial
 view: three-quarter front, with the up axis vertical on the screen.
 
-A named view is reached in a short animation, except off-screen.
+A named view is reached in a short animation, except off-screen.  What was framed is framed again
+when the window takes another size, until the camera is moved.
+
+Long because views, movements by the mouse and saved settings all end in the placement of one
+camera, with the same limits.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -50,6 +54,18 @@ VIEWS = tuple(_VIEWS)
 """The names of the views for `Viewpoint.look_from`."""
 
 
+class _Framed(NamedTuple):
+    """What was framed: the direction to the camera, that up on the screen, and the points."""
+
+    away: FloatArray
+    up: FloatArray
+    points: FloatArray
+    size: tuple[int, int]
+    """Of the view, in pixels."""
+    place: tuple[Any, ...] | None = None
+    """The camera there; None while it still moves."""
+
+
 class Viewpoint:
     """The camera of a view over a model.
 
@@ -70,6 +86,8 @@ class Viewpoint:
         self._points, self._diagonal = points, diagonal
         self._up = _AXES[2]
         self._stop_animation: Stop | None = None
+        self._framed: _Framed | None = None
+        self._stop_fitting = view.before_render(self._fit)
 
     # Axes.
 
@@ -291,6 +309,7 @@ class Viewpoint:
 
     def _aim(self, away: FloatArray, up: FloatArray, points: FloatArray, *, animate: bool) -> None:
         """Look at *points* from the direction *away*."""
+        framed = _Framed(away, up, points, self.view.renderer.GetSize())
         axes = _axes_of(away, up)
         assert axes is not None
         camera, (width, height) = self.view.camera, self.view.renderer.GetSize()
@@ -310,6 +329,27 @@ class Viewpoint:
         scale = float(max(half[1], half[0] * slopes[1] / slopes[0])) / _MARGIN
         focus = origin + middle @ axes
         self._move_to(focus, axes, distance, scale, animate=animate)
+        if self._stop_animation is None:
+            framed = framed._replace(place=self._place_now)
+        self._framed = framed
+
+    def _fit(self) -> None:
+        """Frame the same again if the size of the view has changed and the camera has not."""
+        framed = self._framed
+        if framed is None or self._stop_animation is not None:
+            return
+        place = self._place_now
+        if framed.place not in (None, place):
+            self._framed = None
+        elif framed.size != self.view.renderer.GetSize():
+            self._aim(framed.away, framed.up, framed.points, animate=False)
+        else:
+            self._framed = framed._replace(place=place)
+
+    def remove(self) -> None:
+        """Leave the camera alone from now on."""
+        self.finish()
+        self._stop_fitting()
 
     def _move_to(
         self, focus: FloatArray, axes: FloatArray, distance: float, scale: float, *, animate: bool
@@ -358,6 +398,11 @@ class Viewpoint:
         camera.SetFocalPoint(*focus)
         camera.SetViewUp(*up)
         self._drawn()
+
+    @property
+    def _place_now(self) -> tuple[Any, ...]:
+        camera = self.view.camera
+        return camera.GetPosition(), camera.GetFocalPoint(), camera.GetParallelScale()
 
     @property
     def _camera_axes(self) -> FloatArray | None:

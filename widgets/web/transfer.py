@@ -2,10 +2,11 @@
 
     POST upload?name=NAME      the body is a mesh or a session
     GET  download/SUFFIX       the session, or the surface in its pose
+    POST paraview/             null: trame's page asks for a launcher first, and there is none
 
-Both need the header ``X-Segdeform``, which a page of another origin cannot send.  A page never
-names a file of the server: of NAME only the suffix is used, and the text is shown.  One file is
-uploaded at a time, each to a folder of its own.
+The first two need the header ``X-Segdeform``, which a page of another origin cannot send.  A page
+never names a file of the server: of NAME only the suffix is used, and the text is shown.  One file
+is uploaded at a time, each to a folder of its own.
 """
 
 from __future__ import annotations
@@ -49,6 +50,10 @@ def formats() -> list[dict[str, str]]:
     return known
 
 
+async def _no_launcher(_: web.Request) -> web.Response:
+    return web.json_response(None)
+
+
 class Transfer:
     """The routes of one editor.
 
@@ -83,6 +88,7 @@ class Transfer:
         """Add the routes to an aiohttp application."""
         app.router.add_post("/upload", self.upload)
         app.router.add_get("/download/{suffix}", self.download)
+        app.router.add_post("/paraview/", _no_launcher)
 
     async def upload(self, request: web.Request) -> web.Response:
         """Store the body, and open it in the background."""

@@ -137,6 +137,33 @@ FACES = {
 }  # fmt: skip
 
 
+def test_the_model_is_framed_again_in_another_window_until_the_camera_is_moved(bench):
+    def is_seen():
+        pixels = np.array([bench.hand.at(x) for x in bench.mesh.vertices])
+        return bool((pixels >= 0).all() and (pixels < bench.view.window.GetSize()).all())
+
+    before = bench.view.window.GetSize()
+    small = before[0] // 8, before[1]
+    try:
+        for size in (small, before, small):
+            bench.view.window.SetSize(*size)
+            View.render(bench.view)
+            assert is_seen()
+        bench.drag("Left", (5, 5))
+        camera = bench.camera
+        bench.view.window.SetSize(*before)
+        View.render(bench.view)
+        assert np.array_equal(bench.camera, camera)
+        bench.editor.controller.camera.viewpoint.home()
+        bench.view.camera.SetPosition(camera[0] + bench.mesh.diagonal)  # by the host
+        camera = bench.camera
+        bench.view.window.SetSize(*small)
+        View.render(bench.view)
+        assert np.array_equal(bench.camera, camera)
+    finally:
+        bench.view.window.SetSize(*before)
+
+
 def test_keys_of_the_keypad_show_the_model_and_change_no_mode(bench):
     mode = bench.editor.mode
 

@@ -201,7 +201,7 @@ def tell_a_story(served: Served, page: Page, mesh: Path, folder: Path, **options
     page.wait("!!document.querySelector('.sd-document b')")
     _upload(served, page, file)
     np.testing.assert_array_equal(web.session.vertices, posed)
-    assert [m for m in page.messages() if m.startswith("error") and "405" not in m] == []
+    assert [m for m in page.messages() if m.startswith("error")] == []
 
 
 def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(

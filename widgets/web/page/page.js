@@ -25,6 +25,8 @@ const Page = {
     previewed: null, draws: remembered.get(DRAWING) !== 'no', isDrawable: false,
   }),
   mounted() {
+    // trame's page does not let anyone zoom.
+    document.querySelector('meta[name=viewport]').content = 'width=device-width, initial-scale=1';
     const connection = this.trame.client.getConnection();
     connection.onConnectionClose((_, event) => this.end(event));
     connection.onConnectionError(() => this.end());

@@ -121,30 +121,31 @@ const Table = {
     colour: (row) => (row.colour ? `rgb(${row.colour.join(',')})` : 'transparent'),
   },
   template: `
-    <div class="sd-table" :title="table.tip" :class="{ disabled: !table.enabled }"
+    <div class="sd-table" :title="table.tip" :class="{ disabled: !table.enabled }" role="grid"
+        :aria-label="table.title" :aria-multiselectable="table.multiple"
         :style="{ '--columns': table.columns.length }">
-      <div class="sd-head"><span>{{ table.title }}</span>
-        <span v-for="column in table.columns" :key="column.name" :title="column.tip">
-          {{ column.title }}</span></div>
-      <div class="sd-rows" role="listbox" :aria-label="table.title"
-          :aria-multiselectable="table.multiple">
-        <div v-for="row in table.rows" :key="row.key" class="sd-row" role="option" tabindex="0"
+      <div class="sd-head" role="row"><span role="columnheader">{{ table.title }}</span>
+        <span v-for="column in table.columns" :key="column.name" :title="column.tip"
+          role="columnheader">{{ column.title }}</span></div>
+      <div class="sd-rows" role="rowgroup">
+        <div v-for="row in table.rows" :key="row.key" class="sd-row" role="row" tabindex="0"
             :aria-selected="row.selected" :class="{ selected: row.selected }"
             @keydown.self.enter.stop="select(row, $event)"
             @keydown.self.space.stop.prevent="select(row, $event)"
             @keydown.self.f2.stop="rename(row)" @keydown.tab.stop
             @click="select(row, $event)" @dblclick="rename(row)">
-          <span class="sd-name"><i class="sd-colour" :style="{ background: colour(row) }"></i>
+          <span class="sd-name" role="gridcell"><i class="sd-colour" :style="{ background: colour(row) }"></i>
             <input v-if="renamed === row.key" ref="name" type="text" :value="row.label"
               @click.stop @keydown.enter="$event.target.blur()"
               @keydown.esc="renamed = null" @blur="named(row, $event)">
             <span v-else>{{ row.label }}</span></span>
-          <span v-for="(cell, k) in row.cells" :key="k" class="sd-cell">
+          <span v-for="(cell, k) in row.cells" :key="k" class="sd-cell" role="gridcell">
             <input v-if="cell.checked !== null" type="checkbox" :checked="cell.checked"
               :title="table.columns[k].tip" :aria-label="table.columns[k].title" @click.stop
               @change="check(row, table.columns[k], $event)">{{ cell.text }}</span>
         </div>
-        <div v-if="!table.rows.length" class="sd-none">None yet</div>
+        <div v-if="!table.rows.length" class="sd-none" role="row">
+          <span role="gridcell">None yet</span></div>
       </div>
     </div>`,
 };
