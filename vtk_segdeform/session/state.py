@@ -48,18 +48,6 @@ Cages: TypeAlias = tuple[FloatArray, ...]
 _NO_PIVOTS: Mapping[str, FloatArray] = MappingProxyType({})
 _TINY = float(np.finfo(np.float64).tiny)
 _FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
-# The options, as undo steps name them; others by their own names.
-_WORDS = {
-    "n_cage_vertices": "total cage vertices",
-    "offset": "cage offset",
-    "preserve_volume": "volume preservation",
-    "preserve_region_volumes": "volume preservation per region",
-    "lids": "volume of open parts",
-    "stretch": "stretch resistance",
-    "rotation_groups": "rotation clusters",
-    "avoid_contact": "contact avoidance",
-    "attach": "attached components",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,15 +143,6 @@ def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
         text = str(fault) if isinstance(fault, ConstraintError) else f"got {shown(volumes)}"
         raise SessionError(f"volumes must be goals by name: {text}") from None
     return tuple(goals.items())
-
-
-def label_of_change(before: Options, after: Options) -> str:
-    """Return the label of an undo step that changes options: "volume preservation off"."""
-    names = [name for name, value in vars(before).items() if value != getattr(after, name)]
-    if len(names) != 1:
-        return "change options"
-    value, words = getattr(after, names[0]), _WORDS.get(names[0], names[0].replace("_", " "))
-    return f"{words} {'on' if value else 'off'}" if isinstance(value, bool) else f"change {words}"
 
 
 @dataclass(frozen=True, eq=False)

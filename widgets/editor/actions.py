@@ -269,8 +269,8 @@ def next_style(controller: Controller) -> None:
 
 
 def show_rest(controller: Controller) -> None:
-    """Show the mesh at rest until `show_pose`; the session is unchanged."""
-    controller.show_instead(controller.session.mesh.vertices, "The mesh at rest")
+    """Show the mesh at rest while the key is held; the session is unchanged."""
+    controller.show_instead(controller.session.mesh.vertices, "The mesh at rest, while held")
 
 
 def toggle_overlay(controller: Controller) -> None:
@@ -380,6 +380,8 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
 
     def change(controller: Controller) -> None:
         session, before = controller.session, controller.session.state
+        if dict(before.options.volumes).get(name) == goal:
+            return
         label = f"set the volume of {session.volume_label(name)}"
 
         def finish(*, joins: bool = join) -> None:

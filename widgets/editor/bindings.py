@@ -37,8 +37,8 @@ BINDINGS = (
     ),
     Binding("segment", ("g",), ALL, "Auto-segment", actions.segment),
     Binding("fit_cages", ("f",), ALL, "Fit cages", actions.fit_cages),
-    Binding("undo", ("z", "ctrl+z"), ALL, "Undo", actions.undo),
-    Binding("redo", ("y", "ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
+    Binding("undo", ("ctrl+z",), ALL, "Undo", actions.undo),
+    Binding("redo", ("ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
     Binding("reset_pose", ("home",), ALL, "Reset pose", actions.reset),
     Binding("finish", ("shift+f",), ALL, "Finish pose on the mesh", actions.finish),
     Binding("show_cages", ("c",), ALL, "Show cages in all modes", actions.toggle_cages),
@@ -105,7 +105,7 @@ BINDINGS = (
     Binding("new_handle", ("a",), H, "New handle", actions.new_handle),
     Binding("next_handle", ("n", "tab"), H | D, "Next handle", actions.next_handle),
     Binding(
-        "remove_handle", ("delete", "backspace"), H | D, "Remove handle", actions.remove_handle
+        "remove_handle", ("delete",), H | D, "Remove handle", actions.remove_handle
     ),
     Binding(
         "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
@@ -147,7 +147,6 @@ BINDINGS = (
 
 # For users of Blender; the other actions have the same keys.
 _BLENDER: dict[str, tuple[str, ...]] = {
-    "undo": ("ctrl+z",),
     "redo": ("ctrl+shift+z", "ctrl+y"),
     "reset_pose": ("alt+g", "alt+r"),
     "show_cages": ("k",),

@@ -9,6 +9,8 @@ Long because every widget, job and file meets here.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,6 +39,7 @@ from .session_history import SessionHistory
 from .widget_set import Mode, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
+_CLICK = 0.3  # seconds; a longer press holds a button
 _REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
 T = TypeVar("T")
 
@@ -89,6 +92,7 @@ class Controller:
         self._is_on = self._was_busy = False
         self._interrupted = False, False  # by turning off: settling, and finishing
         self._text_instead = self._unmoved = ""
+        self._held_at = -math.inf  # when the button that shows the mesh at rest was pressed
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
         self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
@@ -249,6 +253,17 @@ class Controller:
     def shows_rest(self) -> bool:
         """Whether the mesh at rest is shown instead of the current pose."""
         return self.widgets.surface.instead is self.session.mesh.vertices
+
+    def hold_rest(self, held: bool) -> None:
+        """Show the mesh at rest while a button is *held*; a click keeps it until the next one."""
+        if held:
+            self._held_at = -math.inf if self.shows_rest else time.monotonic()
+            self.show_instead(self.session.mesh.vertices, "The mesh at rest, while held")
+        elif time.monotonic() - self._held_at > _CLICK:
+            self.show_instead(None)
+        else:
+            text = "The mesh at rest. Press on it, or Before/After again, to see the pose"
+            self.show_instead(self.session.mesh.vertices, text)
 
     def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
         """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""

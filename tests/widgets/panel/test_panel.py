@@ -18,7 +18,7 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import segment
 from vtk_segdeform.session.state import State
-from vtk_segdeform.widgets.editor import Controller, preparing
+from vtk_segdeform.widgets.editor import Controller, controller, preparing
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
@@ -61,8 +61,8 @@ def full() -> Session:
     """Return a session with a step to undo and one to redo."""
     mesh, state = start()
     session = Session(mesh, state=state)
-    for share in (20.0, 30.0):
-        session.change_options(stretch=share)
+    for point in mesh.vertices[1:3]:
+        session.handles.set_pivot("handle 1", point)
     session.undo()
     return session
 
@@ -200,20 +200,26 @@ def test_controls_that_are_disabled_or_not_shown_do_nothing():
             assert (everything(editor), editor.session.state) == before
 
 
-def test_the_toolbar_and_the_menu_do_what_they_say():
+def test_the_toolbar_and_the_menu_do_what_they_say(monkeypatch):
     with editing(Mode.DEFORM) as editor:
         buttons = {field.name: field for field in toolbar(editor)}
         assert buttons["undo"].tip.startswith("Undo: ")
-        stretch = editor.session.options.stretch
+        pivots = editor.session.state.pivots
         assert press(editor, "undo") is None
-        assert editor.session.options.stretch != stretch
+        assert editor.session.state.pivots is not pivots
         editor.wait()
         press(editor, "redo")
         editor.wait()
-        assert editor.session.options.stretch == stretch
+        assert editor.session.state.pivots is pivots
+        for stays in (True, False):  # a click keeps the mesh at rest until the next one
+            press(editor, "compare", True)
+            assert status(editor).hint == "The mesh at rest, while held"
+            press(editor, "compare", False)
+            assert editor.controller.shows_rest is stays
+            assert ("Before/After again" in status(editor).hint) is stays
         press(editor, "compare", True)
-        assert editor.controller.shows_rest
-        press(editor, "compare", False)
+        monkeypatch.setattr(controller, "_CLICK", -1.0)
+        press(editor, "compare", False)  # after a longer press
         assert not editor.controller.shows_rest
         press(editor, "help")
         assert editor.controller.help.is_shown

@@ -117,7 +117,7 @@ def _step_by_step(
         if turn % 2:
             page.click(f"[data-name={button}]")
         else:
-            page.key(key)
+            page.key(key, modifiers=CTRL)
         served.wait(lambda: seen and served.is_at_rest and not len(served.web.stream.inputs))
         assert set(seen) == {position}
     served.call(stop)
@@ -236,7 +236,7 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     page.wait("document.activeElement == document.body")
     page.key("?")
     page.wait("document.querySelector('.sd-help').textContent.includes('Auto-segment')")
-    page.key("z")  # nothing behind it
+    page.key("z", modifiers=CTRL)  # nothing behind it
     page.key("Escape")
     page.wait("!document.querySelector('.sd-help')")
     served.wait(lambda: not len(web.stream.inputs))
