@@ -495,6 +495,30 @@ def test_options_of_fitting_need_no_new_binding_and_others_do():
     assert session.is_bound
 
 
+def test_a_region_at_rest_takes_its_handles_along_and_holds_no_vertex_later():
+    session = ready()
+    session.reset_region(1)
+    assert session.history.undo_label == "set tip"  # at rest already
+    front = int(np.abs(VERTICES - [-1.0, -0.8, 0.0]).max(axis=1).argmin())  # of the other region
+    session.pull(front, VERTICES[front] + [0.0, 0.0, 0.4])
+    session.commit()
+    session.move_handle("tip", up(0.5), max_steps=2)
+    session.reset_region(1)
+    own = SCENE.regions.labels == 1
+    assert session.history.labels[-2:] == ("drag tip", "reset region 2")
+    assert_allclose(session.vertices[own], VERTICES[own], atol=0.02)
+    assert np.abs(session.vertices[~own] - VERTICES[~own]).max() > 0.1
+    for name, points in session.targets.items():
+        at_rest = np.array_equal(points, VERTICES[session.handles[name]])
+        assert at_rest is bool(own[session.handles[name]].all())
+    assert volume_error(session) < 1e-12
+    session.move_handle("tip", up(0.5))
+    assert np.abs(session.vertices[own] - VERTICES[own]).max() > 0.3
+    for wrong in (2, -1, 2.5, None):
+        with pytest.raises(RegionError, match="must be the number of one of 2"):
+            session.reset_region(wrong)
+
+
 def test_settings_are_no_steps_and_stay_through_undo_and_redo():
     session = ready()
     session.move_handle("tip", up(0.2))

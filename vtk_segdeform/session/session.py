@@ -47,7 +47,7 @@ from ..deformer import (
     checked_place,
     checked_radius,
 )
-from ..errors import CageError, ConstraintError, SessionError
+from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
@@ -877,6 +877,23 @@ class Session(Described):
     def reset_pose(self) -> None:
         """Reset the pose to rest; an ongoing drag is committed first."""
         self.history.step("reset pose", self.state.at_rest())
+
+    def reset_region(self, region: int) -> None:
+        """Move the vertices of a region, and its handles, back to rest; the others follow.
+
+        Nothing holds the region there in later drags but its handles.
+
+        Raises
+        ------
+        RegionError
+            If there is no such region.
+        """
+        count = len(self.region_names)
+        if not is_whole(region, 0, count - 1):
+            raise RegionError(f"region must be the number of one of {count}; got {shown(region)}")
+        self.commit()
+        after = solving.with_region_at_rest(self.poses, self.state, int(region))
+        self.history.step(f"reset {self.region_name(int(region))}", after)
 
     def change_options(
         self, **changes: float | bool | Attach | Mapping[str, str | float] | None

@@ -28,7 +28,7 @@ from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
 from .session_file import pose_remark, write_posed
-from .widget_set import Mode
+from .widget_set import Mode, Spot
 
 _GROWTH = 20  # per cent of the volume of a part at rest, at each press
 
@@ -358,21 +358,39 @@ def unpin_all(controller: Controller) -> None:
 
 def keep_part(controller: Controller) -> None:
     """Keep the volume of the part under the hand as at rest; if it has a goal, no longer."""
-    name, session = _part(controller), controller.session
-    label = session.volume_label(name)
-    if name in dict(session.options.volumes):
-        forgetting_volume(name)(controller)
-    else:
-        is_kept = session.options.preserve_region_volumes
-        setting_volume(name, "free" if is_kept else "keep")(controller)
-    controller.say(f"Volume of {label} {'kept' if controller.widgets.keeps_part else 'free'}")
+    keeping(controller.widgets.part)(controller)
+
+
+def keeping(part: str | None) -> Action:
+    """Return the action that keeps the volume of *part* as at rest; if it has a goal, no longer."""
+
+    def keep(controller: Controller) -> None:
+        name, session = _checked_part(controller, part), controller.session
+        if name in dict(session.options.volumes):
+            forgetting_volume(name)(controller)
+        else:
+            is_kept = session.options.preserve_region_volumes
+            setting_volume(name, "free" if is_kept else "keep")(controller)
+        is_kept = controller.widgets.keeps(name)
+        controller.say(f"Volume of {session.volume_label(name)} {'kept' if is_kept else 'free'}")
+
+    return keep
 
 
 def grow_part(controller: Controller) -> None:
     """Let the part under the hand have 20 % more of its volume at rest than now, in whole %."""
-    name = _part(controller)
-    goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
-    setting_volume(name, f"{goal:+}%")(controller)
+    growing(controller.widgets.part)(controller)
+
+
+def growing(part: str | None) -> Action:
+    """Return the action that lets *part* have 20 % more of its volume at rest than now."""
+
+    def grow(controller: Controller) -> None:
+        name = _checked_part(controller, part)
+        goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
+        setting_volume(name, f"{goal:+}%")(controller)
+
+    return grow
 
 
 def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
@@ -421,9 +439,9 @@ def _settle(controller: Controller) -> None:
         controller.finishing.rest()
 
 
-def _part(controller: Controller) -> str:
-    """Return the name of the volume of the part under the hand."""
-    session, part = controller.session, controller.widgets.part
+def _checked_part(controller: Controller, part: str | None) -> str:
+    """Return *part* if it has a volume."""
+    session = controller.session
     if not session.is_bound:
         raise SessionError("The mesh is not ready yet. Wait until it is prepared")
     if part is None:
@@ -431,6 +449,34 @@ def _part(controller: Controller) -> str:
     if part not in session.deformer.volume_names:
         raise ConstraintError(f"{session.volume_label(part)} encloses no volume")
     return part
+
+
+# What the menu of the right button does at a place.
+
+
+def resetting(region: int) -> Action:
+    """Return the action that moves a region back to rest, while the others follow."""
+
+    def reset_part(controller: Controller) -> None:
+        controller.session.reset_region(region)
+        controller.say(f"Reset {controller.session.region_name(region)}")
+
+    return reset_part
+
+
+def pinning(vertex: int) -> Action:
+    """Return the action that pins a vertex, or removes the handle there."""
+
+    def pin(controller: Controller) -> None:
+        controller.widgets.puller.toggle_pin(vertex)
+        controller.say(controller.widgets.puller.remark)
+
+    return pin
+
+
+def framing(spot: Spot) -> Action:
+    """Return the action that frames the part at *spot*."""
+    return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
 
 
 # Painting.

@@ -104,9 +104,7 @@ BINDINGS = (
     Binding("paint_handle", ("d",), H, "Paint handle", actions.painting(Paint.HANDLE)),
     Binding("new_handle", ("a",), H, "New handle", actions.new_handle),
     Binding("next_handle", ("n", "tab"), H | D, "Next handle", actions.next_handle),
-    Binding(
-        "remove_handle", ("delete",), H | D, "Remove handle", actions.remove_handle
-    ),
+    Binding("remove_handle", ("delete",), H | D, "Remove handle", actions.remove_handle),
     Binding(
         "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
     ),

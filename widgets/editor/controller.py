@@ -24,7 +24,7 @@ from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, lo
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
 
-from ..scene import Draft, View, Widget
+from ..scene import Draft, Pointer, View, Widget
 from .camera import Camera, has_y_up
 from .finishing import Finishing
 from .help_card import HelpCard
@@ -36,7 +36,7 @@ from .preparing import Preparing
 from .queue import Kind, Queue, Task
 from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
 from .session_history import SessionHistory
-from .widget_set import Mode, WidgetSet
+from .widget_set import Mode, Spot, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
 _CLICK = 0.3  # seconds; a longer press holds a button
@@ -68,6 +68,10 @@ class Controller:
         The card with the keys.
     show_keys : callable
         Shows the keys or hides them: on the card, unless a toolkit has something better.
+    show_menu : callable
+        ``show_menu(pointer)`` shows the menu of what is at `spot`; by default nothing.
+    spot : Spot or None
+        What the last right click was on; None beside the mesh.
     messages : Messages
         The status line.
     notices : Notices
@@ -85,6 +89,8 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.show_keys: Callable[[], object] = self.help.toggle
+        self.show_menu: Callable[[Pointer], object] = lambda _: None
+        self.spot: Spot | None = None
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
@@ -105,6 +111,7 @@ class Controller:
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
+        self.camera.navigation.right_clicked = self._open_menu
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -589,7 +596,13 @@ class Controller:
         self._edit(session)
         self._apply_mode()
 
+    def _open_menu(self, pointer: Pointer) -> None:
+        if not self.is_busy:
+            self.spot = self.widgets.spot_at(pointer)
+            self.show_menu(pointer)
+
     def _edit(self, session: Session) -> None:
+        self.spot = None
         self.widgets = self.widgets.replaced_by(session)
         self.camera.follow(self.widgets)
         self._stop_listening()

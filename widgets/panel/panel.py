@@ -14,6 +14,7 @@ from vtk_segdeform.errors import ArgumentError
 from ..editor import DeformEditor, Mode, jumping_to, preview
 from .fields import Field, Item, Section, Table
 from .handles import handles_section
+from .menu import menu
 from .options import cages_section, deform_section
 from .painting import painting_section
 from .pulling import pull_section
@@ -100,6 +101,9 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
             return _use(editor, field, value, is_shown=True)
     if editor.is_busy:  # the job owns the session
         return None
+    for field in menu(editor):
+        if field is not None and field.name == name:
+            return _use(editor, field, value, is_shown=True)
     table_name, _, verb = name.rpartition(".")
     for section in _one_by_one(editor):
         for field in section.fields:

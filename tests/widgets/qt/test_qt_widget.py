@@ -612,6 +612,29 @@ def test_the_dialog_with_the_keys_resets_them_to_a_preset_and_can_be_cancelled(s
     assert editor.keys.changes == {}
 
 
+def test_a_right_click_opens_a_menu_whose_entries_act(seen):
+    hand, session = seen.view_hand(), seen.session
+    x = session.mesh.vertices
+    front = np.argmin(x[:, 1] + np.abs(x[:, 0]) + np.abs(x[:, 2]))
+    place = hand._pixel(hand.at(x[front]))
+    for _ in range(2):  # pins the point, and removes the pin
+        QtTest.QTest.mouseMove(hand.widget, place)
+        QtTest.QTest.mousePress(hand.widget, Qt.RightButton, Qt.NoModifier, place)
+        QtTest.QTest.mouseRelease(hand.widget, Qt.RightButton, Qt.NoModifier, place)
+        until(application().activePopupWidget, "the menu")
+        menu, before = application().activePopupWidget(), list(session.handles)
+        texts = [entry.text() for entry in menu.actions()]
+        assert any(text.startswith("Reset region") for text in texts)
+        assert "Reset pose\tHome" in texts
+        entry = next(e for e in menu.actions() if e.text().startswith(("Pin this", "Remove pin")))
+        spot = menu.actionGeometry(entry).center()
+        QtTest.QTest.mouseClick(menu, Qt.LeftButton, Qt.NoModifier, spot)
+        seen.settle()
+        assert list(session.handles) != before
+    assert not any(name.startswith("pin") for name in session.handles)
+    assert hand.failures == []
+
+
 def test_an_error_is_shown_emitted_and_then_cleared(seen):
     seen.mode(Mode.HANDLES)
     seen.panel.controls["handles.list"].topLevelItem(1).setText(0, "")  # not a valid name
