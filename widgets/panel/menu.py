@@ -46,7 +46,7 @@ def menu(editor: DeformEditor) -> tuple[Field | None, ...]:
             "A locked handle cannot be grabbed",
             value=is_locked,
             enabled=handle is not None,
-            act=lambda on: lambda c: c.widgets.dragger.set_locked(handle, on),
+            act=lambda on: lambda c: c.widgets.dragger.set_locked(str(handle), on),
         ),
         Field(
             "menu.rigid",

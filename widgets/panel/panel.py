@@ -15,6 +15,7 @@ from ..editor import DeformEditor, Mode, jumping_to, preview
 from .fields import Field, Item, Section, Table
 from .handles import handles_section
 from .menu import menu
+from .motion import motion_section
 from .options import cages_section, deform_section
 from .painting import painting_section
 from .pulling import pull_section
@@ -27,6 +28,7 @@ from .volumes import bodies_section, volumes_section
 _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (pull_section, {Mode.PULL}),
     (handles_section, {Mode.PULL, Mode.HANDLES, Mode.DEFORM}),
+    (motion_section, {Mode.DEFORM}),
     (cages_section, {Mode.CAGES}),
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
@@ -101,9 +103,9 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
             return _use(editor, field, value, is_shown=True)
     if editor.is_busy:  # the job owns the session
         return None
-    for field in menu(editor):
-        if field is not None and field.name == name:
-            return _use(editor, field, value, is_shown=True)
+    for entry in menu(editor):
+        if entry is not None and entry.name == name:
+            return _use(editor, entry, value, is_shown=True)
     table_name, _, verb = name.rpartition(".")
     for section in _one_by_one(editor):
         for field in section.fields:

@@ -104,6 +104,8 @@ def another(field: Field) -> object:
         return not field.value
     if field.kind == "choice":
         return next((value for _, value in field.choices if value != field.value), field.value)
+    if field.name.startswith("motion."):
+        return field.value + 10.0 * field.step
     low = field.minimum
     high = min(field.maximum, low + 9.0 * abs(low) + 50.0 * field.step)
     value = round(low + 0.5 * (high - low), field.decimals)
@@ -144,6 +146,9 @@ def presses(editor: DeformEditor, name: str) -> None:
     now = of(editor, name).value
     if value is None:
         assert field.value is None or now is True
+        return
+    if name.startswith(("motion.rotate", "motion.scale")):  # by so much from now
+        assert now == field.value
         return
     near = 0.3 if name == "cages.detail" else 1e-12  # that is met only nearly
 

@@ -10,7 +10,7 @@ import pytest
 from bad_values import BAD
 from campaign import every
 from hands import plain_view
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import (
     Qt,
@@ -610,6 +610,19 @@ def test_the_dialog_with_the_keys_resets_them_to_a_preset_and_can_be_cancelled(s
     assert dialog.keys.changes == keys_of("Blender").changes
     dialog.reject()
     assert editor.keys.changes == {}
+
+
+def test_numbers_typed_into_the_panel_move_and_turn_the_handle(seen):
+    seen.mode(Mode.DEFORM)
+    (name,), controls = seen.session.handles, seen.panel.controls
+    rest = seen.session.targets[name]
+    seen.type_number(controls["motion.move_z"], 0.4)
+    assert_allclose(seen.session.targets[name] - rest, np.tile([0.0, 0.0, 0.4], (len(rest), 1)))
+    assert controls["motion.move_z"].text() == "z 0.40"
+    for _ in range(2):
+        seen.type_number(controls["motion.rotate_x"], 20.0)
+        assert controls["motion.rotate_x"].text() == "x 0.0 °"
+    assert seen.session.history.labels[-3:] == (f"drag {name}", *[f"rotate {name}"] * 2)
 
 
 def test_a_right_click_opens_a_menu_whose_entries_act(seen):
