@@ -12,6 +12,7 @@ Each of these calls is one undo step, except that all moves of a drag are one st
     history    `Timeline`: the states before and after it
     poses      `Poses`: everything that is computed from states
     handles    the handles and their edits              painting    edits of the regions
+    saved_poses                                         poses by name, applied and blended
 
 - New regions or cages reset the pose, unless `carried` tells where the cages are.  New regions keep
   the cages if each cage still encloses its region; otherwise all cages are removed.
@@ -61,6 +62,7 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
+from .saved_poses import SavedPoses
 from .separating import apart, separated, separated_by
 from .state import (
     Cages,
@@ -181,6 +183,11 @@ class Session(Described):
     def handles(self) -> Handles:
         """For each handle by name, (k,) int: its vertices; and edits of handles."""
         return Handles(self.history, self.poses)
+
+    @property
+    def saved_poses(self) -> SavedPoses:
+        """The saved poses by name; and edits of them."""
+        return SavedPoses(self.history, self.poses)
 
     @property
     def painting(self) -> Painting:

@@ -230,6 +230,8 @@ class State(Described, Frozen):
     """As `Deformer` takes them, with read-only arrays."""
     parts: Parts = ()
     """Parts of the surface that have volumes under lids, with read-only arrays."""
+    saved: tuple[tuple[str, State], ...] = ()
+    """Saved poses by name, as in `SavedPoses`; these states have none themselves."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -281,6 +283,7 @@ class State(Described, Frozen):
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
+            (Change.SAVED_POSES, self.saved is other.saved),
         )
         changed = Change(0)
         for change, same in pairs:
@@ -334,7 +337,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     return State(
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
-        owned_parts(mesh, state.parts),
+        owned_parts(mesh, state.parts), _checked_saved(mesh, state.saved),
     )  # fmt: skip
 
 
@@ -355,6 +358,18 @@ def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
     for each in checked:
         frozen(np.asarray(each.vertices))
     return checked
+
+
+def _checked_saved(
+    mesh: Mesh, saved: tuple[tuple[str, State], ...]
+) -> tuple[tuple[str, State], ...]:
+    names = [name for name, _ in saved]
+    if len(set(names)) != len(names):
+        raise ConstraintError("two saved poses have the same name")
+    for name in names:
+        if fault := fault_of(name):
+            raise ConstraintError(f"a pose{fault}")
+    return tuple((name, checked_state(mesh, replace(each, saved=()))) for name, each in saved)
 
 
 def owned_parts(mesh: Mesh, parts: Sequence[tuple[str, ArrayLike]]) -> Parts:

@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError, RegionError, Sessio
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import FinishedPose, State
+from vtk_segdeform.session import FinishedPose, State, blend_label
 
 from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
@@ -477,6 +477,48 @@ def pinning(vertex: int) -> Action:
 def framing(spot: Spot) -> Action:
     """Return the action that frames the part at *spot*."""
     return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
+
+
+# Saved poses.
+
+
+def save_pose(controller: Controller) -> None:
+    """Save the current pose by a new name."""
+    name = controller.session.saved_poses.save()
+    controller.say(f"Saved {name}. F2 renames it in the list")
+
+
+def going_to(name: str) -> Action:
+    """Return the action that lets the mesh have a saved pose."""
+
+    def go(controller: Controller) -> None:
+        session = controller.session
+        saved, before = session.saved_poses, session.state
+
+        def show(after: State) -> None:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while the pose was being fitted. Try again")
+            session.history.step(f"go to {name}", after)
+
+        if saved.has_cages(name):
+            saved.apply(name)
+        else:
+            controller.start("Fitting the pose to other cages", lambda _: saved.applied(name), show)
+
+    return go
+
+
+def blending(first: str | None, second: str | None, share: float) -> Action:
+    """Return the action that shows a pose between two; moves of a slider are one undo step."""
+
+    def blend(controller: Controller) -> None:
+        session = controller.session
+        session.saved_poses.blend(first, second, share, max_steps=STEPS)
+        session.commit(blend_label(first, second), join=True)
+        if 0.0 < share < 1.0:  # the ends are as they were saved
+            _settle(controller)
+
+    return blend
 
 
 # Painting.

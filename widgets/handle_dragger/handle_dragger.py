@@ -17,6 +17,8 @@ plane.  A pin or pulled point is moved by a pull, so that the pose around it is 
 Each move solves once for the current position of the pointer.  While the pointer
 rests, and after the release, a timer refines the pose until it has converged; this is part of the
 same undo step.
+
+Long because one widget moves its handle by the mouse, by keys and by numbers.
 """
 
 from __future__ import annotations

@@ -123,6 +123,7 @@ class Table:
     multiple: bool = False
     """Whether several rows may be selected."""
     enabled: bool = True
+    visible: bool = True
     acts: Mapping[str, Callable[..., Action]] = field(
         default_factory=dict, compare=False, repr=False
     )

@@ -6,7 +6,7 @@ from ..editor import DeformEditor
 from .fields import Field, Section
 
 _AXES = "xyz"
-_LARGEST = 1e6  # of the size of the mesh, and of an angle in degrees
+_FARTHEST, _LARGEST = 10.0, 3600.0  # in sizes of the mesh, and degrees
 _LEAST_FACTOR = 0.01
 
 
@@ -29,8 +29,8 @@ def motion_section(editor: DeformEditor) -> Section:
             f"Distance of the handle from rest along {axis}, in the unit of the mesh",
             value=float(shift[k]),
             enabled=is_free,
-            minimum=-_LARGEST * session.mesh.diagonal,
-            maximum=_LARGEST * session.mesh.diagonal,
+            minimum=-_FARTHEST * session.mesh.diagonal,
+            maximum=_FARTHEST * session.mesh.diagonal,
             step=10.0 ** (1 - decimals),
             decimals=decimals,
             prefix=axis,

@@ -18,6 +18,7 @@ from .menu import menu
 from .motion import motion_section
 from .options import cages_section, deform_section
 from .painting import painting_section
+from .poses import poses_section
 from .pulling import pull_section
 from .regions import regions_section
 from .status import history, status
@@ -29,6 +30,7 @@ _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (pull_section, {Mode.PULL}),
     (handles_section, {Mode.PULL, Mode.HANDLES, Mode.DEFORM}),
     (motion_section, {Mode.DEFORM}),
+    (poses_section, {Mode.PULL, Mode.DEFORM}),
     (cages_section, {Mode.CAGES}),
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
@@ -114,7 +116,7 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
         for table in section.tables:
             if table.name == table_name and verb in table.acts:
                 arguments = _arguments(table, verb, value)
-                works = section.visible and table.enabled
+                works = section.visible and table.visible and table.enabled
                 return editor.do(table.acts[verb](*arguments)) if works else None
     raise ArgumentError(f"name: there is no control {shown(name)} in the panel")
 

@@ -63,6 +63,7 @@ class SectionBox(QtWidgets.QGroupBox):
         """Show *section*, with *keys* in the tooltips."""
         for table in section.tables:
             self.controls[table.name].draw(table)
+            self.controls[table.name].setVisible(table.visible)
         for field in section.fields:
             control, now = self.controls[field.name], (field, tooltip(field, keys))
             before = self._drawn.get(field.name)

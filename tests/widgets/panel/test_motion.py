@@ -10,7 +10,9 @@ from scenes import sausage
 from scipy.spatial.transform import Rotation
 
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.panel import press, sections
+from vtk_segdeform.widgets.scene import Phase, Pointer
 
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 SCENE = sausage(is_coarse=True)
@@ -90,12 +92,10 @@ def test_a_drag_shows_its_numbers(editor):
     assert seen["move_x"] == pytest.approx(0.0, abs=1e-12)
     hand.key("Escape")
     assert shown(editor)["move_z"] == 0.0
-    hand.press(start)
-    hand.move(start + [0.0, 2.0])
-    hand.key("Escape")
-    ring = gizmo.centre + 1.15 * gizmo.radius * np.array([np.cos(0.5), 0.0, np.sin(0.5)])
-    hand.press(hand.at(ring))
-    hand.key("y")
+    editor.view.draw()  # which sets the size of the gizmo
+    ring = Part(Kind.ROTATION, 1)
+    line = np.round(gizmo.line(ring)[:, :2])
+    hand.press(next(p for p in line if gizmo.part_at(Pointer(Phase.HOVER, *p)) == ring))
     hand.key("3")
     hand.key("0")
     assert shown(editor)["rotate_y"] == pytest.approx(30.0)
