@@ -35,34 +35,38 @@ def pose_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
 def read_pose(
     archive: Archive,
     header: dict[str, Any],
-    prefix: str,
-    n: int,
-    n_vertices: list[int],
-    sizes: Mapping[str, int],
+    cages: list[int],
+    handles: Mapping[str, int],
+    *,
+    n_vertices: int,
+    prefix: str = "",
 ) -> Pose | None:
-    """Return the pose whose arrays begin with *prefix*, for cages and handles of these sizes."""
+    """Return the pose of a mesh of *n_vertices*, whose arrays begin with *prefix*.
+
+    *cages* and *handles* are their numbers of vertices.
+    """
     if not field(header, "posed", flag):
         return None
-    total = sum(n_vertices)
-    places = split_rows(archive.array(f"{prefix}pose", "f", (total, 3)), n_vertices)
-    points = archive.array(f"{prefix}targets", "f", (sum(sizes.values()), 3))
-    targets = split_rows(points, list(sizes.values()))
+    total = sum(cages)
+    places = split_rows(archive.array(f"{prefix}pose", "f", (total, 3)), cages)
+    points = archive.array(f"{prefix}targets", "f", (sum(handles.values()), 3))
+    targets = split_rows(points, list(handles.values()))
     finished = None
     if "n_finished_held" in header:
         held = field(header, "n_finished_held", whole)
-        cages = archive.array(f"{prefix}finished_cages", "f", (total, 3))
+        then = archive.array(f"{prefix}finished_cages", "f", (total, 3))
         finished = Finished(
-            archive.array(f"{prefix}finished", "f", (n, 3)),
+            archive.array(f"{prefix}finished", "f", (n_vertices, 3)),
             archive.array(f"{prefix}finished_held", "i", (held,)),
             archive.array(f"{prefix}finished_shifts", "f", (held, 3)),
-            tuple(split_rows(cages, n_vertices)),
-            archive.array(f"{prefix}finished_offset", "f", (n, 3)),
+            tuple(split_rows(then, cages)),
+            archive.array(f"{prefix}finished_offset", "f", (n_vertices, 3)),
         )
-    return Pose(tuple(places), dict(zip(sizes, targets, strict=True)), finished)
+    return Pose(tuple(places), dict(zip(handles, targets, strict=True)), finished)
 
 
 def read_places(
-    archive: Archive, header: dict[str, Any], prefix: str, n_fixed: int
+    archive: Archive, header: dict[str, Any], n_fixed: int, *, prefix: str = ""
 ) -> FloatArray | None:
     """Return where fixed vertices stay in a pose; None at rest."""
     if "fixed_in_pose" not in header or not field(header, "fixed_in_pose", flag):

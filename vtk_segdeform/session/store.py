@@ -289,7 +289,7 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         raise SessionError("two handles have the same name")
     lengths, n_handle = list(sizes.values()), sum(sizes.values())
     ids = split_rows(archive.array("handle", "i", (n_handle,)), lengths)
-    pose = read_pose(archive, header, "", n, n_vertices, sizes)
+    pose = read_pose(archive, header, n_vertices, sizes, n_vertices=n)
     fixed = archive.array("fixed", "i", (field(header, "n_fixed", whole),))
     names, pulls = (
         tuple(field(header, name, list_of(text))) if name in header else ()
@@ -311,7 +311,7 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     if "pivots" in header:
         pivots = field(header, "pivots", map_of(row_of(number, number, number)))
         more["pivots"] = {name: np.array(point) for name, point in pivots.items()}
-    more["fixed_at"] = read_places(archive, header, "", len(fixed))
+    more["fixed_at"] = read_places(archive, header, len(fixed))
     if "has_stiffness" in header and field(header, "has_stiffness", flag):
         more["stiffness"] = archive.array("stiffness", "f", (n,))
     if "slides" in header:
@@ -336,8 +336,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
             prefix, volumes = f"saved_{k}_", field(each, "volumes", map_of(anything))
             posed = replace(
                 state,
-                pose=read_pose(archive, each, prefix, n, n_vertices, sizes),
-                fixed_at=read_places(archive, each, prefix, len(fixed)),
+                pose=read_pose(archive, each, n_vertices, sizes, n_vertices=n, prefix=prefix),
+                fixed_at=read_places(archive, each, len(fixed), prefix=prefix),
                 options=replace(options, volumes=tuple(volumes.items())),
                 locality=None,
             )
