@@ -16,9 +16,9 @@ The files, in reading order:
                      autosaved work on disk, recovery after a crash, and when to save
     messages hints status_line help_card
                      messages, hints and the help card
-    session_history history
-                     the steps of the session and of its repaired copies; states by name, jumps
-                     and previews
+    session_history step_texts history
+                     the steps of the session and of its repaired copies; what each did and where;
+                     jumps and previews
     notices notice_line
                      how the mesh differs from what was given, and where
 """

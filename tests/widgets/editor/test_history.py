@@ -47,7 +47,7 @@ def editor():
 
 def test_states_are_named_and_a_jump_reaches_each(editor):
     controller = editor.controller
-    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
+    assert states_of(controller) == ("Opened", "Set tip", "Drag tip, 0.3")
     for position in (1, 0, 2):
         editor.do(jumping_to(position))
         assert editor.status.startswith(f"History: {states_of(controller)[position]}")
@@ -117,7 +117,7 @@ def test_another_step_in_place_of_a_repair_replaces_the_copies(editor, repaired)
     controller = editor.controller
     editor.do(jumping_to(1))
     editor.session.move_handle("tip", UP, max_steps=1)
-    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
+    assert states_of(controller) == ("Opened", "Set tip", "Drag tip, 0.3")
     assert controller.history.redo_label is None
     editor.session.revert()
     repaired.check(1)
