@@ -32,7 +32,7 @@ from .controller import Controller
 from .editor import DeformEditor
 from .hints import TOOLS, hint
 from .history import jumping_to, preview, states_of
-from .keys import MOUSE, Binding, Keys, key_cap, key_name
+from .keys import Binding, Keys, key_cap, key_name
 from .messages import error_text
 from .notices import Notice, Notices, notices_of
 from .queue import Kind, Queue, Task
@@ -48,7 +48,6 @@ from .widget_set import Mode
 
 __all__ = [
     "INTERVAL",
-    "MOUSE",
     "PRESETS",
     "TOOLS",
     "About",

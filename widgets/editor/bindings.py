@@ -191,10 +191,10 @@ def keys_of(choice: KeyChoice | Keys) -> Keys:
         if not found:
             names = " or ".join(map(repr, PRESETS))
             raise ArgumentError(f"keys must be {names}, or a mapping; got {shown(choice)}")
-        return Keys(BINDINGS, found[0])
+        return Keys(BINDINGS, found[0], blenders=_BLENDER)
     if not isinstance(choice, Mapping):
         raise ArgumentError(f"keys must be a preset or a mapping; got {shown(choice)}")
     changes = {name: (keys,) if isinstance(keys, str) else keys for name, keys in choice.items()}
     for keys in changes.values():
         require_sequence(keys, "keys")
-    return Keys(BINDINGS, changes)
+    return Keys(BINDINGS, changes, blenders=_BLENDER)

@@ -112,6 +112,7 @@ class Controller:
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
         self.camera.navigation.right_clicked = self._open_menu
+        self.camera.navigation.middle_orbits = keys.middle_orbits
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -148,6 +149,7 @@ class Controller:
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
         keys = self.keys
+        self.camera.navigation.middle_orbits = keys.middle_orbits
         self.help.list_keys(keys.sections(), keys.sections(self._mode))
 
     @property

@@ -1,7 +1,7 @@
 """The camera by mouse, alike in every host and every interactor style.
 
     Alt and left drag       orbit; beside the model without Alt
-    middle drag             pan; also Shift with one of the drags above
+    middle drag             pan, as Shift with one of the drags above; orbit with `middle_orbits`
     right drag              zoom; also Control with one of the drags above
     right click             `Navigation.right_clicked`, which opens a menu
     wheel                   zoom to the pointer
@@ -67,6 +67,8 @@ class Navigation:
     ----------
     right_clicked : callable
         ``right_clicked(pointer)``, called for a right click: a press without a drag.
+    middle_orbits : bool
+        Whether the middle button orbits, as the left one beside the model; else it pans.
     """
 
     def __init__(
@@ -87,6 +89,7 @@ class Navigation:
         self._last = np.zeros(2)
         self._click: tuple[float, Pointer, object] | None = None  # the last press
         self.right_clicked: Callable[[Pointer], object] = lambda _: None
+        self.middle_orbits = False
         self._right: Pointer | None = None  # the press of the right button
         self._draft = Draft.of(view)
         self._withheld: list[tuple[Any, int]] = []  # observers of styles, for one event
@@ -153,7 +156,7 @@ class Navigation:
             return False
         self._withhold(f"{button}ButtonPressEvent")
         kind = {"Left": "orbit", "Middle": "pan", "Right": "zoom"}[button]
-        if button == "Left":
+        if button == "Left" or (button == "Middle" and self.middle_orbits):
             kind = "pan" if pointer.shift else "zoom" if pointer.control else "orbit"
         self._begin(pointer, button, kind, self._point_at(pointer))
         self._right = pointer if button == "Right" else None
