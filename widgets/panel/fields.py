@@ -142,6 +142,8 @@ class Section:
     title: str
     items: tuple[Item, ...]
     visible: bool = True
+    advice: str = ""
+    """When one needs it; such a section is folded at first, and shows only this."""
 
     @property
     def fields(self) -> tuple[Field, ...]:

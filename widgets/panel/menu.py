@@ -18,8 +18,19 @@ def menu(editor: DeformEditor) -> tuple[Field | None, ...]:
     name = "this part" if region is None else session.region_name(region)
     has_volume = session.is_bound and part in session.deformer.volume_names
     is_rigid = region is not None and stiffness_of(session, [region]) == "inf"
-    is_locked = handle in widgets.dragger.locked
     is_fixed = spot.vertex in session.fixed
+    lock: tuple[Field, ...] = ()
+    if handle is not None:
+        lock = (
+            Field(
+                "menu.lock",
+                "toggle",
+                f"Lock {handle}",
+                "A locked handle cannot be grabbed",
+                value=handle in widgets.dragger.locked,
+                act=lambda on: lambda c: c.widgets.dragger.set_locked(handle, on),
+            ),
+        )
     return (
         Field(
             "menu.reset",
@@ -39,15 +50,7 @@ def menu(editor: DeformEditor) -> tuple[Field | None, ...]:
             enabled=not is_fixed,
             act=lambda _: actions.pinning(spot.vertex),
         ),
-        Field(
-            "menu.lock",
-            "toggle",
-            f"Lock {handle or 'handle'}",
-            "A locked handle cannot be grabbed",
-            value=is_locked,
-            enabled=handle is not None,
-            act=lambda on: lambda c: c.widgets.dragger.set_locked(str(handle), on),
-        ),
+        *lock,
         Field(
             "menu.rigid",
             "toggle",

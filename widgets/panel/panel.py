@@ -16,7 +16,7 @@ from .fields import Field, Item, Section, Table
 from .handles import handles_section
 from .menu import menu
 from .motion import motion_section
-from .options import cages_section, deform_section
+from .options import advanced_section, cages_section, deform_section
 from .painting import painting_section
 from .poses import poses_section
 from .pulling import pull_section
@@ -36,6 +36,7 @@ _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
     (bodies_section, {Mode.PULL, Mode.DEFORM}),
     (regions_section, {Mode.REGIONS, Mode.CAGES, Mode.DEFORM}),
+    (advanced_section, {Mode.DEFORM}),
     (painting_section, {Mode.REGIONS, Mode.HANDLES}),
 )
 _NUMBERS = ("number", "integer", "slider")

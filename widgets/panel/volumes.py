@@ -116,6 +116,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 act=lambda axis: option("symmetry")(None if axis == "none" else axis),
             ),
         ),
+        advice="To keep or set volumes, symmetry",
     )
 
 

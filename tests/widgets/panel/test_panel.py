@@ -334,18 +334,25 @@ def test_the_newest_pull_is_selected_or_the_one_that_is_pulled_again():
 
 def test_a_handle_is_a_part_whose_volume_is_listed_and_set():
     with editing(Mode.DEFORM) as editor:
-        press(editor, "handles.list.select", ["handle:handle 1"])
-        press(editor, "handles.volume", True)
-        assert of(editor, "handles.volume").value
+
+        def select(row: str, on: bool) -> Exception | None:
+            editor.mode = Mode.HANDLES
+            press(editor, "handles.list.select", [row])
+            error = press(editor, "handles.volume", on)
+            assert error or of(editor, "handles.volume").value is on
+            editor.mode = Mode.DEFORM
+            editor.wait()
+            return error
+
+        select("handle:handle 1", True)
         assert ("Handle 1", "handle 1") in of(editor, "volumes.name").choices
         press(editor, "volumes.name", "handle 1")
         press(editor, "volumes.change", 25)
         assert abs(editor.session.volume("handle 1")[1] - 0.25) < 1e-12
-        press(editor, "handles.volume", False)
+        select("handle:handle 1", False)
         assert editor.session.options.volumes == ()
         assert of(editor, "volumes.name").value == "whole"
-        press(editor, "handles.list.select", ["handle:pin 1"])
-        error = press(editor, "handles.volume", True)
+        error = select("handle:pin 1", True)
         assert "the part 'pin 1' encloses no volume under a lid" in str(error)
 
 

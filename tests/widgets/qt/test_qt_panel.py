@@ -31,6 +31,10 @@ def widget(unprepared):
     widget.resize(900, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
+    for name in ("volumes", "advanced"):
+        fold = widget.panel.boxes[name].fold
+        assert fold.isChecked() is False
+        fold.click()
     yield widget
     widget.close()
     widget.deleteLater()

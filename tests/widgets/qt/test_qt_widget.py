@@ -334,7 +334,7 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_when_released
     bend(seen, 0.1)
     part["regions.count"].setValue(3)
     seen.settle()
-    assert "3 regions found. The pose was reset; Z brings it back" in seen.editor.status
+    assert "3 regions found. The pose was reset; Ctrl+Z brings it back" in seen.editor.status
     assert session.regions.n_regions == part["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
     slider = part["cages.detail"]

@@ -156,13 +156,16 @@ const Sections = {
   template: `
     <section v-for="section in sections" :key="section.name" class="sd-section">
       <h2>{{ section.title }}</h2>
-      <template v-for="(item, k) in section.items" :key="k">
-        <sd-table v-if="item.rows" :table="item" @press="press"></sd-table>
-        <div v-else-if="Array.isArray(item)" class="sd-line">
-          <sd-field v-for="field in item" :key="field.name" :field="field" @press="press">
-          </sd-field></div>
-        <sd-field v-else :field="item" @press="press"></sd-field>
-      </template>
+      <component :is="section.advice ? 'details' : 'div'">
+        <summary v-if="section.advice">{{ section.advice }}</summary>
+        <template v-for="(item, k) in section.items" :key="k">
+          <sd-table v-if="item.rows" :table="item" @press="press"></sd-table>
+          <div v-else-if="Array.isArray(item)" class="sd-line">
+            <sd-field v-for="field in item" :key="field.name" :field="field" @press="press">
+            </sd-field></div>
+          <sd-field v-else :field="item" @press="press"></sd-field>
+        </template>
+      </component>
     </section>`,
 };
 
