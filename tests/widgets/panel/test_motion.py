@@ -45,7 +45,8 @@ def shown(editor):
 
 def test_numbers_move_rotate_and_scale_the_handle_each_as_one_step(editor):
     session, (name,) = editor.session, editor.session.handles
-    assert press(editor, "motion.move_z", 0.4) is None
+    assert press(editor, "motion.move_z", 0.7) is None
+    assert press(editor, "motion.move_z", 0.4) is None  # from rest, and not in addition
     assert press(editor, "motion.move_x", -0.1) is None
     assert session.history.labels[-2:] == (f"drag {name}", f"drag {name}")
     assert_allclose(session.targets[name], REST + [-0.1, 0.0, 0.4], atol=1e-12)
@@ -63,7 +64,7 @@ def test_numbers_move_rotate_and_scale_the_handle_each_as_one_step(editor):
     now = shown(editor)
     assert (now["rotate_y"], now["scale"]) == (0.0, 1.0)  # of the next ones
     assert abs(session.volume_change) < 1e-12
-    for _ in range(4):
+    for _ in range(5):
         editor.run("undo")
     assert session.state.pose is None
     assert_array_equal(list(shown(editor).values())[:3], np.zeros(3))
