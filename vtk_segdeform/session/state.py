@@ -363,7 +363,10 @@ def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
 def _checked_saved(
     mesh: Mesh, saved: tuple[tuple[str, State], ...]
 ) -> tuple[tuple[str, State], ...]:
-    names = [name for name, _ in saved]
+    try:
+        names = [name for name, each in saved if require(each, State, "state.saved")]
+    except (TypeError, ValueError, RuntimeError):
+        raise ConstraintError(f"saved must be names and states; got {shown(saved)}") from None
     if len(set(names)) != len(names):
         raise ConstraintError("two saved poses have the same name")
     for name in names:

@@ -32,8 +32,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.checks import as_flag, require
+from vtk_segdeform.arrays import FloatArray, is_number, is_whole
+from vtk_segdeform.checks import as_flag, require, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.session import Change, Session, pulls, require_handle
 from vtk_segdeform.solver import Solution
@@ -47,6 +48,7 @@ from .handle_motion import Grip, Motion, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
+_LEAST_FACTOR = 1e-3
 _CLICK_TOLERANCE = 3.0  # pixels; smaller movements of a press on a handle do not move it
 
 
@@ -275,8 +277,12 @@ class HandleDragger(Widget):
 
     @property
     def shift(self) -> FloatArray:
-        """(3,) float: how far the targets of the active handle are from rest, on average."""
+        """(3,) float: how far the targets of the active handle are from rest, on average.
+
+        ConstraintError without an active handle; so do the methods that move it.
+        """
         name, session = str(self._handle), self.session
+        require_handle(session.handles, name)
         return np.asarray(
             (session.targets[name] - session.mesh.vertices[session.handles[name]]).mean(axis=0)
         )
@@ -290,14 +296,21 @@ class HandleDragger(Widget):
         return angles
 
     def shift_to(self, axis: int, amount: float) -> None:
-        """Move the active handle along x, y or z, until its `shift` there is *amount*."""
+        """Move the active handle along x, y or z, *axis* 0 to 2, until its `shift` is *amount*."""
+        axis = _checked_axis(axis)
+        _require_number(amount, "amount")
         matrix = np.eye(4)
         matrix[axis, 3] = amount - self.shift[axis]
         self._apply("drag", [matrix])
 
     def rotate(self, axis: int, degrees: float) -> None:
-        """Rotate the active handle about its pivot by *degrees*, along an axis of its gizmo."""
-        count = max(1, math.ceil(abs(degrees) / 90.0))  # the solver turns the shorter way
+        """Rotate the active handle about its pivot by *degrees*, about *axis* 0 to 2 of its gizmo.
+
+        A turn of more than 90 degrees stops on its way, as the solver turns the shorter way.
+        """
+        axis = _checked_axis(axis)
+        _require_number(degrees, "degrees")
+        count = max(1, math.ceil(abs(degrees) / 90.0))
         direction = self._axes[axis]
         turns = [
             Rotation.from_rotvec(np.radians(degrees * k / count) * direction).as_matrix()
@@ -306,7 +319,8 @@ class HandleDragger(Widget):
         self._apply("rotate", [self._about_pivot(R) for R in turns])
 
     def scale(self, factor: float) -> None:
-        """Scale the active handle about its pivot."""
+        """Scale the active handle about its pivot by a positive *factor*."""
+        _require_number(factor, "factor", least=_LEAST_FACTOR)
         self._apply("scale", [self._about_pivot(factor * np.eye(3))])
 
     def _about_pivot(self, linear: FloatArray) -> FloatArray:
@@ -318,6 +332,7 @@ class HandleDragger(Widget):
     def _apply(self, verb: str, stops: list[FloatArray]) -> None:
         """Move the active handle by the last of *stops* (4, 4), through the others, in one step."""
         session, name = self.session, str(self._handle)
+        require_handle(session.handles, name)
         self.finish()
         session.commit()
         self._live.pause()
@@ -445,3 +460,15 @@ class HandleDragger(Widget):
             return np.eye(3)
         session, name = self.session, str(self._handle)
         return rigid_fit(session.mesh.vertices[session.handles[name]], session.targets[name])[0].T
+
+
+def _checked_axis(axis: int) -> int:
+    if not is_whole(axis, 0, 2):
+        raise ArgumentError(f"axis must be 0, 1 or 2; got {shown(axis)}")
+    return int(axis)
+
+
+def _require_number(value: float, name: str, *, least: float = -math.inf) -> None:
+    if not is_number(value, least):
+        bound = "" if least == -math.inf else f" of at least {least:g}"
+        raise ArgumentError(f"{name} must be a number{bound}; got {shown(value)}")
