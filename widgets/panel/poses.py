@@ -60,7 +60,7 @@ def poses_section(editor: DeformEditor) -> Section:
                     "Save pose",
                     "Keeps the current pose by a name, in the session file as well",
                     enabled=session.is_bound,
-                    act=lambda _: actions.save_pose,
+                    act=lambda _: actions.once_settled(actions.save_pose),
                 ),
                 Field(
                     "poses.remove",

@@ -47,9 +47,14 @@ def test_poses_are_saved_selected_renamed_and_blended(editor):
     up = session.vertices
     assert list(shown(editor)[1]) == ["save"]
     press(editor, "poses.save")
-    press(editor, "motion.move_z", -0.5)
+    press(editor, "motion.move_z", -2.5)
+    assert editor.widgets.is_settling
+    press(editor, "poses.save")  # once the pose has settled
+    assert list(session.saved_poses) == ["pose 1"]
     settle(editor)
-    press(editor, "poses.save")
+    editor.view.interactor.InvokeEvent("TimerEvent")
+    assert list(session.saved_poses) == ["pose 1", "pose 2"]
+    assert not session.is_unsettled
     press(editor, "poses.list.rename", ("pose 2", "down"))
     section, _ = shown(editor)
     (table,) = section.tables
@@ -66,8 +71,8 @@ def test_poses_are_saved_selected_renamed_and_blended(editor):
         assert shown(editor)[1]["share"].value == share
     assert session.history.labels[steps:] == ("blend pose 1 and down",)
     (name,) = session.handles
-    at_rest = session.mesh.vertices[session.handles[name]]
-    assert np.abs(session.targets[name] - at_rest).max() < 1e-6  # half-way
+    half = session.mesh.vertices[session.handles[name]] - [0.0, 0.0, 1.0]
+    assert np.abs(session.targets[name] - half).max() < 1e-6
     assert abs(session.volume_change) < 1e-12
     editor.run("undo")
     assert_array_equal(session.vertices, up)
