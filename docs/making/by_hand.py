@@ -90,7 +90,8 @@ def bend(hand: Hand) -> None:
     if np.allclose(hand.editor.session.vertices, vertices):
         raise RuntimeError("the pull missed the arm")
     hand.save("hand-pulled")
-    hand.press("z", "1", "g")
+    hand.editor.run("undo")
+    hand.press("1", "g")
     hand.save("hand-regions")
     hand.press("f", "2")
     hand.save("hand-cages")
@@ -126,7 +127,8 @@ def paint(hand: Hand) -> None:
     place = hand.at([[0.0, -0.1, 0.62], [0.02, -0.1, 0.78]])
     hand.drag([place[0] + t * (place[1] - place[0]) for t in np.linspace(0.0, 1.0, 12)])
     hand.save("hand-painted")
-    hand.press("z", "f", "2")
+    hand.editor.run("undo")
+    hand.press("f", "2")
     cage = hand.editor.session.cages[0].vertices
     top = cage[np.argmax(cage @ [0.4, -0.4, 1.0])]
     start = hand.at(top[None])[0]

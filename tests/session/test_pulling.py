@@ -440,8 +440,6 @@ def _volumes(session: Session):
 def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for():
     session = Session(MESH)
     session.set_fixed(SCENE.fixed)
-    session.change_options(n_cage_vertices=40)
-    session.undo()
     session.change_options(n_cage_vertices=60)
     told = {}
     prepared = session.preparation(lambda fraction, message: told.setdefault(message, fraction))
@@ -453,7 +451,7 @@ def test_a_preparation_is_no_step_and_is_accepted_only_by_what_it_was_made_for()
     assert session.accept(prepared)
     assert session.is_bound
     assert len(heard) == 1
-    assert session.history.undo_label == "change total cage vertices"
+    assert session.history.undo_label == "set fixed vertices"
     session.pull(HIGH, X[HIGH] + UP, max_steps=2)
     while session.history.can_undo:
         session.undo()

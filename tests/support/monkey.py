@@ -23,7 +23,7 @@ LONGEST = 120.0  # seconds that a job may take, on a busy machine
 KEYS = sorted({key for binding in BINDINGS for key in binding.keys})
 # Files are opened so rarely that there are unsaved changes to lose.
 RARE = {"p": 0.3, "ctrl+o": 0.3, "ctrl+s": 0.2, "g": 0.1, "f": 1.5, "delete": 0.3, "backspace": 0.3}
-OFTEN = {"0": 6.0, "1": 2.0, "2": 2.0, "3": 2.0, "4": 6.0, "escape": 3.0, "x": 2.0, "z": 3.0,
+OFTEN = {"0": 6.0, "1": 2.0, "2": 2.0, "3": 2.0, "4": 6.0, "escape": 3.0, "x": 2.0, "ctrl+z": 3.0,
          "r": 2.0, "return": 2.0}  # fmt: skip
 ODDS = np.array([RARE.get(key, OFTEN.get(key, 1.0)) for key in KEYS])
 

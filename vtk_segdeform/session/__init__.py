@@ -15,11 +15,13 @@ The files, in reading order:
     preparing      regions, cages and binding in advance
     separating     components that follow others, and those with regions of their own
     finishing      poses finished on the mesh itself
+    saved_poses    poses by name: saved, applied and blended
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes
     naming         names of regions and handles
-    store          saving and loading sessions
+    store pose_store
+                   saving and loading sessions, and the poses in them
     surface_store  the given surface in a file
     archive        the file format
 """
@@ -34,6 +36,7 @@ from .naming import region_name, volume_label
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
+from .saved_poses import SavedPoses, blend_label
 from .session import Session
 from .stand_in import StandIn
 from .state import Options, State
@@ -48,11 +51,13 @@ __all__ = [
     "Painting",
     "Poses",
     "Preparation",
+    "SavedPoses",
     "Session",
     "StandIn",
     "State",
     "SurfacePoint",
     "Timeline",
+    "blend_label",
     "load_session",
     "pulls",
     "region_name",

@@ -32,6 +32,8 @@ class Change(enum.Flag):
     """The steps to undo or redo."""
     PIVOTS = enum.auto()
     """`Handles.pivot` of a handle."""
+    SAVED_POSES = enum.auto()
+    """`Session.saved_poses`."""
 
 
 Listener = Callable[[Change], None]

@@ -6,12 +6,13 @@ The session is the only object with state.  Widgets and scripts read and edit a 
     segment, painting.paint ...  ->  fit_cages  ->  set_fixed, handles.add  ->  drag ... commit
 
 Each of these calls is one undo step, except that all moves of a drag are one step, ended by
-`commit`.
+`commit`, and that settings are none; see `Session.change_options`.
 
     state      a frozen `State`, the value of the session
     history    `Timeline`: the states before and after it
     poses      `Poses`: everything that is computed from states
     handles    the handles and their edits              painting    edits of the regions
+    saved_poses                                         poses by name, applied and blended
 
 - New regions or cages reset the pose, unless `carried` tells where the cages are.  New regions keep
   the cages if each cage still encloses its region; otherwise all cages are removed.
@@ -47,7 +48,7 @@ from ..deformer import (
     checked_place,
     checked_radius,
 )
-from ..errors import CageError, ConstraintError, SessionError
+from ..errors import CageError, ConstraintError, RegionError, SessionError
 from ..geometry import Attach, Lids
 from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
@@ -61,6 +62,7 @@ from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
+from .saved_poses import SavedPoses
 from .separating import apart, separated, separated_by
 from .state import (
     Cages,
@@ -70,7 +72,6 @@ from .state import (
     checked_state,
     checked_stiffness,
     fitting_cages,
-    label_of_change,
     of_mesh,
     owned_parts,
     owned_slides,
@@ -82,6 +83,8 @@ if TYPE_CHECKING:
 
     from ..io import Surface
 
+# The options that a step changes, and its label; the others are settings.
+_STEPS = {"volumes": "change volumes", "attach": "change attached components"}
 _ROUNDING = 1e-9  # diagonals: distance of cage vertices that are in the same place
 
 
@@ -180,6 +183,11 @@ class Session(Described):
     def handles(self) -> Handles:
         """For each handle by name, (k,) int: its vertices; and edits of handles."""
         return Handles(self.history, self.poses)
+
+    @property
+    def saved_poses(self) -> SavedPoses:
+        """The saved poses by name; and edits of them."""
+        return SavedPoses(self.history, self.poses)
 
     @property
     def painting(self) -> Painting:
@@ -485,7 +493,9 @@ class Session(Described):
 
         The pose stays; call `refine` to apply it.
         """
-        checked = checked_stiffness(self.mesh, stiffness)
+        checked, before = checked_stiffness(self.mesh, stiffness), self.state.stiffness
+        if checked is not None and before is not None and np.array_equal(checked, before):
+            return
         self.history.step("set stiffness", replace(self.state, stiffness=checked))
 
     def set_slides(self, slides: Iterable[Slide]) -> None:
@@ -876,20 +886,48 @@ class Session(Described):
         """Reset the pose to rest; an ongoing drag is committed first."""
         self.history.step("reset pose", self.state.at_rest())
 
+    def reset_region(self, region: int) -> None:
+        """Move the vertices of a region, and its handles, back to rest; the others follow.
+
+        Nothing holds the region there in later drags but its handles.
+
+        Raises
+        ------
+        RegionError
+            If there is no such region.
+        """
+        count = len(self.region_names)
+        if not is_whole(region, 0, count - 1):
+            raise RegionError(f"region must be the number of one of {count}; got {shown(region)}")
+        self.commit()
+        after = solving.with_region_at_rest(self.poses, self.state, int(region))
+        self.history.step(f"reset {self.region_name(int(region))}", after)
+
     def change_options(
         self, **changes: float | bool | Attach | Mapping[str, str | float] | None
     ) -> None:
-        """Change some of the `Options` by name; call `refine` to apply them to the pose."""
+        """Change some of the `Options` by name; call `refine` to apply them to the pose.
+
+        Options are settings: changing them is no undo step, drops nothing that can be redone, and
+        undo and redo leave them as they are.  Only *volumes* and *attach*, on which regions and
+        cages depend, are changed by a step.  An ongoing drag is committed first.
+        """
         unknown = sorted(changes.keys() - vars(self.options).keys())
         if unknown:
             known = ", ".join(vars(self.options))
             raise SessionError(f"there is no option {', '.join(unknown)}; there are {known}")
         options = replace(self.options, **changes)  # type: ignore[arg-type]  # `Options` checks them
+        if options == self.options:
+            return
         if options.symmetry != self.options.symmetry:
             self.poses.mirror(replace(self.state, options=options))  # raises if it is not symmetric
-        label = label_of_change(self.options, options)
-        state = apart(self.poses, self.state, dict(options.volumes))
-        self.history.step(label, replace(state, options=options))
+        after = apart(self.poses, self.state, dict(options.volumes))
+        self.commit()
+        settings = {name: getattr(options, name) for name in changes.keys() - _STEPS.keys()}
+        self.history.amend(partial(_with_settings, settings))
+        label = next((_STEPS[name] for name in _STEPS if name in changes), "fit cages")
+        if options != self.options or after.regions is not self.regions:
+            self.history.step(label, replace(after, options=options))
 
     # Undo and redo.
 
@@ -944,6 +982,10 @@ class Session(Described):
         if n_cage_vertices is None:
             return self.options
         return replace(self.options, n_cage_vertices=n_cage_vertices)
+
+
+def _with_settings(settings: Mapping[str, Any], state: State) -> State:
+    return replace(state, options=replace(state.options, **settings))
 
 
 def _surface(surface: Any) -> Surface:

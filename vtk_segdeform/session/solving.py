@@ -19,10 +19,13 @@ from ..errors import ConstraintError
 from ..geometry import volume_gradient
 from ..progress import Progress
 from ..solver import Solution
+from . import pulls
 from .finishing import errors, moved_on
 from .handles import require_near, stacked, targets_at
 from .poses import Aim, Path, Poses, Shown
 from .state import Cages, Pose, State
+
+_SAMPLED = 200  # vertices that hold a region in its place, at most about twice as many
 
 
 def solve(
@@ -84,6 +87,29 @@ def solve(
     if shift is not None:
         solution = replace(solution, errors=errors(poses, state, deformer, wanted))
     return pose, solution
+
+
+def with_region_at_rest(poses: Poses, state: State, region: int) -> State:
+    """Return *state* with the vertices of a region where they were at rest; the others follow.
+
+    Its handles, pins and pulled points go back to rest as well; later drags may move it again.
+    """
+    regions, rest = state.regions, poses.mesh.vertices
+    if state.pose is None or regions is None:
+        return state
+    state = pulls.released(state, poses.vertices(state))
+    own = np.flatnonzero(regions.labels == region)
+    inside = [name for name, ids in state.handles.items() if np.isin(ids, own).mean() > 0.5]
+    free = np.setdiff1d(own, np.concatenate([state.fixed, state.handle]))
+    held = {"": frozen(free[:: 1 + len(free) // _SAMPLED])} if len(free) else {}  # for this solve
+    assert state.pose is not None
+    targets = {**state.pose.targets, **{name: rest[ids] for name, ids in held.items()}}
+    targets |= {name: frozen(rest[state.handles[name]]) for name in inside}
+    handles = MappingProxyType({**state.handles, **held})
+    pose = replace(state.pose, targets=targets_at(handles, poses.vertices(state)))
+    pose, _ = solve(poses, replace(state, handles=handles, pose=pose), targets)
+    kept = {name: points for name, points in pose.targets.items() if name in state.handles}
+    return replace(state, pose=replace(pose, targets=MappingProxyType(kept)))
 
 
 def free_form(poses: Poses, state: State, cage_vertices: Sequence[FloatArray]) -> Pose:

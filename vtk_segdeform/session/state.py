@@ -48,18 +48,6 @@ Cages: TypeAlias = tuple[FloatArray, ...]
 _NO_PIVOTS: Mapping[str, FloatArray] = MappingProxyType({})
 _TINY = float(np.finfo(np.float64).tiny)
 _FARTHEST = 1e6  # mesh diagonals; poses farther away are damaged, since no drag reaches so far
-# The options, as undo steps name them; others by their own names.
-_WORDS = {
-    "n_cage_vertices": "total cage vertices",
-    "offset": "cage offset",
-    "preserve_volume": "volume preservation",
-    "preserve_region_volumes": "volume preservation per region",
-    "lids": "volume of open parts",
-    "stretch": "stretch resistance",
-    "rotation_groups": "rotation clusters",
-    "avoid_contact": "contact avoidance",
-    "attach": "attached components",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,15 +145,6 @@ def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
     return tuple(goals.items())
 
 
-def label_of_change(before: Options, after: Options) -> str:
-    """Return the label of an undo step that changes options: "volume preservation off"."""
-    names = [name for name, value in vars(before).items() if value != getattr(after, name)]
-    if len(names) != 1:
-        return "change options"
-    value, words = getattr(after, names[0]), _WORDS.get(names[0], names[0].replace("_", " "))
-    return f"{words} {'on' if value else 'off'}" if isinstance(value, bool) else f"change {words}"
-
-
 @dataclass(frozen=True, eq=False)
 class Finished(Frozen):
     """The mesh in a pose that was finished, or dragged on from one that was; see `finishing`."""
@@ -251,6 +230,8 @@ class State(Described, Frozen):
     """As `Deformer` takes them, with read-only arrays."""
     parts: Parts = ()
     """Parts of the surface that have volumes under lids, with read-only arrays."""
+    saved: tuple[tuple[str, State], ...] = ()
+    """Saved poses by name, as in `SavedPoses`; these states have none themselves."""
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -302,6 +283,7 @@ class State(Described, Frozen):
             (Change.PIVOTS, self.pivots is other.pivots),
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
+            (Change.SAVED_POSES, self.saved is other.saved),
         )
         changed = Change(0)
         for change, same in pairs:
@@ -355,7 +337,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
     return State(
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
-        owned_parts(mesh, state.parts),
+        owned_parts(mesh, state.parts), _checked_saved(mesh, state.saved),
     )  # fmt: skip
 
 
@@ -376,6 +358,21 @@ def owned_slides(mesh: Mesh, slides: Iterable[Slide]) -> tuple[Slide, ...]:
     for each in checked:
         frozen(np.asarray(each.vertices))
     return checked
+
+
+def _checked_saved(
+    mesh: Mesh, saved: tuple[tuple[str, State], ...]
+) -> tuple[tuple[str, State], ...]:
+    try:
+        names = [name for name, each in saved if require(each, State, "state.saved")]
+    except (TypeError, ValueError, RuntimeError):
+        raise ConstraintError(f"saved must be names and states; got {shown(saved)}") from None
+    if len(set(names)) != len(names):
+        raise ConstraintError("two saved poses have the same name")
+    for name in names:
+        if fault := fault_of(name):
+            raise ConstraintError(f"a pose{fault}")
+    return tuple((name, checked_state(mesh, replace(each, saved=()))) for name, each in saved)
 
 
 def owned_parts(mesh: Mesh, parts: Sequence[tuple[str, ArrayLike]]) -> Parts:

@@ -14,6 +14,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     finished.npy          (n, 3) float     the mesh in a finished pose             if any
     finished_held.npy, finished_shifts.npy, finished_cages.npy, finished_offset.npy
                                            as in `state.Finished`
+    saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -37,7 +38,7 @@ import os
 import struct
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,8 +65,10 @@ from .archive import (
     whole,
     write_archive,
 )
+from .pose_store import pose_parts, read_places, read_pose
+from .saved_poses import in_pose
 from .session import Session
-from .state import Finished, Locality, Options, Pose, State, split_rows
+from .state import Locality, Options, State, split_rows
 
 if TYPE_CHECKING:
     from ..io import Surface
@@ -171,7 +174,7 @@ def _write(
     file: Any, session: Session, given: Surface | None, view: Mapping[str, Any] | None
 ) -> None:
     mesh, state = session.mesh, session.state
-    regions, pose = state.regions, state.pose
+    regions = state.regions
     options = {name: _plain(value) for name, value in asdict(state.options).items()}
     defaults = asdict(Options())
     options = {k: v for k, v in options.items() if k in _FIRST or v != defaults[k]}
@@ -189,7 +192,6 @@ def _write(
         "cages": [[cage.n_vertices, cage.n_faces] for cage in state.cages],
         "n_fixed": len(state.fixed),
         "handles": [[name, len(ids)] for name, ids in state.handles.items()],
-        "posed": pose is not None,
         "options": options,
     }
     if state.region_names:  # optional: earlier versions ignore it
@@ -209,9 +211,6 @@ def _write(
     if state.cages:
         arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
         arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
-    if pose is not None:
-        arrays["pose"] = np.concatenate(pose.cage_vertices)
-        arrays["targets"] = np.concatenate([np.empty((0, 3)), *pose.targets.values()])
     if state.pulls:  # optional, like what follows
         header["pulls"] = list(state.pulls)
     if state.locality is not None:
@@ -220,16 +219,16 @@ def _write(
         if not point.is_vertex:
             header["pulled_point"] = [point.corners, point.shares]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
-    if pose is not None and pose.finished is not None:
-        header["n_finished_held"] = len(pose.finished.held)
-        arrays["finished"] = pose.finished.vertices
-        arrays["finished_held"] = pose.finished.held
-        arrays["finished_shifts"] = pose.finished.shifts
-        arrays["finished_cages"] = np.concatenate(pose.finished.cage_vertices)
-        arrays["finished_offset"] = pose.finished.offset
-    if state.fixed_at is not None:
-        header["fixed_in_pose"] = True
-        arrays["fixed_at"] = state.fixed_at
+    more, posed = pose_parts(state)
+    header |= more
+    arrays |= posed
+    saved = []
+    for k, (name, each) in enumerate(state.saved):  # with the handles and cages of the session
+        more, posed = pose_parts(in_pose(session.poses, replace(state, saved=()), each))
+        saved.append({"name": name, "volumes": dict(each.options.volumes), **more})
+        arrays |= {f"saved_{k}_{key}": array for key, array in posed.items()}
+    if saved:
+        header["saved_poses"] = saved
     if state.pivots:
         header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
     if state.stiffness is not None:
@@ -290,21 +289,7 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         raise SessionError("two handles have the same name")
     lengths, n_handle = list(sizes.values()), sum(sizes.values())
     ids = split_rows(archive.array("handle", "i", (n_handle,)), lengths)
-    pose = None
-    if field(header, "posed", flag):
-        places = split_rows(archive.array("pose", "f", (total, 3)), n_vertices)
-        targets = split_rows(archive.array("targets", "f", (n_handle, 3)), lengths)
-        finished = None
-        if "n_finished_held" in header:
-            held = field(header, "n_finished_held", whole)
-            finished = Finished(
-                archive.array("finished", "f", (n, 3)),
-                archive.array("finished_held", "i", (held,)),
-                archive.array("finished_shifts", "f", (held, 3)),
-                tuple(split_rows(archive.array("finished_cages", "f", (total, 3)), n_vertices)),
-                archive.array("finished_offset", "f", (n, 3)),
-            )
-        pose = Pose(tuple(places), dict(zip(sizes, targets, strict=True)), finished)
+    pose = read_pose(archive, header, n_vertices, sizes, n_vertices=n)
     fixed = archive.array("fixed", "i", (field(header, "n_fixed", whole),))
     names, pulls = (
         tuple(field(header, name, list_of(text))) if name in header else ()
@@ -326,8 +311,7 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     if "pivots" in header:
         pivots = field(header, "pivots", map_of(row_of(number, number, number)))
         more["pivots"] = {name: np.array(point) for name, point in pivots.items()}
-    if "fixed_in_pose" in header and field(header, "fixed_in_pose", flag):
-        more["fixed_at"] = archive.array("fixed_at", "f", (len(fixed), 3))
+    more["fixed_at"] = read_places(archive, header, len(fixed))
     if "has_stiffness" in header and field(header, "has_stiffness", flag):
         more["stiffness"] = archive.array("stiffness", "f", (n,))
     if "slides" in header:
@@ -346,6 +330,19 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
+    saved = list[tuple[str, State]]()
+    if "saved_poses" in header:
+        for k, each in enumerate(field(header, "saved_poses", list_of(map_of(anything)))):
+            prefix, volumes = f"saved_{k}_", field(each, "volumes", map_of(anything))
+            posed = replace(
+                state,
+                pose=read_pose(archive, each, n_vertices, sizes, n_vertices=n, prefix=prefix),
+                fixed_at=read_places(archive, each, len(fixed), prefix=prefix),
+                options=replace(options, volumes=tuple(volumes.items())),
+                locality=None,
+            )
+            saved.append((field(each, "name", text), posed))
+        state = replace(state, saved=tuple(saved))
     if "surface" not in header:
         return mesh, state
     imported("vtk_segdeform.session.surface_store")  # imports pyvista

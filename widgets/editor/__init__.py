@@ -16,9 +16,9 @@ The files, in reading order:
                      autosaved work on disk, recovery after a crash, and when to save
     messages hints status_line help_card
                      messages, hints and the help card
-    session_history history
-                     the steps of the session and of its repaired copies; states by name, jumps
-                     and previews
+    session_history step_texts history
+                     the steps of the session and of its repaired copies; what each did and where;
+                     jumps and previews
     notices notice_line
                      how the mesh differs from what was given, and where
 """
@@ -32,7 +32,7 @@ from .controller import Controller
 from .editor import DeformEditor
 from .hints import TOOLS, hint
 from .history import jumping_to, preview, states_of
-from .keys import MOUSE, Binding, Keys, key_cap, key_name
+from .keys import Binding, Keys, key_cap, key_name
 from .messages import error_text
 from .notices import Notice, Notices, notices_of
 from .queue import Kind, Queue, Task
@@ -48,7 +48,6 @@ from .widget_set import Mode
 
 __all__ = [
     "INTERVAL",
-    "MOUSE",
     "PRESETS",
     "TOOLS",
     "About",

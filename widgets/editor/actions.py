@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError, RegionError, Sessio
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import FinishedPose, State
+from vtk_segdeform.session import FinishedPose, State, blend_label
 
 from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
@@ -28,7 +28,7 @@ from ..scene import Phase, SurfaceStyle
 from .controller import Controller
 from .finishing import measured
 from .session_file import pose_remark, write_posed
-from .widget_set import Mode
+from .widget_set import Mode, Spot
 
 _GROWTH = 20  # per cent of the volume of a part at rest, at each press
 
@@ -269,8 +269,8 @@ def next_style(controller: Controller) -> None:
 
 
 def show_rest(controller: Controller) -> None:
-    """Show the mesh at rest until `show_pose`; the session is unchanged."""
-    controller.show_instead(controller.session.mesh.vertices, "The mesh at rest")
+    """Show the mesh at rest while the key is held; the session is unchanged."""
+    controller.show_instead(controller.session.mesh.vertices, "The mesh at rest, while held")
 
 
 def toggle_overlay(controller: Controller) -> None:
@@ -358,21 +358,39 @@ def unpin_all(controller: Controller) -> None:
 
 def keep_part(controller: Controller) -> None:
     """Keep the volume of the part under the hand as at rest; if it has a goal, no longer."""
-    name, session = _part(controller), controller.session
-    label = session.volume_label(name)
-    if name in dict(session.options.volumes):
-        forgetting_volume(name)(controller)
-    else:
-        is_kept = session.options.preserve_region_volumes
-        setting_volume(name, "free" if is_kept else "keep")(controller)
-    controller.say(f"Volume of {label} {'kept' if controller.widgets.keeps_part else 'free'}")
+    keeping(controller.widgets.part)(controller)
+
+
+def keeping(part: str | None) -> Action:
+    """Return the action that keeps the volume of *part* as at rest; if it has a goal, no longer."""
+
+    def keep(controller: Controller) -> None:
+        name, session = _checked_part(controller, part), controller.session
+        if name in dict(session.options.volumes):
+            forgetting_volume(name)(controller)
+        else:
+            is_kept = session.options.preserve_region_volumes
+            setting_volume(name, "free" if is_kept else "keep")(controller)
+        is_kept = controller.widgets.keeps(name)
+        controller.say(f"Volume of {session.volume_label(name)} {'kept' if is_kept else 'free'}")
+
+    return keep
 
 
 def grow_part(controller: Controller) -> None:
     """Let the part under the hand have 20 % more of its volume at rest than now, in whole %."""
-    name = _part(controller)
-    goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
-    setting_volume(name, f"{goal:+}%")(controller)
+    growing(controller.widgets.part)(controller)
+
+
+def growing(part: str | None) -> Action:
+    """Return the action that lets *part* have 20 % more of its volume at rest than now."""
+
+    def grow(controller: Controller) -> None:
+        name = _checked_part(controller, part)
+        goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
+        setting_volume(name, f"{goal:+}%")(controller)
+
+    return grow
 
 
 def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
@@ -380,6 +398,8 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
 
     def change(controller: Controller) -> None:
         session, before = controller.session, controller.session.state
+        if dict(before.options.volumes).get(name) == goal:
+            return
         label = f"set the volume of {session.volume_label(name)}"
 
         def finish(*, joins: bool = join) -> None:
@@ -419,9 +439,9 @@ def _settle(controller: Controller) -> None:
         controller.finishing.rest()
 
 
-def _part(controller: Controller) -> str:
-    """Return the name of the volume of the part under the hand."""
-    session, part = controller.session, controller.widgets.part
+def _checked_part(controller: Controller, part: str | None) -> str:
+    """Return *part* if it has a volume."""
+    session = controller.session
     if not session.is_bound:
         raise SessionError("The mesh is not ready yet. Wait until it is prepared")
     if part is None:
@@ -429,6 +449,76 @@ def _part(controller: Controller) -> str:
     if part not in session.deformer.volume_names:
         raise ConstraintError(f"{session.volume_label(part)} encloses no volume")
     return part
+
+
+# What the menu of the right button does at a place.
+
+
+def resetting(region: int) -> Action:
+    """Return the action that moves a region back to rest, while the others follow."""
+
+    def reset_part(controller: Controller) -> None:
+        controller.session.reset_region(region)
+        controller.say(f"Reset {controller.session.region_name(region)}")
+
+    return reset_part
+
+
+def pinning(vertex: int) -> Action:
+    """Return the action that pins a vertex, or removes the handle there."""
+
+    def pin(controller: Controller) -> None:
+        controller.widgets.puller.toggle_pin(vertex)
+        controller.say(controller.widgets.puller.remark)
+
+    return pin
+
+
+def framing(spot: Spot) -> Action:
+    """Return the action that frames the part at *spot*."""
+    return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
+
+
+# Saved poses.
+
+
+def save_pose(controller: Controller) -> None:
+    """Save the current pose by a new name."""
+    name = controller.session.saved_poses.save()
+    controller.say(f"Saved {name}. F2 renames it in the list")
+
+
+def going_to(name: str) -> Action:
+    """Return the action that lets the mesh have a saved pose."""
+
+    def go(controller: Controller) -> None:
+        session = controller.session
+        saved, before = session.saved_poses, session.state
+
+        def show(after: State) -> None:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while the pose was being fitted. Try again")
+            session.history.step(f"go to {name}", after)
+
+        if saved.has_cages(name):
+            saved.apply(name)
+        else:
+            controller.start("Fitting the pose to other cages", lambda _: saved.applied(name), show)
+
+    return go
+
+
+def blending(first: str | None, second: str | None, share: float) -> Action:
+    """Return the action that shows a pose between two; moves of a slider are one undo step."""
+
+    def blend(controller: Controller) -> None:
+        session = controller.session
+        session.saved_poses.blend(first, second, share, max_steps=STEPS)
+        session.commit(blend_label(first, second), join=True)
+        if 0.0 < share < 1.0:  # the ends are as they were saved
+            _settle(controller)
+
+    return blend
 
 
 # Painting.

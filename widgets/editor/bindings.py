@@ -37,8 +37,8 @@ BINDINGS = (
     ),
     Binding("segment", ("g",), ALL, "Auto-segment", actions.segment),
     Binding("fit_cages", ("f",), ALL, "Fit cages", actions.fit_cages),
-    Binding("undo", ("z", "ctrl+z"), ALL, "Undo", actions.undo),
-    Binding("redo", ("y", "ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
+    Binding("undo", ("ctrl+z",), ALL, "Undo", actions.undo),
+    Binding("redo", ("ctrl+y", "ctrl+shift+z"), ALL, "Redo", actions.redo),
     Binding("reset_pose", ("home",), ALL, "Reset pose", actions.reset),
     Binding("finish", ("shift+f",), ALL, "Finish pose on the mesh", actions.finish),
     Binding("show_cages", ("c",), ALL, "Show cages in all modes", actions.toggle_cages),
@@ -104,9 +104,7 @@ BINDINGS = (
     Binding("paint_handle", ("d",), H, "Paint handle", actions.painting(Paint.HANDLE)),
     Binding("new_handle", ("a",), H, "New handle", actions.new_handle),
     Binding("next_handle", ("n", "tab"), H | D, "Next handle", actions.next_handle),
-    Binding(
-        "remove_handle", ("delete", "backspace"), H | D, "Remove handle", actions.remove_handle
-    ),
+    Binding("remove_handle", ("delete",), H | D, "Remove handle", actions.remove_handle),
     Binding(
         "convert_handle", ("m",), DRAGGING, "Convert pin to handle, or back", actions.convert_handle
     ),
@@ -147,7 +145,6 @@ BINDINGS = (
 
 # For users of Blender; the other actions have the same keys.
 _BLENDER: dict[str, tuple[str, ...]] = {
-    "undo": ("ctrl+z",),
     "redo": ("ctrl+shift+z", "ctrl+y"),
     "reset_pose": ("alt+g", "alt+r"),
     "show_cages": ("k",),
@@ -194,10 +191,10 @@ def keys_of(choice: KeyChoice | Keys) -> Keys:
         if not found:
             names = " or ".join(map(repr, PRESETS))
             raise ArgumentError(f"keys must be {names}, or a mapping; got {shown(choice)}")
-        return Keys(BINDINGS, found[0])
+        return Keys(BINDINGS, found[0], blenders=_BLENDER)
     if not isinstance(choice, Mapping):
         raise ArgumentError(f"keys must be a preset or a mapping; got {shown(choice)}")
     changes = {name: (keys,) if isinstance(keys, str) else keys for name, keys in choice.items()}
     for keys in changes.values():
         require_sequence(keys, "keys")
-    return Keys(BINDINGS, changes)
+    return Keys(BINDINGS, changes, blenders=_BLENDER)

@@ -9,6 +9,8 @@ Long because every widget, job and file meets here.
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +24,7 @@ from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, lo
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
 
-from ..scene import Draft, View, Widget
+from ..scene import Draft, Pointer, View, Widget
 from .camera import Camera, has_y_up
 from .finishing import Finishing
 from .help_card import HelpCard
@@ -34,9 +36,10 @@ from .preparing import Preparing
 from .queue import Kind, Queue, Task
 from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
 from .session_history import SessionHistory
-from .widget_set import Mode, WidgetSet
+from .widget_set import Mode, Spot, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
+_CLICK = 0.3  # seconds; a longer press holds a button
 _REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
 T = TypeVar("T")
 
@@ -65,6 +68,10 @@ class Controller:
         The card with the keys.
     show_keys : callable
         Shows the keys or hides them: on the card, unless a toolkit has something better.
+    show_menu : callable
+        ``show_menu(pointer)`` shows the menu of what is at `spot`; by default nothing.
+    spot : Spot or None
+        What the last right click was on; None beside the mesh.
     messages : Messages
         The status line.
     notices : Notices
@@ -82,6 +89,8 @@ class Controller:
         self.view, self.keys = view, keys
         self.help = HelpCard(view, keys.sections(), keys.sections(Mode.PULL))
         self.show_keys: Callable[[], object] = self.help.toggle
+        self.show_menu: Callable[[Pointer], object] = lambda _: None
+        self.spot: Spot | None = None
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
@@ -89,6 +98,7 @@ class Controller:
         self._is_on = self._was_busy = False
         self._interrupted = False, False  # by turning off: settling, and finishing
         self._text_instead = self._unmoved = ""
+        self._held_at = -math.inf  # when the button that shows the mesh at rest was pressed
         self._began_at = 0  # the position in the history when the last gesture began
         self.queue = Queue(view, self._queue_changed)
         self._preparing = Preparing(self.queue, self._may_accept, self._accept, self._prepare_pulls)
@@ -101,6 +111,8 @@ class Controller:
         )
         self.widgets = WidgetSet(view, session)
         self.camera = Camera(view, self.widgets, self.help)
+        self.camera.navigation.right_clicked = self._open_menu
+        self.camera.navigation.middle_orbits = keys.middle_orbits
         self._listen()
         self.notices.follow(session)
         self.file = SessionFile(Path("session.segdeform"), session)
@@ -137,6 +149,7 @@ class Controller:
     def list_keys(self) -> None:
         """List the current keys on the help card, in a small window those of the mode."""
         keys = self.keys
+        self.camera.navigation.middle_orbits = keys.middle_orbits
         self.help.list_keys(keys.sections(), keys.sections(self._mode))
 
     @property
@@ -249,6 +262,17 @@ class Controller:
     def shows_rest(self) -> bool:
         """Whether the mesh at rest is shown instead of the current pose."""
         return self.widgets.surface.instead is self.session.mesh.vertices
+
+    def hold_rest(self, held: bool) -> None:
+        """Show the mesh at rest while a button is *held*; a click keeps it until the next one."""
+        if held:
+            self._held_at = -math.inf if self.shows_rest else time.monotonic()
+            self.show_instead(self.session.mesh.vertices, "The mesh at rest, while held")
+        elif time.monotonic() - self._held_at > _CLICK:
+            self.show_instead(None)
+        else:
+            text = "The mesh at rest. Press on it, or Before/After again, to see the pose"
+            self.show_instead(self.session.mesh.vertices, text)
 
     def show_instead(self, vertices: FloatArray | None, text: str = "") -> None:
         """Show *vertices* (n, 3) without widgets, and *text*; or None for the current pose."""
@@ -574,7 +598,13 @@ class Controller:
         self._edit(session)
         self._apply_mode()
 
+    def _open_menu(self, pointer: Pointer) -> None:
+        if not self.is_busy:
+            self.spot = self.widgets.spot_at(pointer)
+            self.show_menu(pointer)
+
     def _edit(self, session: Session) -> None:
+        self.spot = None
         self.widgets = self.widgets.replaced_by(session)
         self.camera.follow(self.widgets)
         self._stop_listening()

@@ -301,6 +301,10 @@ class DeformEditor:
         self._controller.show_instead(None)
 
     def _type(self, key: str) -> None:
+        if self._controller.camera.navigation.is_dragging and key not in self.keys["cancel"].keys:
+            # Keys of a drag, after a press that has missed: they would undo, or change the mode.
+            self._controller.say("Nothing is grabbed: the drag moves the camera, and keys wait")
+            return
         binding = self.keys.binding_of(key, self.mode)
         if binding is not None and binding.action is not None:
             self._do(binding.action, binding.while_busy)
@@ -322,7 +326,8 @@ class DeformEditor:
         controller.messages.clear()
         if not while_busy:
             controller.queue.hurry(Kind.SAVE)
-        self._stop_waiting()
+        if action is show_rest:
+            self._stop_waiting()  # its key repeats
         is_edit = not while_busy and action is not show_rest
         if is_edit:  # the camera may move around the mesh at rest
             controller.show_instead(None)

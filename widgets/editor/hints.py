@@ -115,7 +115,7 @@ def _part(widgets: WidgetSet, keys: Keys | None = None) -> str:
         return ""
     text = f"{brief(session.volume_label(part), volume_label((), part))} {change} %"
     text = text[:1].upper() + text[1:]
-    if keys is None or widgets.keeps_part:
+    if keys is None or widgets.keeps(widgets.part):
         return text
     return f"{text} · {keys.cap('keep_part')}: keep its volume"
 

@@ -10,6 +10,7 @@ import difflib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 from vtk_segdeform.checks import shown
@@ -33,10 +34,11 @@ _HEADINGS = {
     frozenset({P, C, D}): "0 Pull, 2 Cages, 4 Deform",
 }
 # How the mouse moves the camera; see `scene.navigation`.
-MOUSE = [
+_MOUSE = [
     ("Alt+drag", "Orbit; beside the mesh without Alt"),
     ("Middle drag", "Pan"),
     ("Right drag", "Zoom"),
+    ("Right click", "Menu of this part (Qt, browser)"),
     ("Wheel", "Zoom to the pointer"),
     ("Double click", "Frame this part, or all"),
 ]
@@ -111,6 +113,8 @@ class Keys:
         The table.
     changes : mapping of str to sequence of str, optional
         Other keys for some of its actions, by their names.
+    blenders : mapping of str to sequence of str, optional
+        The changes that Blender's users make; with most of them the middle button orbits, too.
 
     Raises
     ------
@@ -119,7 +123,11 @@ class Keys:
     """
 
     def __init__(
-        self, bindings: Iterable[Binding], changes: Mapping[str, Sequence[str]] | None = None
+        self,
+        bindings: Iterable[Binding],
+        changes: Mapping[str, Sequence[str]] | None = None,
+        *,
+        blenders: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         table = tuple(bindings)
         names = [b.name for b in table if b.name]
@@ -131,6 +139,9 @@ class Keys:
         """The table with these keys, in its order."""
         self.changes = {b.name: own[b.name] for b in table if own.get(b.name, b.keys) != b.keys}
         """The keys that differ from those of the table, by action."""
+        shared = [name for name, keys in blenders.items() if own.get(name) == keys]
+        self.middle_orbits = 2 * len(shared) > len(blenders)
+        """Whether a middle drag orbits, as in Blender, and pans with Shift; else it pans."""
         self._by_name = {b.name: b for b in self.bindings if b.name}
         self._require_distinct()
 
@@ -138,6 +149,14 @@ class Keys:
         """Return the binding of the action *name*; ArgumentError if there is none."""
         _require_action(name, self._by_name, "name")
         return self._by_name[name]
+
+    @property
+    def mouse(self) -> list[tuple[str, str]]:
+        """How the mouse moves the camera, for users."""
+        if not self.middle_orbits:
+            return _MOUSE
+        orbit = "Middle drag  Alt+drag", _MOUSE[0][1]
+        return [orbit, ("Shift+middle drag", "Pan"), *_MOUSE[2:]]
 
     def cap(self, name: str) -> str:
         """Return the first key of the action *name* for users, or else the label of the action."""
@@ -156,7 +175,7 @@ class Keys:
     def sections(self, mode: Mode | None = None) -> list[Section]:
         """Return the table for users, of *mode* or all, by modes; without actions without keys."""
         sections: dict[str, list[tuple[str, str]]] = {name: [] for name in _HEADINGS.values()}
-        sections[VIEW] = list(MOUSE)
+        sections[VIEW] = list(self.mouse)
         for b in self.bindings:
             listed = [key for key in b.keys if key not in _UNLISTED] or b.keys
             caps = "  ".join(map(key_cap, listed))

@@ -13,6 +13,8 @@ from collections.abc import Callable
 
 from vtk_segdeform.session import Session
 
+from .step_texts import step_texts
+
 _REPAIR = "repair"
 
 
@@ -46,8 +48,8 @@ class SessionHistory:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The labels of all states, the oldest first: of each, the step that led to it."""
-        first, *others = [session.history.labels for session in self._linked]
+        """What led to each state, the oldest first; see `step_texts`."""
+        first, *others = map(step_texts, self._linked)
         return first + tuple(label for labels in others for label in labels[1:])
 
     @property

@@ -10,6 +10,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from contextlib import ExitStack
+from typing import NamedTuple
 
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.cages import suggested_size
@@ -43,6 +44,16 @@ class Mode(enum.Enum):
     """Paint fixed vertices and handles."""
     DEFORM = 4
     """Move and rotate handles."""
+
+
+class Spot(NamedTuple):
+    """What is at a place of the surface."""
+
+    vertex: int
+    region: int | None
+    """None if there are no regions."""
+    handle: str | None
+    """A handle, pin or pulled point."""
 
 
 class WidgetSet:
@@ -108,11 +119,10 @@ class WidgetSet:
         ids = session.handles[name]
         return f"region {regions.label_at(pulls.middle_vertex(session.mesh, ids))}"
 
-    @property
-    def keeps_part(self) -> bool:
-        """Whether the volume of `part` is preserved or set."""
+    def keeps(self, part: str | None) -> bool:
+        """Return whether the volume called *part* is preserved or set."""
         options = self.session.options
-        goal = dict(options.volumes).get(self.part or "")
+        goal = dict(options.volumes).get(part or "")
         return options.preserve_region_volumes if goal is None else goal != "free"
 
     def choose_region(self, region: int) -> None:
@@ -207,17 +217,29 @@ class WidgetSet:
         hit = self._picker.hit(pointer)
         return None if hit is None else hit.point
 
+    def spot_at(self, pointer: Pointer) -> Spot | None:
+        """Return the vertex at *pointer*, with its region and handle; None beside the surface."""
+        hit, session = self._picker.hit(pointer), self.session
+        if hit is None:
+            return None
+        handles = (name for name, ids in session.handles.items() if hit.vertex in ids)
+        region = None if session.regions is None else session.regions.label_at(hit.vertex)
+        return Spot(hit.vertex, region, next(handles, None))
+
     def part_at(self, pointer: Pointer) -> FloatArray | None:
         """Return the vertices (k, 3) of the region at *pointer*, or else of the connected part.
 
         None beside the surface.
         """
-        hit, regions = self._picker.hit(pointer), self.session.regions
-        if hit is None:
-            return None
-        if regions is None:
-            return self.session.vertices[self._picker.component(hit.vertex)]
-        return self.session.vertices[regions.members(regions.label_at(hit.vertex))]
+        spot = self.spot_at(pointer)
+        return None if spot is None else self.part_of(spot)
+
+    def part_of(self, spot: Spot) -> FloatArray:
+        """Return the vertices (k, 3) of the region of *spot*, or else of the connected part."""
+        session = self.session
+        if session.regions is None or spot.region is None:
+            return session.vertices[self._picker.component(spot.vertex)]
+        return session.vertices[session.regions.members(spot.region)]
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""

@@ -17,19 +17,24 @@ plane.  A pin or pulled point is moved by a pull, so that the pose around it is 
 Each move solves once for the current position of the pointer.  While the pointer
 rests, and after the release, a timer refines the pose until it has converged; this is part of the
 same undo step.
+
+Long because one widget moves its handle by the mouse, by keys and by numbers.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.arrays import FloatArray
-from vtk_segdeform.checks import as_flag, require
+from vtk_segdeform.arrays import FloatArray, is_number, is_whole
+from vtk_segdeform.checks import as_flag, require, shown
+from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.session import Change, Session, pulls, require_handle
 from vtk_segdeform.solver import Solution
@@ -43,6 +48,7 @@ from .handle_motion import Grip, Motion, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
+_LEAST_FACTOR = 1e-3
 _CLICK_TOLERANCE = 3.0  # pixels; smaller movements of a press on a handle do not move it
 
 
@@ -82,6 +88,7 @@ class HandleDragger(Widget):
         self._locked: frozenset[str] = frozenset()
         self._grabbed: Part | None = None  # the part of the running gesture
         self._constraint: Part | None = None  # set by keys during the gesture
+        self._motion: Motion | None = None  # of the running gesture
         self._entry = NumberEntry()  # of the running gesture
         self._live = LiveSolve(self.view, session, self.cancel)
         self._last_handles = session.handles  # to recognise a renamed handle
@@ -230,7 +237,7 @@ class HandleDragger(Widget):
         point = gizmo.centre if point is None else point
         step = step_of(session.mesh.diagonal)
         grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius, step)
-        motion = self._motion_of(part, grip, press)
+        motion = self._motion = self._motion_of(part, grip, press)
         self._grabbed, self._constraint = part, None
         entry = self._entry = NumberEntry()
         move = self._mover(name)
@@ -246,6 +253,7 @@ class HandleDragger(Widget):
                     self._live.solve_through([move(stop) for stop in motion.stops(reached)])
                     sent = reached = 0.0
                     motion = self._motion_of(self._constraint or part, grip, press)
+                    self._motion = motion
                 matrix = entry.matrix(motion) if entry.text else motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
                 is_far = distance > tolerance or bool(entry.text)
@@ -260,12 +268,82 @@ class HandleDragger(Widget):
                 session.commit(f"{'rotate' if part.kind is Kind.ROTATION else 'drag'} {name}")
                 committed = True
         finally:
-            self._grabbed = None
+            self._grabbed = self._motion = None
             gizmo.set_caption("")
             gizmo.show_only(None)
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
             self._live.resume()
+
+    @property
+    def shift(self) -> FloatArray:
+        """(3,) float: how far the targets of the active handle are from rest, on average.
+
+        ConstraintError without an active handle; so do the methods that move it.
+        """
+        name, session = str(self._handle), self.session
+        require_handle(session.handles, name)
+        return np.asarray(
+            (session.targets[name] - session.mesh.vertices[session.handles[name]]).mean(axis=0)
+        )
+
+    @property
+    def angles(self) -> FloatArray:
+        """(3,) float: by how many degrees the running drag has turned about x, y and z."""
+        motion, angles = self._motion, np.zeros(3)
+        if motion is not None and motion.part.axis is not None:
+            angles[motion.part.axis] = np.degrees(motion.turn)
+        return angles
+
+    def shift_to(self, axis: int, amount: float) -> None:
+        """Move the active handle along x, y or z, *axis* 0 to 2, until its `shift` is *amount*."""
+        axis = _checked_axis(axis)
+        _require_number(amount, "amount")
+        matrix = np.eye(4)
+        matrix[axis, 3] = amount - self.shift[axis]
+        self._apply("drag", [matrix])
+
+    def rotate(self, axis: int, degrees: float) -> None:
+        """Rotate the active handle about its pivot by *degrees*, about *axis* 0 to 2 of its gizmo.
+
+        A turn of more than 90 degrees stops on its way, as the solver turns the shorter way.
+        """
+        axis = _checked_axis(axis)
+        _require_number(degrees, "degrees")
+        count = max(1, math.ceil(abs(degrees) / 90.0))
+        direction = self._axes[axis]
+        turns = [
+            Rotation.from_rotvec(np.radians(degrees * k / count) * direction).as_matrix()
+            for k in range(1, count + 1)
+        ]
+        self._apply("rotate", [self._about_pivot(R) for R in turns])
+
+    def scale(self, factor: float) -> None:
+        """Scale the active handle about its pivot by a positive *factor*."""
+        _require_number(factor, "factor", least=_LEAST_FACTOR)
+        self._apply("scale", [self._about_pivot(factor * np.eye(3))])
+
+    def _about_pivot(self, linear: FloatArray) -> FloatArray:
+        """Return the map (4, 4) with a *linear* part (3, 3) that keeps the pivot."""
+        pivot, matrix = self.session.handles.pivot(str(self._handle)), np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = linear, pivot - linear @ pivot
+        return matrix
+
+    def _apply(self, verb: str, stops: list[FloatArray]) -> None:
+        """Move the active handle by the last of *stops* (4, 4), through the others, in one step."""
+        session, name = self.session, str(self._handle)
+        require_handle(session.handles, name)
+        self.finish()
+        session.commit()
+        self._live.pause()
+        self._invoke("StartInteractionEvent")
+        try:
+            move = self._mover(name)
+            self._live.solve_through([move(matrix) for matrix in stops[:-1]])
+            self._live.solve(move(stops[-1]))
+            session.commit(f"{verb} {name}")
+        finally:
+            self._invoke("EndInteractionEvent")
 
     def _mover(self, name: str) -> Callable[[FloatArray], Callable[..., Solution]]:
         """Return what moves the handle *name* by a matrix (4, 4) since now."""
@@ -373,8 +451,24 @@ class HandleDragger(Widget):
         if name is None or not is_shown or self._is_out_of_reach(name):
             self.gizmo.place(None)
             return
-        ids = session.handles[name]
-        axes = np.eye(3)
-        if self._local:
-            axes = rigid_fit(session.mesh.vertices[ids], session.targets[name])[0].T
-        self.gizmo.place(session.handles.pivot(name), axes)
+        self.gizmo.place(session.handles.pivot(name), self._axes)
+
+    @property
+    def _axes(self) -> FloatArray:
+        """The axes of the active handle, (3, 3) as rows."""
+        if not self._local:
+            return np.eye(3)
+        session, name = self.session, str(self._handle)
+        return rigid_fit(session.mesh.vertices[session.handles[name]], session.targets[name])[0].T
+
+
+def _checked_axis(axis: int) -> int:
+    if not is_whole(axis, 0, 2):
+        raise ArgumentError(f"axis must be 0, 1 or 2; got {shown(axis)}")
+    return int(axis)
+
+
+def _require_number(value: float, name: str, *, least: float = -math.inf) -> None:
+    if not is_number(value, least):
+        bound = "" if least == -math.inf else f" of at least {least:g}"
+        raise ArgumentError(f"{name} must be a number{bound}; got {shown(value)}")

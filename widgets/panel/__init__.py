@@ -1,6 +1,7 @@
 """The panel of the editor without a toolkit: what it shows, and what its controls do.
 
     sections(editor)                  the boxes of the present mode, with fields and tables
+    menu(editor)                      the menu of the right button
     toolbar(editor)                   the buttons that are the same in every mode
     status(editor)                    the message, the next step, progress
     history(editor)                   the states by name
@@ -13,9 +14,10 @@ The files, in reading order:
 
     fields      what fields, tables and sections are
     panel       `sections` and `press`
-    pulling handles options volumes regions painting
+    pulling handles motion poses options volumes regions painting
                 the sections
     toolbar     the toolbar and the menu about the view
+    menu        the menu of the right button
     status      the status, the history and the first steps
 """
 
@@ -34,6 +36,7 @@ from .fields import (
     Word,
     tooltip,
 )
+from .menu import menu
 from .panel import all_sections, press, sections
 from .status import first_steps, history, status
 from .toolbar import toolbar, view_entries
@@ -54,6 +57,7 @@ __all__ = [
     "all_sections",
     "first_steps",
     "history",
+    "menu",
     "press",
     "sections",
     "status",

@@ -123,6 +123,7 @@ class Table:
     multiple: bool = False
     """Whether several rows may be selected."""
     enabled: bool = True
+    visible: bool = True
     acts: Mapping[str, Callable[..., Action]] = field(
         default_factory=dict, compare=False, repr=False
     )
@@ -141,6 +142,8 @@ class Section:
     title: str
     items: tuple[Item, ...]
     visible: bool = True
+    advice: str = ""
+    """When one needs it; such a section is folded at first, and shows only this."""
 
     @property
     def fields(self) -> tuple[Field, ...]:

@@ -65,8 +65,7 @@ def handles_section(editor: DeformEditor) -> Section:
                 "Volume under a lid",
                 "Lists the volume of this part of the surface, under a lid, in the section Volumes",
                 value=handle in dict(session.state.parts),
-                enabled=exists and session.is_bound,
-                visible=mode is not Mode.PULL,
+                visible=exists and session.is_bound and mode is Mode.HANDLES,
                 act=lambda on: _with_volume(str(handle), on),
             ),
             Field(
@@ -75,8 +74,8 @@ def handles_section(editor: DeformEditor) -> Section:
                 "Fixed part slides in its plane",
                 "Fixed vertices may move along the plane nearest to them, as a base on a plate",
                 value=bool(session.state.slides),
-                enabled=bool(session.state.slides) or len(session.fixed) > 0,
-                visible=mode is not Mode.PULL,
+                visible=(bool(session.state.slides) or len(session.fixed) > 0)
+                and mode is Mode.HANDLES,
                 act=lambda on: lambda controller: controller.session.slide_fixed(on),
             ),
             (
@@ -97,8 +96,7 @@ def handles_section(editor: DeformEditor) -> Section:
                     "Rotate about the centre of the handle again. "
                     "Shift+drag on the ball moves the pivot",
                     "pivot",
-                    enabled=handle in session.state.pivots,
-                    visible=mode is Mode.DEFORM,
+                    visible=mode is Mode.DEFORM and handle in session.state.pivots,
                     act=lambda _: actions.reset_pivot,
                 ),
             ),

@@ -102,7 +102,7 @@ def deform_section(editor: DeformEditor) -> Section:
                     "Per region",
                     "Preserve the volume of each region as well",
                     value=options.preserve_region_volumes and has_volume,
-                    enabled=has_volume,
+                    visible=has_volume,
                     act=option("preserve_region_volumes"),
                 ),
             ),
@@ -116,22 +116,12 @@ def deform_section(editor: DeformEditor) -> Section:
                 act=lambda _: actions.toggle_overlay,
             ),
             Field(
-                "deform.lids",
-                "choice",
-                "Open parts",
-                "How the volume of open parts is preserved: Auto is under lids unless flat",
-                value=next(name for name, lids in _LIDS.items() if lids is options.lids),
-                enabled=not session.mesh.is_closed,
-                choices=_LIDS_LABELS,
-                act=lambda name: option("lids")(_LIDS[name]),
-            ),
-            Field(
                 "deform.range",
                 "number",
                 "Colour range",
                 "Local volume change at the ends of the colour scale",
                 value=None if share is None else 100.0 * share,
-                enabled=widgets.overlay_wanted,
+                visible=widgets.overlay_wanted,
                 maximum=1000.0,
                 step=5.0,
                 decimals=1,
@@ -139,6 +129,37 @@ def deform_section(editor: DeformEditor) -> Section:
                 unit="%",
                 special="Auto",
                 act=_with_range,
+            ),
+            (
+                key_button(
+                    editor.keys,
+                    "deform.finish",
+                    "finish",
+                    "Finish pose",
+                    enabled=session.can_finish or session.can_finish_further,
+                ),
+                reset_button(editor, "deform.reset"),
+            ),
+        ),
+    )
+
+
+def advanced_section(editor: DeformEditor) -> Section:
+    """Return the options for deforming that most meshes do not need."""
+    session, options = editor.session, editor.session.options
+    return Section(
+        "advanced",
+        "Advanced",
+        (
+            Field(
+                "deform.lids",
+                "choice",
+                "Open parts",
+                "How the volume of open parts is preserved: Auto is under lids unless flat",
+                value=next(name for name, lids in _LIDS.items() if lids is options.lids),
+                visible=not session.mesh.is_closed,
+                choices=_LIDS_LABELS,
+                act=lambda name: option("lids")(_LIDS[name]),
             ),
             Field(
                 "deform.stretch",
@@ -180,17 +201,8 @@ def deform_section(editor: DeformEditor) -> Section:
                     act=_finishing_after_drags,
                 ),
             ),
-            (
-                key_button(
-                    editor.keys,
-                    "deform.finish",
-                    "finish",
-                    "Finish pose",
-                    enabled=session.can_finish or session.can_finish_further,
-                ),
-                reset_button(editor, "deform.reset"),
-            ),
         ),
+        advice="For open meshes, contact, speed",
     )
 
 

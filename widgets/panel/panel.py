@@ -14,8 +14,11 @@ from vtk_segdeform.errors import ArgumentError
 from ..editor import DeformEditor, Mode, jumping_to, preview
 from .fields import Field, Item, Section, Table
 from .handles import handles_section
-from .options import cages_section, deform_section
+from .menu import menu
+from .motion import motion_section
+from .options import advanced_section, cages_section, deform_section
 from .painting import painting_section
+from .poses import poses_section
 from .pulling import pull_section
 from .regions import regions_section
 from .status import history, status
@@ -26,11 +29,14 @@ from .volumes import bodies_section, volumes_section
 _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (pull_section, {Mode.PULL}),
     (handles_section, {Mode.PULL, Mode.HANDLES, Mode.DEFORM}),
+    (motion_section, {Mode.DEFORM}),
+    (poses_section, {Mode.PULL, Mode.DEFORM}),
     (cages_section, {Mode.CAGES}),
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
     (bodies_section, {Mode.PULL, Mode.DEFORM}),
     (regions_section, {Mode.REGIONS, Mode.CAGES, Mode.DEFORM}),
+    (advanced_section, {Mode.DEFORM}),
     (painting_section, {Mode.REGIONS, Mode.HANDLES}),
 )
 _NUMBERS = ("number", "integer", "slider")
@@ -100,6 +106,9 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
             return _use(editor, field, value, is_shown=True)
     if editor.is_busy:  # the job owns the session
         return None
+    for entry in menu(editor):
+        if entry is not None and entry.name == name:
+            return _use(editor, entry, value, is_shown=True)
     table_name, _, verb = name.rpartition(".")
     for section in _one_by_one(editor):
         for field in section.fields:
@@ -108,7 +117,7 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
         for table in section.tables:
             if table.name == table_name and verb in table.acts:
                 arguments = _arguments(table, verb, value)
-                works = section.visible and table.enabled
+                works = section.visible and table.visible and table.enabled
                 return editor.do(table.acts[verb](*arguments)) if works else None
     raise ArgumentError(f"name: there is no control {shown(name)} in the panel")
 

@@ -52,7 +52,7 @@ def pull_section(editor: DeformEditor) -> Section:
                 preserve_toggle(editor, "pull.preserve"),
             ),
             (
-                key_button(keys, "pull.unpin", "remove_pins", enabled=bool(puller.marked)),
+                key_button(keys, "pull.unpin", "remove_pins", visible=bool(puller.marked)),
                 reset_button(editor, "pull.reset"),
             ),
         ),
@@ -77,7 +77,7 @@ def preserve_toggle(editor: DeformEditor, name: str) -> Field:
         "Preserve the enclosed volume exactly",
         "preserve_volume",
         value=editor.session.options.preserve_volume and has_volume,
-        enabled=has_volume,
+        visible=has_volume,
         act=lambda _: actions.toggle_volume,
     )
 

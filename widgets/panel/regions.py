@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vtk_segdeform.pictures import of_region
+from vtk_segdeform.session import Session
 
 from ..editor import Action, Controller, DeformEditor, Mode, actions
 from ..volume_overlay import in_tenths
@@ -66,10 +67,10 @@ def regions_section(editor: DeformEditor) -> Section:
                 "choice",
                 "Stiffness",
                 "How much stiffer the selected regions are; rigid ones keep their shape",
-                value=_stiffness(editor, existing),
+                value=stiffness_of(editor.session, existing),
                 enabled=bool(existing),
                 choices=STIFFNESS,
-                act=lambda times: _stiffening(existing, times),
+                act=lambda times: stiffening(existing, times),
             ),
             (
                 key_button(keys, "regions.new", "new_region", "New", visible=painting),
@@ -97,9 +98,9 @@ def regions_section(editor: DeformEditor) -> Section:
     )
 
 
-def _stiffness(editor: DeformEditor, chosen: list[int]) -> str:
+def stiffness_of(session: Session, chosen: list[int]) -> str:
     """Return the choice that fits the stiffness of the *chosen* regions best."""
-    stiffness, regions = editor.session.state.stiffness, editor.session.regions
+    stiffness, regions = session.state.stiffness, session.regions
     if stiffness is None or regions is None or not chosen:
         return "1"
     median = float(np.median(stiffness[np.isin(regions.labels, chosen)]))
@@ -109,7 +110,7 @@ def _stiffness(editor: DeformEditor, chosen: list[int]) -> str:
     )
 
 
-def _stiffening(chosen: list[int], times: str) -> Action:
+def stiffening(chosen: list[int], times: str) -> Action:
     """Return the action that makes the *chosen* regions so many *times* as stiff as others."""
 
     def stiffen(controller: Controller) -> None:

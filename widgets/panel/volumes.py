@@ -94,7 +94,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                     f"Keep {_short(session, part) if part else 'region'}",
                     "Keeps the volume of the region of the pulled point or active handle",
                     "keep_part",
-                    value=has_part and editor.widgets.keeps_part,
+                    value=has_part and editor.widgets.keeps(part),
                     enabled=has_part,
                     act=lambda _: actions.keep_part,
                 ),
@@ -116,6 +116,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 act=lambda axis: option("symmetry")(None if axis == "none" else axis),
             ),
         ),
+        advice="To keep or set volumes, symmetry",
     )
 
 

@@ -274,7 +274,7 @@ class Puller(Widget):
                 elif to is None and motion.entry.text:
                     self.remark = _NO_DIRECTION
                 elif to is None and press.shift:
-                    self._toggle_pin(point.vertex)
+                    self.toggle_pin(point.vertex)
                 session.commit("pull")
                 committed = True
         finally:
@@ -293,7 +293,8 @@ class Puller(Widget):
             pass
         self.remark = remark
 
-    def _toggle_pin(self, vertex: int) -> None:
+    def toggle_pin(self, vertex: int) -> None:
+        """Pin a vertex, or remove the pin or pulled point there; `remark` tells which."""
         session, before = self.session, self.effective_locality
         owners = [name for name, ids in session.handles.items() if vertex in ids]
         if owners:

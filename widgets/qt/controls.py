@@ -64,6 +64,22 @@ def highlighted(button: Any) -> Any:
     return button
 
 
+def folding_button(text: str, folded: Any) -> Any:
+    """Return a button with an arrow that shows the widget *folded* while it is down."""
+    button = tool_button(text)
+    button.setToolTip("Show or hide these options")
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+    button.setCheckable(True)
+
+    def fold(down: bool) -> None:
+        button.setArrowType(Qt.ArrowType.DownArrow if down else Qt.ArrowType.RightArrow)
+        folded.setVisible(down)
+
+    fold(False)
+    button.toggled.connect(fold)
+    return button
+
+
 class _WheelFilter(QtCore.QObject):
     """Lets the wheel scroll the panel over a field, unless the field has the focus."""
 

@@ -9,7 +9,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.errors import ArgumentError
 
-from ..editor import MOUSE, PRESETS, Keys, Mode, key_cap, key_name, keys_of
+from ..editor import PRESETS, Keys, Mode, key_cap, key_name, keys_of
 
 Qt = QtCore.Qt
 _KEYS, _ACTION, _MODES = range(3)
@@ -49,7 +49,8 @@ class KeysDialog(QtWidgets.QDialog):
         rows += [(b.keys, b.label, b.modes) for b in keys.bindings if not b.name]
         for own, label, modes in rows:
             QtWidgets.QTreeWidgetItem(self.table, [_caps(own), label, _where(modes)])
-        for button, label in MOUSE:
+        self._n_keys = len(rows)
+        for button, label in keys.mouse:
             QtWidgets.QTreeWidgetItem(self.table, [button, label, "All"])
         self.table.currentItemChanged.connect(lambda *_: self._select())
         self.key = QtWidgets.QKeySequenceEdit()
@@ -108,6 +109,9 @@ class KeysDialog(QtWidgets.QDialog):
     def _show(self) -> None:
         for row, name in enumerate(self._names):
             self.table.topLevelItem(row).setText(_KEYS, _caps(self.keys[name].keys))
+        for row, (button, label) in enumerate(self.keys.mouse, self._n_keys):
+            for column, text in ((_KEYS, button), (_ACTION, label)):
+                self.table.topLevelItem(row).setText(column, text)
 
     @property
     def _selected(self) -> str:

@@ -15,17 +15,19 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from qtpy import QtCore, QtWidgets
+from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.session import Change
 
 from ..editor import DeformEditor, Keys, key_cap
-from ..panel import all_sections, sections
+from ..panel import all_sections, menu, sections
+from ..scene import Pointer
 from .controls import shortcut, stopper, using
 from .history import HistoryPart
 from .sections import SectionBox
 from .status import StatusPart
 from .toolbar import Toolbar
+from .view_menu import context_menu
 
 Qt = QtCore.Qt
 _DELAY = 30  # milliseconds; longer than between two moves of a drag
@@ -89,6 +91,7 @@ class DeformPanel(QtWidgets.QWidget):
             editor.view.on_failure(lambda _: self.error.emit(editor.controller.messages.error)),
         ]
         self._stop_session: list[Callable[[], None]] = []
+        editor.controller.show_menu = self._show_menu
         self._follow()
         # Unsubscribe before Qt deletes the widgets.
         self.destroyed.connect(stopper(self._stops, self._stop_session))
@@ -122,8 +125,14 @@ class DeformPanel(QtWidgets.QWidget):
         """Unsubscribe from the editor and disable the panel, permanently."""
         stopper(self._stops, self._stop_session)()
         self._delay.stop()
+        self.editor.controller.show_menu = lambda _: None
         for each in (self, self.toolbar, self.status):
             each.setEnabled(False)
+
+    def _show_menu(self, _: Pointer) -> None:
+        """Show the menu of the right button at the pointer."""
+        fields, press = menu(self.editor), using(self.editor)
+        context_menu(self, fields, self.editor.keys, press).popup(QtGui.QCursor.pos())
 
     def _build(self) -> None:
         self._inside = QtWidgets.QWidget()

@@ -17,6 +17,7 @@ from .controls import (
     check_box,
     choice_box,
     column,
+    folding_button,
     form,
     highlighted,
     number_box,
@@ -44,6 +45,8 @@ class SectionBox(QtWidgets.QGroupBox):
     ----------
     controls : dict of str to QWidget
         The control of each field and table, by its name.
+    fold : QToolButton, optional
+        Shows the controls of a section with an advice while it is down.
     """
 
     def __init__(self, section: Section, press: Press) -> None:
@@ -57,12 +60,19 @@ class SectionBox(QtWidgets.QGroupBox):
         for is_form, group in groupby(section.items, key=_is_in_form):
             items = list(group)
             lines += [self._form(items)] if is_form else [self._line(item) for item in items]
+        if section.advice:
+            inside = QtWidgets.QWidget()
+            column(inside, *lines)
+            inside.layout().setContentsMargins(0, 0, 0, 0)
+            self.fold = folding_button(section.advice, inside)
+            lines = [self.fold, inside]
         column(self, *lines)
 
     def draw(self, section: Section, keys: Keys) -> None:
         """Show *section*, with *keys* in the tooltips."""
         for table in section.tables:
             self.controls[table.name].draw(table)
+            self.controls[table.name].setVisible(table.visible)
         for field in section.fields:
             control, now = self.controls[field.name], (field, tooltip(field, keys))
             before = self._drawn.get(field.name)

@@ -22,7 +22,6 @@ from .view_menu import add_view_entries
 Qt = QtCore.Qt
 _SESSIONS = "Sessions (*.segdeform)"
 _HEIGHT = 32  # pixels of a row
-_CLICK = 300  # milliseconds; a longer press holds a button
 
 
 class Toolbar(QtWidgets.QWidget):
@@ -46,7 +45,6 @@ class Toolbar(QtWidgets.QWidget):
     def __init__(self, editor: DeformEditor, press: Press) -> None:
         super().__init__()
         self._editor, self._press = editor, press
-        self._since, self._was_held = QtCore.QElapsedTimer(), False
         self.asking: dict[str, Callable[[], object]] = {
             "open": self.ask_and_open,
             "save.session": self.save_session,
@@ -110,25 +108,15 @@ class Toolbar(QtWidgets.QWidget):
         elif field.kind == "file":
             button.clicked.connect(self._asker(name))
         elif field.kind == "hold":
-            button.pressed.connect(lambda: self._hold(name))
-            button.released.connect(lambda: self._release(name))
+            button.pressed.connect(lambda: press(name, True))
+            button.released.connect(lambda: press(name, False))
+            button.clicked.connect(self.refresh)  # down while the mesh at rest is shown
             highlighted(button)
         else:
             button.clicked.connect(lambda: press(name))
         if field.value is not None and field.kind == "button":
             self._modes.addButton(highlighted(button))
         return button
-
-    def _hold(self, name: str) -> None:
-        """Show the mesh at rest; a click keeps it until the next one."""
-        self._was_held = self._editor.controller.shows_rest
-        self._since.start()
-        self._press(name, True)
-
-    def _release(self, name: str) -> None:
-        if self._was_held or self._since.elapsed() > _CLICK:
-            self._press(name, False)
-        self.refresh()
 
     def _asker(self, name: str) -> Callable[[], None]:
         def ask() -> None:

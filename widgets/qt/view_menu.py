@@ -1,14 +1,17 @@
-"""Menu entries for what is shown and for the camera: views, up axis, projection, cube."""
+"""Menus of the models: of the right button, and what is shown, with the views of the camera."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from qtpy import QtWidgets
+
 from ..editor import DeformEditor, Keys, key_cap, keys_of
 from ..panel import Field, view_entries
 from .controls import using
 
+_Use = Callable[[str], object]
 _DEFAULT = keys_of("pyvista")
 # The letters that select entries while the menu is open.
 _LETTERS = {
@@ -45,6 +48,16 @@ def add_view_entries(menu: Any, editor_of: Callable[[], DeformEditor | None]) ->
     menu.aboutToShow.connect(update)
 
 
+def context_menu(parent: Any, fields: Iterable[Field | None], keys: Keys, use: _Use) -> Any:
+    """Return a QMenu of *fields*, which calls *use* with the name of what is chosen."""
+    menu, entries = QtWidgets.QMenu(parent), dict[str, Any]()
+    fields = tuple(fields)
+    _add(menu, fields, entries, use)
+    _draw(entries, fields, keys)
+    menu.aboutToHide.connect(menu.deleteLater)
+    return menu
+
+
 def name_keys(entries: Iterable[tuple[Any, str, str]], keys: Keys) -> None:
     """Show beside each entry the first key of its action; *entries* are (entry, text, action)."""
     for entry, text, action in entries:
@@ -52,9 +65,7 @@ def name_keys(entries: Iterable[tuple[Any, str, str]], keys: Keys) -> None:
         entry.setText(f"{text}\t{key_cap(key[0])}" if key else text)
 
 
-def _add(
-    menu: Any, fields: Iterable[Field | None], entries: dict[str, Any], use: Callable[[str], object]
-) -> None:
+def _add(menu: Any, fields: Iterable[Field | None], entries: dict[str, Any], use: _Use) -> None:
     """Add the entries of *fields* to a menu and to *entries*, by their names."""
     for field in fields:
         if field is None:

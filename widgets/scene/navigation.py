@@ -1,8 +1,9 @@
 """The camera by mouse, alike in every host and every interactor style.
 
     Alt and left drag       orbit; beside the model without Alt
-    middle drag             pan; also Shift with one of the drags above
+    middle drag             pan, as Shift with one of the drags above; orbit with `middle_orbits`
     right drag              zoom; also Control with one of the drags above
+    right click             `Navigation.right_clicked`, which opens a menu
     wheel                   zoom to the pointer
     double click            frame the part under the pointer; beside the model, frame all
 
@@ -61,6 +62,13 @@ class Navigation:
         Returns an object that is another one after an edit.
     double_clicked : callable, optional
         Handles a double click at a pointer; if it returns False, the part there is framed.
+
+    Attributes
+    ----------
+    right_clicked : callable
+        ``right_clicked(pointer)``, called for a right click: a press without a drag.
+    middle_orbits : bool
+        Whether the middle button orbits, as the left one beside the model; else it pans.
     """
 
     def __init__(
@@ -80,6 +88,9 @@ class Navigation:
         self._button = ""
         self._last = np.zeros(2)
         self._click: tuple[float, Pointer, object] | None = None  # the last press
+        self.right_clicked: Callable[[Pointer], object] = lambda _: None
+        self.middle_orbits = False
+        self._right: Pointer | None = None  # the press of the right button
         self._draft = Draft.of(view)
         self._withheld: list[tuple[Any, int]] = []  # observers of styles, for one event
 
@@ -110,7 +121,7 @@ class Navigation:
     def Off(self) -> None:  # noqa: N802
         """Leave the camera to the interactor style."""
         self.viewpoint.finish()
-        self._move = self._click = None
+        self._move = self._click = self._right = None
         self._end_withholding()
         self._draft.end()
         for stop in self._stops:
@@ -145,9 +156,10 @@ class Navigation:
             return False
         self._withhold(f"{button}ButtonPressEvent")
         kind = {"Left": "orbit", "Middle": "pan", "Right": "zoom"}[button]
-        if button == "Left":
+        if button == "Left" or (button == "Middle" and self.middle_orbits):
             kind = "pan" if pointer.shift else "zoom" if pointer.control else "orbit"
         self._begin(pointer, button, kind, self._point_at(pointer))
+        self._right = pointer if button == "Right" else None
         return False
 
     def _begin(self, pointer: Pointer, button: str, kind: str, point: FloatArray | None) -> None:
@@ -180,6 +192,11 @@ class Navigation:
         self._end_withholding()
         if button == self._button:
             self._move = None
+        pointer, press = self.view.pointer(Phase.RELEASE), self._right
+        if button == "Right" and press is not None:
+            self._right = None
+            if not press.alt and np.linalg.norm(pointer.position - press.position) <= _SAME_PLACE:
+                self.right_clicked(press)
         if button == "Left" and self._click is not None:
             moved = self.view.pointer(Phase.RELEASE).position - self._click[1].position
             if np.linalg.norm(moved) > _SAME_PLACE:

@@ -16,6 +16,7 @@ from vtk_segdeform.errors import ArgumentError
 from .. import panel
 from ..editor import DeformEditor
 from ..panel import Field
+from ..scene import Pointer
 from .touch import card_for_fingers, for_fingers
 
 _PERIOD = 0.1  # seconds between two refreshes, at least
@@ -46,6 +47,8 @@ class PageModel:
         self._editor, self._state, self._names = editor, state, names
         self._loop: asyncio.AbstractEventLoop | None = None
         self._is_due = False
+        self._place: tuple[float, float] | None = None  # of the open menu, as shares of the view
+        editor.controller.show_menu = self._open_menu
         cards = panel.first_steps()
         state.cards = _plain(cards)
         state.touch_cards = _plain(tuple(map(card_for_fingers, cards)))
@@ -76,6 +79,9 @@ class PageModel:
         self._show("toolbar", panel.toolbar(editor))
         self._show("sections", panel.sections(editor))
         self._show("history", panel.history(editor))
+        entries = () if self._place is None or editor.is_busy else panel.menu(editor)
+        self._show("menu", entries)
+        self._state["menu_place"] = self._place
         is_modified = editor.controller.is_modified
         stem = name.rpartition(".")[0] or name
         self._state["document"] = {"name": name, "stem": stem, "modified": is_modified}
@@ -84,11 +90,17 @@ class PageModel:
         self._state["help"] = {"keys": keys["help"].keys, "sections": [*keys.sections(), _OWN_KEYS]}
 
     def press(self, name: object, value: object = None) -> None:
-        """Use a control; see `panel.press`.  "hint" runs the action of a word of the hint."""
+        """Use a control; see `panel.press`.
+
+        "hint" runs the action of a word of the hint, and "menu" closes the menu of a right click.
+        """
         editor = self._editor
+        self._place = None  # any use of the page closes the menu
         with editor.view.guarded(), editor.view.drawing_once():
             try:
-                if name == "hint":
+                if name == "menu":
+                    pass
+                elif name == "hint":
                     words = panel.status(editor).words
                     if value in {word.action for word in words if word.action}:
                         editor.run(str(value))
@@ -98,6 +110,11 @@ class PageModel:
                 _log.info("a page pressed %r: %s", name, fault)
                 editor.controller.messages.report_error(fault)
                 editor.controller.refresh()
+        self.changed()
+
+    def _open_menu(self, pointer: Pointer) -> None:
+        width, height = self._editor.view.renderer.GetSize()
+        self._place = pointer.x / width, 1.0 - pointer.y / height
         self.changed()
 
     @property

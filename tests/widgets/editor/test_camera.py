@@ -15,6 +15,7 @@ from vtkmodules.vtkInteractionStyle import (
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.session import saved_view
 from vtk_segdeform.widgets import DeformEditor, Mode
+from vtk_segdeform.widgets.editor import PRESETS
 from vtk_segdeform.widgets.editor.actions import show_rest
 from vtk_segdeform.widgets.scene.view import View
 
@@ -107,6 +108,27 @@ def test_every_drag_moves_the_camera_in_every_mode_and_style(bench):
             bench.editor.controller.camera.viewpoint.home()
         assert bench.editor.session.state is before
         assert bench.hand.failures == []
+
+
+def test_with_blenders_keys_the_middle_button_orbits_and_pans_with_shift(bench):
+    def turned():
+        before = bench.view.view_direction
+        bench.drag("Middle", bench.middle)
+        return bool(np.linalg.norm(bench.view.view_direction - before) > 1e-3)
+
+    assert not turned()  # it pans
+    bench.editor.keys = PRESETS["Blender"] | {"segment": "f5"}
+    assert turned()
+    assert ("Shift+middle drag", "Pan") in bench.editor.keys.mouse
+    place = bench.middle
+    before, direction = bench.camera, bench.view.view_direction
+    bench.hand.event("MiddleButtonPressEvent", place, shift=True)
+    bench.hand.move(place + [20, 8], shift=True)
+    bench.hand.event("MiddleButtonReleaseEvent", place + [20, 8], shift=True)
+    assert np.abs(bench.view.view_direction - direction).max() < 1e-9
+    assert np.abs(bench.camera[1] - before[1]).max() > 1e-3 * bench.mesh.diagonal
+    bench.editor.keys = {"undo": "alt+z"}
+    assert not turned()
 
 
 def test_the_wheel_zooms_to_the_pointer_within_limits(bench):

@@ -165,12 +165,12 @@ def test_the_whole_story(tmp_path):
 
     steps = 0
     while bench.session.history.can_undo:
-        bench.type("z")
+        bench.type("ctrl+z")
         steps += 1
     assert steps == 7  # regions, brush, cages, fixed, handle, drag, turn
     assert bench.session.regions is None
     assert_array_equal(bench.editor.widgets.surface.points, mesh.vertices)
-    bench.type(*["ctrl+y", "ctrl+shift+z"] * 3, "y")
+    bench.type(*["ctrl+y", "ctrl+shift+z"] * 3, "ctrl+y")
     assert not bench.session.history.can_redo
     assert_array_equal(bench.session.vertices, turned)
     assert not bench.session.state.changes(replace(marked, pose=bench.session.state.pose))
@@ -309,6 +309,45 @@ def test_a_held_key_shows_the_mesh_at_rest_and_its_release_the_pose(bench):
     assert_array_equal(surface.points, posed)
 
 
+def test_a_tap_on_the_key_of_the_mesh_at_rest_ends_with_it_whatever_follows(bench):
+    bench.editor.mode = Mode.DEFORM
+    bench.settle()
+    bench.session.move_handle("handle 1", np.eye(4) + 0.1 * np.eye(4, k=3))
+    bench.session.commit()
+    bench.settle()
+    bench.hand.event("KeyPressEvent", key="backslash")
+    assert "at rest, while held" in bench.editor.status
+    bench.hand.event("KeyReleaseEvent", key="backslash")
+    bench.type("comma")  # before the release is known to be no repetition
+    bench.hand.tick(3)
+    assert bench.editor.widgets.surface.instead is None
+
+
+@pytest.mark.parametrize("preset", ["pyvista", "Blender"])
+@pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
+def test_no_key_edits_anything_after_a_press_beside_the_mesh(bench, mode, preset):
+    editor, session = bench.editor, bench.session
+    editor.keys = preset
+    editor.mode = mode
+    bench.settle()
+    session.handles.set_pivot("handle 1", session.mesh.vertices[0])
+    session.handles.set_pivot("handle 1", session.mesh.vertices[1])
+    session.undo()
+    selector = editor.widgets.selector
+    before = session.state, session.history.labels, session.options, selector.tool, selector.paints
+    bench.hand.press((4, 4))
+    bench.hand.move((9, 6))
+    for key in sorted({key for binding in editor.keys.bindings for key in binding.keys}):
+        if key != "escape":
+            bench.hand.types(key)
+            assert "Nothing is grabbed" in editor.status or key.startswith("bracket"), key
+            editor.controller.messages.clear()
+    bench.hand.release((9, 6))
+    now = session.state, session.history.labels, session.options, selector.tool, selector.paints
+    assert now == before
+    assert (editor.mode, editor.is_busy) == (mode, False)
+
+
 def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
     shaded, seen = bench.editor.widgets.surface.style, []
     for _ in SurfaceStyle:
@@ -348,7 +387,7 @@ def test_a_pose_that_new_cages_cannot_have_is_reset_and_that_is_said(bench, monk
     )
     bench.type("f")
     assert session.state.pose is None
-    assert "The pose was reset; Z brings it back" in bench.editor.status
+    assert "The pose was reset; Ctrl+Z brings it back" in bench.editor.status
 
 
 def test_a_stroke_paints_a_handle_once_something_is_fixed(bench):
@@ -386,14 +425,14 @@ def test_keys_select_the_target_of_painting(bench):
 
 
 def test_without_regions_painting_splits_the_mesh_into_the_stroke_and_the_rest(bare):
-    bare.type("g", "n", "n", "z")
+    bare.type("g", "n", "n", "ctrl+z")
     assert bare.session.regions is None
     bare.hand.click(bare.hand.at([-2.0, 0.0, 0.0]))
     everything, painted = bare.session.regions.membership
     assert everything.all()
     assert 0 < np.count_nonzero(painted) < len(painted)
     assert "region 2" in bare.editor.status
-    bare.type("g", "a", "z", "z")  # undo to a session without regions
+    bare.type("g", "a", "ctrl+z", "ctrl+z")  # undo to a session without regions
     assert "No regions yet" in bare.editor.status
     bare.hand.click(bare.hand.at([2.0, 0.0, 0.0]))
     assert bare.session.regions.n_regions == 2
@@ -431,7 +470,7 @@ def test_painting_a_region_in_a_pose_resets_it_and_says_so(bench):
     bench.type("1", "plus")
     assert bench.session.state.pose is None
     assert "Pose reset" in bench.editor.status
-    bench.type("z")
+    bench.type("ctrl+z")
     assert bench.session.state.pose is not None
     assert "Pose reset" not in bench.editor.status
 
@@ -441,9 +480,9 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
     size = np.count_nonzero(bench.session.regions.membership[0])
     bench.type("plus")
     assert np.count_nonzero(bench.session.regions.membership[0]) > size
-    bench.type("z", "minus")
+    bench.type("ctrl+z", "minus")
     assert np.count_nonzero(bench.session.regions.membership[0]) < size
-    bench.type("z")
+    bench.type("ctrl+z")
     hand.hover(hand.at([2.0, 0.0, 0.0]))  # on region 1
     bench.type("m")
     assert bench.session.regions.n_regions == 1
@@ -451,7 +490,7 @@ def test_regions_are_merged_split_grown_and_shrunk(bench):
     assert bench.session.regions.n_regions == 2
     bench.type("n")
     assert selector.region == 1
-    bench.type("z")
+    bench.type("ctrl+z")
     bench.type("n")
     assert selector.region == 0  # only one region is left
 
@@ -496,10 +535,10 @@ SAID = [
     ("c", "Cages shown"), ("c", "Cages hidden"), ("shift+g", "Regions shown"),
     ("shift+g", "Regions hidden"), ("w", "Shaded with edges"), ("w", "Wireframe"), ("w", "Shaded"),
     ("KP_5", "Orthographic"), ("KP_5", "Perspective"), ("p", "Volume preservation off"),
-    ("p", "Volume preservation on from the next move"), ("z", "Undo: volume preservation on"),
-    ("y", "Redo: volume preservation on"), ("v", "Brush: paint region 1 (X-ray)"),
+    ("p", "Volume preservation on from the next move"), ("v", "Brush: paint region 1 (X-ray)"),
     ("i", "The mesh is closed and exactly as given: nothing to show"),
-    ("v", "Visible surface only"), ("x", "Split region 1"), ("4", "No cages yet. Press F"),
+    ("v", "Visible surface only"), ("x", "Split region 1"), ("ctrl+z", "Undo: split region 1"),
+    ("ctrl+y", "Redo: split region 1"), ("4", "No cages yet. Press F"),
     ("l", "Axes: local"), ("l", "Axes: global"), ("Home", "Pose reset"),
     ("0", "Drag the surface. Shift-click pins. Shift+wheel: radius (5 %)"),
 ]  # fmt: skip
@@ -587,7 +626,7 @@ def test_resetting_the_pose_and_turning_volume_preservation_off(bench):
     assert abs(bench.session.volume_change) > 1e-6
 
 
-def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
+def test_z_constrains_while_a_handle_is_dragged_and_ctrl_z_undoes(bench):
     bench.type("4")
     before = bench.session.state
     handle = bench.session.handles["handle 1"]
@@ -601,7 +640,7 @@ def test_z_undoes_but_constrains_while_a_handle_is_dragged(bench):
     moved = bench.session.targets["handle 1"] - bench.session.mesh.vertices[handle]
     assert np.abs(moved[:, :2]).max() < 1e-9 < moved[:, 2].min()
     bench.hand.release((x + 20, y + 30))
-    bench.type("z")
+    bench.type("ctrl+z")
     assert not bench.session.state.changes(before)
 
 
@@ -679,7 +718,7 @@ def test_an_error_is_shown_until_an_action_succeeds(bench):
 
 def test_an_internal_error_is_shown_too(bench):
     bench.session.on_change(lambda change: 1 // 0)
-    bench.type("2", "z")
+    bench.type("2", "ctrl+z")
     assert "Nothing to undo" in bench.editor.status
     bench.type("p")
     assert "ZeroDivisionError" in bench.editor.status
@@ -934,7 +973,7 @@ def test_opening_asks_again_after_another_action(bench, tmp_path):
     first = bench.session
     bench.type("x", "ctrl+o", "n", "ctrl+o")
     assert bench.session is first
-    bench.type("z", "ctrl+o")  # the saved state: no unsaved changes
+    bench.type("ctrl+z", "ctrl+o")  # the saved state: no unsaved changes
     assert bench.session is not first
 
 

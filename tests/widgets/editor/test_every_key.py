@@ -51,7 +51,7 @@ def test_in_mid_drag(plain, mode, key):
 
 
 # One key of each kind: which entries of the table interrupt, the other two moments test.
-KINDS = {"escape", "z", "4", "g", "x", "ctrl+s", "shift+f"}
+KINDS = {"escape", "ctrl+z", "4", "g", "x", "ctrl+s", "shift+f"}
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.campaign)])

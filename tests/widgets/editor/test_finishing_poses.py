@@ -69,7 +69,7 @@ def test_a_pose_is_finished_after_each_drag(bench):  # noqa: F811
     first = bench.session.vertices
     pull_handle(bench, (-10, 12))
     until(bench, lambda: is_finished(bench))
-    bench.type("z")
+    bench.type("ctrl+z")
     assert np.array_equal(bench.session.vertices, first)
 
 
@@ -94,7 +94,7 @@ def test_the_next_press_and_escape_and_undo_cancel_it(bench, monkeypatch):  # no
     bench.type("escape")
     assert running.fraction is None
     begin()
-    bench.type("z")
+    bench.type("ctrl+z")
     assert running.fraction is None
     pull_handle(bench, (5, 8))
     bench.editor.controller.finishing.is_wanted = False
@@ -192,7 +192,7 @@ def test_what_ends_the_wait_saves_the_pose_as_it_is(bench, settling, tmp_path, c
     assert not bench.editor.path.exists()
     ends = {
         "escape": lambda: bench.type("escape"),
-        "undo": lambda: bench.type("z"),
+        "undo": lambda: bench.type("ctrl+z"),
         "press": lambda: pull_handle(bench, (5, 5)),
         "off": bench.editor.Off,
         "another mode": lambda: bench.type("3"),
@@ -292,9 +292,9 @@ def test_pulls_are_finished_and_add_up(bench):  # noqa: F811
         until(bench, lambda: is_finished(bench))
         assert bench.session.solution.handle_error < 1e-12
         poses.append(bench.session.vertices)
-    bench.type("z")
+    bench.type("ctrl+z")
     assert np.array_equal(bench.session.vertices, poses[0])
-    bench.type("y")
+    bench.type("ctrl+y")
     assert np.array_equal(bench.session.vertices, poses[1])
 
 

@@ -47,7 +47,7 @@ def editor():
 
 def test_states_are_named_and_a_jump_reaches_each(editor):
     controller = editor.controller
-    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
+    assert states_of(controller) == ("Opened", "Set tip", "Drag tip, 0.3")
     for position in (1, 0, 2):
         editor.do(jumping_to(position))
         assert editor.status.startswith(f"History: {states_of(controller)[position]}")
@@ -117,7 +117,7 @@ def test_another_step_in_place_of_a_repair_replaces_the_copies(editor, repaired)
     controller = editor.controller
     editor.do(jumping_to(1))
     editor.session.move_handle("tip", UP, max_steps=1)
-    assert states_of(controller) == ("Opened", "Set tip", "Drag tip")
+    assert states_of(controller) == ("Opened", "Set tip", "Drag tip, 0.3")
     assert controller.history.redo_label is None
     editor.session.revert()
     repaired.check(1)
@@ -166,7 +166,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
     hand.types("w")  # a key of the editor
     assert surface.instead is None
     assert shows_rest(0)
-    session.change_options(stretch=5.0)  # by a script
+    session.handles.set_pivot("tip", [0.0, 0.0, 0.0])  # by a script
     assert surface.instead is None
     np.testing.assert_array_equal(surface.points, end)
     session.move_handle("tip", UP, max_steps=1)
@@ -182,9 +182,7 @@ def test_a_preview_shows_another_state_until_anything_happens(editor):
 def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):
     session, controller, surface = editor.session, editor.controller, editor.widgets.surface
     posed = session.vertices
-    for k in range(3):
-        session.change_options(stretch=float(k + 2))  # only the last three are bound
-        session.bind()
+    session.change_options(stretch=3.0)  # with which they are not bound yet
     session.history.jump(0)
     assert session.poses.peek(session.history.state_at(2)) is None
     preview(controller, 2)

@@ -42,14 +42,14 @@ def test_every_action_has_a_name_and_every_preset_is_without_conflicts():
 
 
 KNOWN = """
-pull 0, regions 1, cages 2, handles 3, deform 4, segment g, fit_cages f, undo z ctrl+z,
-redo y ctrl+y ctrl+shift+z, reset_pose home, finish shift+f, show_cages c, preserve_volume p,
+pull 0, regions 1, cages 2, handles 3, deform 4, segment g, fit_cages f, undo ctrl+z,
+redo ctrl+y ctrl+shift+z, reset_pose home, finish shift+f, show_cages c, preserve_volume p,
 show_holes i, save ctrl+s, open ctrl+o, help h f1 question, cancel escape, brush b, lasso l,
 rectangle t, connected_part k, whole_region r, more_local plus equal, less_local minus,
 auto_locality a, remove_pins u, select_through v, grow plus equal, shrink minus,
 select_all ctrl+a, select_none ctrl+shift+a, invert ctrl+i, next_region n tab, new_region a,
 merge_region m, split_region x, paint_fixed s, paint_handle d, new_handle a, next_handle n tab,
-remove_handle delete backspace, convert_handle m, local_axes l, pivot v, show_volume_change o,
+remove_handle delete, convert_handle m, local_axes l, pivot v, show_volume_change o,
 style w, show_regions shift+g, before_after backslash, view_front kp_1, view_back ctrl+kp_1,
 view_right kp_3, view_left ctrl+kp_3, view_top kp_7, view_bottom ctrl+kp_7, view_home kp_0,
 projection kp_5, frame_selection period, frame_all comma, keep_part shift+p, grow_part e,
@@ -94,7 +94,7 @@ class Nameless:
 @pytest.mark.parametrize(
     ("choice", "message"),
     [
-        ({"undo": "y"}, "Y is assigned to both 'Undo' and 'Redo'"),
+        ({"undo": "ctrl+y"}, "Ctrl.Y is assigned to both 'Undo' and 'Redo'"),
         ({"grow": "["}, r"\[ is assigned to both 'Grow by one ring' and 'Smaller, larger brush'"),
         ({"und": "k"}, "no action 'und'; did you mean 'undo'"),
         ({"undo": "Ctrl+Foo Bar"}, "no such key as 'Ctrl.Foo Bar'"),
@@ -132,7 +132,7 @@ def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
     editor.keys = {"undo": "j", "next_handle": "Ctrl+J", "paint_handle": "f5", "finish": []}
     session = editor.session
     session.set_fixed([1, 2])
-    hand.key("z")
+    hand.key("z", control=True)
     assert len(session.fixed) == 2
     hand.key("j")
     assert len(session.fixed) == 0
@@ -145,6 +145,6 @@ def test_the_chosen_keys_act_and_are_named_in_hints_errors_and_help(editor):
     assert ("J", "Undo") in rows
     assert not any(label == "Finish pose on the mesh" for _, label in rows)
     with pytest.raises(ArgumentError):
-        editor.keys = {"undo": "y"}
+        editor.keys = {"undo": "ctrl+y"}
     assert editor.keys.cap("undo") == "J"
     assert editor.keys.cap("finish") == "Finish pose on the mesh"

@@ -123,7 +123,7 @@ def test_a_part_is_kept_by_a_key_through_later_pulls_and_set_free_again(bench):
     assert bench.session.options.volumes == ()
     assert not bench.field("keep_part").value
     assert_allclose(bench.session.vertices, before, atol=1e-3 * SCENE.mesh.diagonal)
-    bench.hand.types("z")
+    bench.hand.types("ctrl+z")
     assert bench.session.options.volumes == (("region 1", "keep"),)
 
 
@@ -136,7 +136,7 @@ def test_a_part_grows_by_a_fifth_of_its_volume_at_rest_at_each_press(bench):
         assert_allclose(bench.change(), change + 0.2 * count, atol=EXACT)
         assert abs(bench.session.volume_change) < EXACT
     assert bench.session.history.labels[steps:] == ("set the volume of arm",) * 2
-    bench.hand.types("z")
+    bench.hand.types("ctrl+z")
     assert_allclose(bench.change(), change + 0.2, atol=EXACT)
     assert press(bench.editor, "volumes.grow_part") is None
     assert_allclose(bench.change(), change + 0.4, atol=EXACT)

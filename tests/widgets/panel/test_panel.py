@@ -18,7 +18,7 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import segment
 from vtk_segdeform.session.state import State
-from vtk_segdeform.widgets.editor import Controller, preparing
+from vtk_segdeform.widgets.editor import Controller, controller, preparing
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
@@ -61,8 +61,8 @@ def full() -> Session:
     """Return a session with a step to undo and one to redo."""
     mesh, state = start()
     session = Session(mesh, state=state)
-    for share in (20.0, 30.0):
-        session.change_options(stretch=share)
+    for point in mesh.vertices[1:3]:
+        session.handles.set_pivot("handle 1", point)
     session.undo()
     return session
 
@@ -104,6 +104,8 @@ def another(field: Field) -> object:
         return not field.value
     if field.kind == "choice":
         return next((value for _, value in field.choices if value != field.value), field.value)
+    if field.name.startswith("motion."):
+        return field.value + 10.0 * field.step
     low = field.minimum
     high = min(field.maximum, low + 9.0 * abs(low) + 50.0 * field.step)
     value = round(low + 0.5 * (high - low), field.decimals)
@@ -144,6 +146,9 @@ def presses(editor: DeformEditor, name: str) -> None:
     now = of(editor, name).value
     if value is None:
         assert field.value is None or now is True
+        return
+    if name.startswith(("motion.rotate", "motion.scale")):  # by so much from now
+        assert now == field.value
         return
     near = 0.3 if name == "cages.detail" else 1e-12  # that is met only nearly
 
@@ -200,20 +205,26 @@ def test_controls_that_are_disabled_or_not_shown_do_nothing():
             assert (everything(editor), editor.session.state) == before
 
 
-def test_the_toolbar_and_the_menu_do_what_they_say():
+def test_the_toolbar_and_the_menu_do_what_they_say(monkeypatch):
     with editing(Mode.DEFORM) as editor:
         buttons = {field.name: field for field in toolbar(editor)}
         assert buttons["undo"].tip.startswith("Undo: ")
-        stretch = editor.session.options.stretch
+        pivots = editor.session.state.pivots
         assert press(editor, "undo") is None
-        assert editor.session.options.stretch != stretch
+        assert editor.session.state.pivots is not pivots
         editor.wait()
         press(editor, "redo")
         editor.wait()
-        assert editor.session.options.stretch == stretch
+        assert editor.session.state.pivots is pivots
+        for stays in (True, False):  # a click keeps the mesh at rest until the next one
+            press(editor, "compare", True)
+            assert status(editor).hint == "The mesh at rest, while held"
+            press(editor, "compare", False)
+            assert editor.controller.shows_rest is stays
+            assert ("Before/After again" in status(editor).hint) is stays
         press(editor, "compare", True)
-        assert editor.controller.shows_rest
-        press(editor, "compare", False)
+        monkeypatch.setattr(controller, "_CLICK", -1.0)
+        press(editor, "compare", False)  # after a longer press
         assert not editor.controller.shows_rest
         press(editor, "help")
         assert editor.controller.help.is_shown
@@ -323,18 +334,25 @@ def test_the_newest_pull_is_selected_or_the_one_that_is_pulled_again():
 
 def test_a_handle_is_a_part_whose_volume_is_listed_and_set():
     with editing(Mode.DEFORM) as editor:
-        press(editor, "handles.list.select", ["handle:handle 1"])
-        press(editor, "handles.volume", True)
-        assert of(editor, "handles.volume").value
+
+        def select(row: str, on: bool) -> Exception | None:
+            editor.mode = Mode.HANDLES
+            press(editor, "handles.list.select", [row])
+            error = press(editor, "handles.volume", on)
+            assert error or of(editor, "handles.volume").value is on
+            editor.mode = Mode.DEFORM
+            editor.wait()
+            return error
+
+        select("handle:handle 1", True)
         assert ("Handle 1", "handle 1") in of(editor, "volumes.name").choices
         press(editor, "volumes.name", "handle 1")
         press(editor, "volumes.change", 25)
         assert abs(editor.session.volume("handle 1")[1] - 0.25) < 1e-12
-        press(editor, "handles.volume", False)
+        select("handle:handle 1", False)
         assert editor.session.options.volumes == ()
         assert of(editor, "volumes.name").value == "whole"
-        press(editor, "handles.list.select", ["handle:pin 1"])
-        error = press(editor, "handles.volume", True)
+        error = select("handle:pin 1", True)
         assert "the part 'pin 1' encloses no volume under a lid" in str(error)
 
 

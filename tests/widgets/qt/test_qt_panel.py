@@ -31,6 +31,10 @@ def widget(unprepared):
     widget.resize(900, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
+    for name in ("volumes", "advanced"):
+        box = widget.panel.boxes[name]
+        assert not any(control.isVisibleTo(box) for control in box.controls.values())
+        box.fold.click()
     yield widget
     widget.close()
     widget.deleteLater()

@@ -10,7 +10,7 @@ import pytest
 from bad_values import BAD
 from campaign import every
 from hands import plain_view
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import (
     Qt,
@@ -334,7 +334,7 @@ def test_sliders_set_the_number_of_regions_and_the_detail_of_cages_when_released
     bend(seen, 0.1)
     part["regions.count"].setValue(3)
     seen.settle()
-    assert "3 regions found. The pose was reset; Z brings it back" in seen.editor.status
+    assert "3 regions found. The pose was reset; Ctrl+Z brings it back" in seen.editor.status
     assert session.regions.n_regions == part["regions.count"].value() == 3
     seen.mode(Mode.CAGES)
     slider = part["cages.detail"]
@@ -610,6 +610,42 @@ def test_the_dialog_with_the_keys_resets_them_to_a_preset_and_can_be_cancelled(s
     assert dialog.keys.changes == keys_of("Blender").changes
     dialog.reject()
     assert editor.keys.changes == {}
+
+
+def test_numbers_typed_into_the_panel_move_and_turn_the_handle(seen):
+    seen.mode(Mode.DEFORM)
+    (name,), controls = seen.session.handles, seen.panel.controls
+    rest = seen.session.targets[name]
+    seen.type_number(controls["motion.move_z"], 0.4)
+    assert_allclose(seen.session.targets[name] - rest, np.tile([0.0, 0.0, 0.4], (len(rest), 1)))
+    assert controls["motion.move_z"].text() == "z 0.40"
+    for _ in range(2):
+        seen.type_number(controls["motion.rotate_x"], 20.0)
+        assert controls["motion.rotate_x"].text() == "x 0.0 °"
+    assert seen.session.history.labels[-3:] == (f"drag {name}", *[f"rotate {name}"] * 2)
+
+
+def test_a_right_click_opens_a_menu_whose_entries_act(seen):
+    hand, session = seen.view_hand(), seen.session
+    x = session.mesh.vertices
+    front = np.argmin(x[:, 1] + np.abs(x[:, 0]) + np.abs(x[:, 2]))
+    place = hand._pixel(hand.at(x[front]))
+    for _ in range(2):  # pins the point, and removes the pin
+        QtTest.QTest.mouseMove(hand.widget, place)
+        QtTest.QTest.mousePress(hand.widget, Qt.RightButton, Qt.NoModifier, place)
+        QtTest.QTest.mouseRelease(hand.widget, Qt.RightButton, Qt.NoModifier, place)
+        until(application().activePopupWidget, "the menu")
+        menu, before = application().activePopupWidget(), list(session.handles)
+        texts = [entry.text() for entry in menu.actions()]
+        assert any(text.startswith("Reset region") for text in texts)
+        assert "Reset pose\tHome" in texts
+        entry = next(e for e in menu.actions() if e.text().startswith(("Pin this", "Remove pin")))
+        spot = menu.actionGeometry(entry).center()
+        QtTest.QTest.mouseClick(menu, Qt.LeftButton, Qt.NoModifier, spot)
+        seen.settle()
+        assert list(session.handles) != before
+    assert not any(name.startswith("pin") for name in session.handles)
+    assert hand.failures == []
 
 
 def test_an_error_is_shown_emitted_and_then_cleared(seen):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("trame")
-from chromium import ALT, Chromium, Page, needs_chromium
+from chromium import ALT, CTRL, Chromium, Page, needs_chromium
 from PIL import Image
 from scipy.ndimage import binary_fill_holes
 from web_hands import Served, line
@@ -148,7 +148,7 @@ def test_a_pull_is_drawn_by_the_page_and_agrees_with_the_picture_at_rest(drawn: 
     assert session.history.position == 1
     assert abs(session.volume_change) < 1e-12
     assert overlap(held, drawn.body()) > 0.99
-    page.key("z")
+    page.key("z", modifiers=CTRL)
     drawn.served.wait(lambda: session.history.position == 0)
     drawn.rest()
     assert overlap(before, drawn.body()) > 0.99
@@ -196,7 +196,7 @@ def test_a_picture_older_than_what_the_page_draws_is_dropped(drawn: Drawn) -> No
     assert drawn.page.evaluate("document.querySelector('.sd-canvas canvas').width") != 50
     drawn.page.release(end)
     drawn.rest()
-    drawn.page.key("z")
+    drawn.page.key("z", modifiers=CTRL)
     drawn.rest()
 
 
@@ -225,14 +225,14 @@ def test_when_the_page_cannot_draw_the_server_does(drawn: Drawn, cause: str) -> 
     page.evaluate("memory.restoreContext()" if cause == "lost" else "location.reload()")
     drawn.await_surface()
     page.wait("Number(document.querySelector('canvas')?.dataset.number) > 0")
-    page.key("z")
+    page.key("z", modifiers=CTRL)
     drawn.rest()
     end = drawn.drag((40.0, 0.0))
     drawn.hold(end)
     assert page.evaluate(LIVE)
     page.release(end)
     drawn.rest()
-    page.key("z")
+    page.key("z", modifiers=CTRL)
     drawn.rest()
 
 
@@ -253,7 +253,7 @@ def test_the_view_menu_decides_who_draws_and_the_browser_remembers(drawn: Drawn)
         assert (drawn.renders == 0) is (choice == "yes")
         page.release(end)
         drawn.rest()
-        page.key("z")
+        page.key("z", modifiers=CTRL)
         drawn.rest()
 
 
@@ -266,7 +266,7 @@ def test_of_two_pages_none_draws(drawn: Drawn) -> None:
     assert not drawn.page.evaluate(LIVE)
     drawn.page.release(end)
     drawn.rest()
-    drawn.page.key("z")
+    drawn.page.key("z", modifiers=CTRL)
     drawn.rest()
     other.close()
     drawn.await_surface()

@@ -32,7 +32,7 @@ KEYS = keys_of("pyvista")
          "No regions yet. Detect them, or paint one", ["segment"]),
         ("No regions yet. Press G to detect them, or 1 to paint one", Mode.CAGES,
          "No regions yet. Detect them, or paint one", ["segment", "regions"]),
-        ("Drag the surface. Shift-click pins. Z: undo", Mode.PULL,
+        ("Drag the surface. Shift-click pins. Ctrl+Z: undo", Mode.PULL,
          "Drag the surface. Choose Pin, then tap: the point stays. Undo", ["undo"]),
         ("Drag the surface · Volume preservation off (P to turn on)", Mode.PULL,
          "Drag the surface · Volume preservation off (turn on)", ["preserve_volume"]),

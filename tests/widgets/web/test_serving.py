@@ -346,7 +346,7 @@ def test_two_pages_show_the_same_work_and_a_killed_browser_loses_nothing(tmp_pat
         with Chromium(900, 600) as browser:
             page = opened(browser, program.address)
             after = saved(page, tmp_path / "after")
-            page.key("z")
+            page.key("z", modifiers=CTRL)
             rested(page)
             undone = saved(page, tmp_path / "undone")
     assert np.abs(before.vertices - before.mesh.vertices).max() > 0.03 * before.mesh.diagonal

@@ -117,7 +117,7 @@ def _step_by_step(
         if turn % 2:
             page.click(f"[data-name={button}]")
         else:
-            page.key(key)
+            page.key(key, modifiers=CTRL)
         served.wait(lambda: seen and served.is_at_rest and not len(served.web.stream.inputs))
         assert set(seen) == {position}
     served.call(stop)
@@ -212,6 +212,30 @@ def test_a_story_by_mouse_and_keys_comes_back_from_its_download_to_the_bit(
     tell_a_story(served, page, tmp_path / "arm.ply", tmp_path / "down", n_cage_vertices=50)
 
 
+def test_a_right_click_opens_a_menu_and_a_click_on_before_after_lasts(
+    served: Served, page: Page, cactus_file: Path
+) -> None:
+    _open(served, cactus_file)
+    session, editor = served.web.session, served.web.editor
+    place = served.seen(page, _top(served))
+    page.click(place, button="right")
+    page.wait("document.querySelectorAll('.sd-context button').length > 5")
+    page.key("Escape")
+    page.wait("!document.querySelector('.sd-context')")
+    page.click(place, button="right")
+    page.wait("!!document.querySelector('.sd-context')")
+    page.evaluate("[...document.querySelectorAll('.sd-context button')]"
+                  ".find((each) => each.textContent.includes('Pin this')).click()")  # fmt: skip
+    served.wait(lambda: list(session.handles) == ["pin 1"])
+    page.wait("!document.querySelector('.sd-context')")
+    page.drag(line(place, (place[0] + 60, place[1] + 15), 8), pause=0.02)
+    served.wait(lambda: session.state.pose is not None and served.is_at_rest)
+    for stays in (True, False):  # a click keeps the mesh at rest until the next one
+        page.click("[data-name=compare]")
+        served.wait(lambda stays=stays: editor.controller.shows_rest is stays)
+        page.wait(f"!!document.querySelector('[data-name=compare].down') === {str(stays).lower()}")
+
+
 @pytest.mark.campaign
 def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     served: Served, page: Page, cactus_file: Path
@@ -236,7 +260,7 @@ def test_the_history_is_previewed_and_keys_reach_the_toolbar_and_the_help(
     page.wait("document.activeElement == document.body")
     page.key("?")
     page.wait("document.querySelector('.sd-help').textContent.includes('Auto-segment')")
-    page.key("z")  # nothing behind it
+    page.key("z", modifiers=CTRL)  # nothing behind it
     page.key("Escape")
     page.wait("!document.querySelector('.sd-help')")
     served.wait(lambda: not len(web.stream.inputs))

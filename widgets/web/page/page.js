@@ -70,7 +70,8 @@ const Page = {
       const isTyping = event.target.closest?.('input, textarea, select');
       const name = NAMES[event.key] || event.key.toLowerCase();
       const isHelp = isPlain && !isTyping && this.trame.state.get('help').keys.includes(name);
-      if (this.hasHelp ? isHelp || name === 'escape' : isHelp) {
+      if (name === 'escape' && this.trame.state.get('menu').length) this.press('menu', null);
+      else if (this.hasHelp ? isHelp || name === 'escape' : isHelp) {
         this.hasHelp = !this.hasHelp;
       } else if (this.hasHelp || this.ended) {
         event.stopImmediatePropagation(); // nothing behind a dialog

@@ -157,14 +157,42 @@ const Sections = {
   template: `
     <section v-for="section in sections" :key="section.name" class="sd-section">
       <h2>{{ section.title }}</h2>
-      <template v-for="(item, k) in section.items" :key="k">
-        <sd-table v-if="item.rows" :table="item" @press="press"></sd-table>
-        <div v-else-if="Array.isArray(item)" class="sd-line">
-          <sd-field v-for="field in item" :key="field.name" :field="field" @press="press">
-          </sd-field></div>
-        <sd-field v-else :field="item" @press="press"></sd-field>
-      </template>
+      <component :is="section.advice ? 'details' : 'div'">
+        <summary v-if="section.advice">{{ section.advice }}</summary>
+        <template v-for="(item, k) in section.items" :key="k">
+          <sd-table v-if="item.rows" :table="item" @press="press"></sd-table>
+          <div v-else-if="Array.isArray(item)" class="sd-line">
+            <sd-field v-for="field in item" :key="field.name" :field="field" @press="press">
+            </sd-field></div>
+          <sd-field v-else :field="item" @press="press"></sd-field>
+        </template>
+      </component>
     </section>`,
+};
+
+const Menu = {
+  props: { items: Array },
+  emits: ['press'],
+  methods: {
+    use(field) {
+      this.$emit('press', field.name, field.kind === 'toggle' ? field.value !== true : null);
+    },
+  },
+  template: `
+    <div class="sd-menu" role="menu">
+      <template v-for="(item, k) in items" :key="k">
+        <hr v-if="item === null">
+        <div v-else-if="item.kind === 'menu'" class="sd-several"><span>{{ item.label }}</span>
+          <button v-for="each in item.items" :key="each.name" type="button" role="menuitem"
+            :class="{ down: each.value === true }" :disabled="!each.enabled" :title="each.tip"
+            @click="use(each)">
+            {{ each.label }}</button></div>
+        <button v-else type="button" role="menuitem" :disabled="!item.enabled" :title="item.tip"
+            @click="use(item)">
+          <i class="mdi" :class="item.value === true ? 'mdi-check' : ''"></i>
+          <span>{{ item.label }}</span></button>
+      </template>
+    </div>`,
 };
 
 const Tool = {
@@ -177,12 +205,9 @@ const Tool = {
   methods: {
     press(value) { this.$emit('press', this.field.name, value); },
     click() {
-      if (this.field.kind !== 'hold') this.use(this.field);
+      if (this.field.kind !== 'hold') this.press(null);
     },
     hold(on) { if (this.field.kind === 'hold') this.press(on); },
-    use(field) {
-      this.$emit('press', field.name, field.kind === 'toggle' ? field.value !== true : null);
-    },
   },
   template: `
     <v-menu v-if="field.kind === 'menu'" :disabled="!field.enabled">
@@ -191,20 +216,7 @@ const Tool = {
           :aria-label="field.label" :disabled="!field.enabled" :data-name="field.name">
           <i class="mdi" :class="icon"></i><span>{{ field.label }}</span></button>
       </template>
-      <div class="sd-menu" role="menu">
-        <template v-for="(item, k) in field.items" :key="k">
-          <hr v-if="item === null">
-          <div v-else-if="item.kind === 'menu'" class="sd-several"><span>{{ item.label }}</span>
-            <button v-for="each in item.items" :key="each.name" type="button" role="menuitem"
-              :class="{ down: each.value === true }" :disabled="!each.enabled" :title="each.tip"
-              @click="use(each)">
-              {{ each.label }}</button></div>
-          <button v-else type="button" role="menuitem" :disabled="!item.enabled" :title="item.tip"
-              @click="use(item)">
-            <i class="mdi" :class="item.value === true ? 'mdi-check' : ''"></i>
-            <span>{{ item.label }}</span></button>
-        </template>
-      </div>
+      <sd-menu :items="field.items" @press="(...words) => $emit('press', ...words)"></sd-menu>
     </v-menu>
     <button v-else type="button" class="sd-tool" :class="{ down: isDown }" :title="field.tip"
         :disabled="!field.enabled" :aria-label="field.label" :data-name="field.name"
@@ -214,4 +226,6 @@ const Tool = {
       <i class="mdi" :class="icon"></i><span>{{ field.label }}</span></button>`,
 };
 
-export default { 'sd-field': Field, 'sd-table': Table, 'sd-sections': Sections, 'sd-tool': Tool };
+export default {
+  'sd-field': Field, 'sd-table': Table, 'sd-sections': Sections, 'sd-tool': Tool, 'sd-menu': Menu,
+};
