@@ -54,8 +54,10 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_locality,
     checked_parts,
     checked_place,
+    checked_radius,
     checked_targets,
     require_together,
     stacked_cages,
@@ -345,21 +347,24 @@ class Deformer:
         return other
 
     def reach_of_pull(
-        self, point: SurfacePoint, radius: float, locality: float
+        self, vertex: int | SurfacePoint, radius: float, locality: float
     ) -> tuple[float, float]:
-        """Return *reach* and *follows* of `local` for a pull, by its *locality* from 0 to 1.
+        """Return *reach* and *follows* of `local` for a pull of *vertex*, or another point.
 
-        The reach is ``radius / sqrt(locality)``.  From the default locality on it ends with the
-        limb of the *point* if that is shorter; limbs within the spread do not count.
+        The reach is ``radius / sqrt(locality)``, with a *locality* from 0 to 1.  From the default
+        locality on it ends with the limb of the point if that is shorter; limbs within the spread
+        do not count.
         """
-        if not locality:
+        point = checked_place(self.mesh, vertex)
+        radius, share = checked_radius(self.mesh, radius), checked_locality(locality) or 0.0
+        if not share:
             return math.inf, 1.0
-        reach = radius / math.sqrt(locality)
-        if locality >= LOCALITY:
+        reach = radius / math.sqrt(share)
+        if share >= LOCALITY:
             size = self._problem.frame.size
             limb = self._problem.samples.limb(point, SPREAD * radius / size, reach / size)
             reach = size * limb
-        return reach, 1.0 - locality
+        return reach, 1.0 - share
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
