@@ -262,7 +262,6 @@ def test_values_at_given_points_and_at_vertices_are_inverse(specimen: Specimen):
     assert_array_equal(surface.vertices_at(some), np.unique(surface.vertex_of[some & at_vertex]))
 
 
-
 def test_planted_differences_are_found():
     given = any_surface.with_arrays(triangles(body()))
     for name, plant in {
