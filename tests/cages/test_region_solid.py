@@ -43,17 +43,6 @@ def test_the_distance_to_a_ball_is_known_at_every_node(scale):
     assert_allclose(field.members, field.grid.to_nodes(mesh.vertices), atol=1e-9)
 
 
-def test_the_distance_to_a_part_of_a_ball_is_that_to_its_own_half():
-    upper = BALL.vertices[:, 2] > -1e-9
-    field = field_of(BALL, upper)
-    nodes = np.indices(field.distance.shape).reshape(3, -1).T
-    points = field.grid.to_points(nodes)
-    below = (points[:, 2] < -0.15) & (np.linalg.norm(points[:, :2], axis=1) < 0.9)
-    assert_allclose(0.1 * field.distance.ravel()[below], -points[below, 2], atol=0.12)
-    above = (points[:, 2] > 0.1) & (np.linalg.norm(points, axis=1) < 0.9)
-    assert (field.distance.ravel()[above] <= 0.0).all()
-
-
 def test_the_step_follows_the_number_of_nodes_and_the_offset():
     fine = field_of(BALL, step=0.05, most_nodes=1e6)
     assert fine.grid.step == pytest.approx(0.05)

@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_array_equal
 from solids import icosphere
 
-from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import arguments
-from vtk_segdeform.errors import ArgumentError, CageError, ConstraintError
+from vtk_segdeform.errors import ArgumentError, ConstraintError
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 
 MESH = Mesh(*icosphere(2))
@@ -50,14 +49,6 @@ def test_places_are_at_most_20_diagonals_apart(axis):
                 says = "20.1 diagonals of the mesh apart; at most 20 are"
                 refused(says, arguments.require_together, MESH, *places)
     arguments.require_together(MESH, np.empty((0, 3)))
-
-
-def test_cages_in_a_pose_are_stacked():
-    cages = [Cage(*icosphere(0)), Cage(*icosphere(1))]
-    poses = [cage.vertices + k for k, cage in enumerate(cages)]
-    assert_array_equal(arguments.stacked_cages(cages, poses), np.concatenate(poses))
-    says = r"must contain \[6, 18\] points, cage by cage; got \[18, 6\]"
-    refused(says, arguments.stacked_cages, cages, poses[::-1], error=CageError)
 
 
 def test_vertices_are_fixed_or_in_a_handle():
@@ -117,13 +108,6 @@ def test_a_pull_grabs_a_point_with_a_vertex_of_its_face_within_the_radius():
     assert f"its face is {share:.3g} % of model size away" in says
     assert f"the pull is {0.5 * share:.3g} %; subdivide" in says
     assert arguments.place_text(MESH, SurfacePoint.at_vertex(0)) == "1,0,0"
-
-
-def test_a_radius_is_15_percent_of_the_diagonal_by_default():
-    assert arguments.checked_radius(MESH, None) == pytest.approx(0.15 * D)
-    assert arguments.checked_radius(MESH, 2) == 2.0
-    for wrong in (0.0, -1.0, np.inf, np.nan, "1"):
-        refused("radius must be a positive number or None", arguments.checked_radius, MESH, wrong)
 
 
 def test_the_locality_decides_the_reach_and_what_follows():

@@ -77,13 +77,6 @@ def test_the_gradient_of_the_volume_is_its_slope(bent):
     assert errors[0] / errors[1] == pytest.approx(100.0, rel=0.1)
 
 
-def test_epsilon_is_the_share_of_a_step_that_is_taken():
-    targets = COARSE.turned(10)
-    whole, half = (printed().solve(targets, max_steps=1, epsilon=e).vertices for e in (1.0, 0.5))
-    rest = COARSE.mesh.vertices
-    assert_allclose(half - rest, 0.5 * (whole - rest), atol=1e-9)
-
-
 def test_a_solution_tells_its_volume_and_the_motion_of_each_step():
     mesh, deformer = COARSE.mesh, printed()
     x = mesh.vertices

@@ -12,13 +12,12 @@ import pytest
 from bodies import Scene, ball, bent, off_carrier, revolved, rod, tube, with_cast
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vtk_segdeform.cages import fit_cages
-from vtk_segdeform.deformer import Deformer, deform
+from vtk_segdeform.deformer import deform
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.models import random_limbs
-from vtk_segdeform.regions import Regions, segment
+from vtk_segdeform.regions import segment
 from vtk_segdeform.solver import Solution
 
 
@@ -97,24 +96,6 @@ def test_bodies_that_stand_near_each_other_do_not_follow():
         assert_array_equal(solution.unmoved, [1])
 
 
-def test_a_component_with_a_handle_of_its_own_deforms_by_itself():
-    scene = bent(arm(), tube(0.55, 0.62, 1.0, 3.0))
-    mesh, z = scene.mesh, scene.mesh.vertices[:, 2]
-    low = np.flatnonzero((mesh.components == 1) & (z < 1.2))
-    high = np.flatnonzero((mesh.components == 1) & (z > 2.8))
-    handle = np.concatenate([scene.handle, high])
-    targets = np.concatenate([scene.mesh.vertices[scene.handle], mesh.vertices[high] + [0.2, 0, 0]])
-    solution = deform(mesh, np.append(scene.fixed, low), handle, targets)
-    moved = np.linalg.norm(solution.vertices - mesh.vertices, axis=1)
-    assert moved[mesh.components == 0].max() < 1e-6
-    assert solution.handle_error < 1e-9
-
-
-def test_the_body_inside_follows_if_the_one_around_it_has_the_handle():
-    scene = bent(tube(0.53, 0.6, 0.0, 4.0), rod(0.5, 0.2, 3.8, n=20))
-    check(scene, deform(scene.mesh, scene.fixed, scene.handle, scene.targets(50.0)))
-
-
 def test_what_is_attached_by_hand_follows_and_what_is_free_stays():
     scene = bent(arm(), ball(0.3, [1.6, 0.0, 2.0]), tube(0.55, 0.62, 1.0, 3.0))
     mesh, is_ball = scene.mesh, scene.mesh.components == 1
@@ -142,11 +123,3 @@ def test_attachments_are_checked(attach, says):
     scene = bent(rod(0.5, 0.0, 4.0, n=8, step=0.5), rod(0.1, 5.0, 6.0, n=8, step=0.5))
     with pytest.raises(ArgumentError, match=says):
         segment(scene.mesh, attach=attach)
-
-
-def test_components_in_one_cage_move_with_the_finish_of_their_carrier():
-    scene = SCENES["sleeve"]()
-    mesh, regions = scene.mesh, Regions.single(scene.mesh)
-    cages = fit_cages(mesh, regions, 155)
-    deformer = Deformer(mesh, regions, cages, fixed=scene.fixed, handle=scene.handle)
-    check(scene, deformer.finish(deformer.solve(scene.targets(60.0))))

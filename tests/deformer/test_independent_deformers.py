@@ -142,13 +142,6 @@ def test_a_cancelled_call_leaves_the_deformer_as_it_was(beginning, act):
         require_unchanged(beginning, act, last)
 
 
-@pytest.mark.campaign
-@pytest.mark.parametrize(("beginning", "act"), ALL_CANCELLED)
-def test_so_does_one_that_is_cancelled_anywhere(beginning, act):
-    for last in range(number_of_calls(beginning, act)):
-        require_unchanged(beginning, act, last)
-
-
 def number_of_calls(beginning, act) -> int:
     """Return how often *act* calls its progress callback."""
     calls = []
@@ -167,8 +160,3 @@ def require_unchanged(beginning, act, last, error=Cancelled) -> None:
     with pytest.raises(error):
         act(deformer, stop)
     assert what_comes_next(deformer) == expected(beginning)
-
-
-def test_any_exception_of_a_progress_callback_leaves_the_deformer_as_it_was():
-    last = number_of_calls(in_a_pull, solve_far) - 1
-    require_unchanged(in_a_pull, solve_far, last, KeyboardInterrupt)

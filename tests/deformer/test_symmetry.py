@@ -66,15 +66,6 @@ def test_a_pull_moves_both_hands(pins):
     assert off_mirror(alone.vertices) > 0.05
 
 
-def test_a_pull_on_the_plane_stays_on_it():
-    middle = np.flatnonzero(X[:, 0] == 0.0)
-    top = int(middle[X[middle, 2].argmax()])
-    pose = sd.pull(BODY, top, X[top] + [0.3, 0.3, 0.2], symmetry="x", **FEW)
-    require_mirrored(pose)
-    assert np.abs(pose.vertices[middle, 0]).max() < EXACT
-    assert_allclose(pose.vertices[top] - X[top], [0.0, 0.3, 0.2], atol=1e-12)
-
-
 @pytest.mark.parametrize("shares", [(0.2, 0.5, 0.3), (0.5, 0.5, 0.0)])
 def test_a_pulled_point_of_a_face_is_mirrored(shares):
     face = BODY.faces[np.flatnonzero((BODY.faces == TIP).any(axis=1))[0]]
@@ -91,15 +82,6 @@ def test_deform_mirrors_handles_and_fixed_vertices(fixed):
     assert pose.handle_error < 1e-12
     feet = np.flatnonzero(FEET)
     assert_allclose(pose.vertices[feet], X[feet], atol=1e-12)
-
-
-def test_both_hands_given_are_followed_as_given():
-    both = np.flatnonzero(np.abs(X[:, 0]) > 1.6)
-    u = np.where(X[both, :1] > 0.0, UP, UP * [-1, 1, 1])
-    symmetric = deformer().hold(fixed=FEET, handle=both, symmetry="x")
-    pose = symmetric.finish(symmetric.solve(X[both] + u))
-    require_mirrored(pose)
-    assert_allclose(pose.vertices[both] - X[both], u, atol=1e-12)
 
 
 def test_a_handle_across_the_plane_moves_along_it():
@@ -146,13 +128,6 @@ def test_volumes_and_stiffness_of_one_side_are_mirrored():
         finished = [each.finish(each.solve(X[HAND] + UP)) for each in (first, then)]
         require_mirrored(finished[0])
         assert_allclose(finished[0].vertices, finished[1].vertices, atol=1e-12)
-
-
-def test_regions_preserved_on_one_side_are_preserved_on_the_other():
-    options = {"preserve_region_volumes": True, "symmetry": "x", "fixed": FEET, "handle": HAND}
-    regions = sd.segment(BODY, 2)
-    symmetric = sd.Deformer(BODY, regions, sd.fit_cages(BODY, regions, 100), **options)
-    require_mirrored(symmetric.finish(symmetric.solve(X[HAND] + UP)))
 
 
 @pytest.mark.parametrize("kind", ["x", "y", "z", "auto", "given"])
@@ -228,17 +203,6 @@ NO_PLANES = [
 def test_what_is_no_plane_is_named(symmetry):
     with pytest.raises((ConstraintError, ArgumentError), match="symmetry must be 'x', 'y', 'z'"):
         deformer().hold(symmetry=symmetry)
-
-
-def test_symmetry_can_be_switched_off():
-    symmetric = deformer().hold(fixed=FEET, handle=HAND, symmetry="x")
-    assert symmetric.mirror is not None
-    assert len(symmetric.handle) == len(HAND)
-    again = symmetric.hold(fixed=FEET, handle=HAND, symmetry=None)
-    assert again.mirror is None
-    plain = deformer().hold(fixed=FEET, handle=HAND)
-    targets = X[HAND] + UP
-    assert np.array_equal(again.solve(targets).vertices, plain.solve(targets).vertices)
 
 
 def test_a_body_beside_the_plane_and_its_twin_move_alike():

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform import models, sizes
+from vtk_segdeform import models
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.energy import Interior, with_interior
 from vtk_segdeform.mesh import Mesh, winding_number
@@ -68,20 +68,6 @@ def test_the_points_are_inside_and_have_the_volume_of_the_body_in_proportion():
         assert (interior.volumes > 0.0).all()
 
 
-def test_what_encloses_nothing_has_no_points():
-    flat = Mesh(*_grid())
-    assert not len(Interior.of(flat, np.ones((1, 25)), BODY).points)
-    assert not len(Interior.of(MESH, SCENE.regions.weights, ~BODY).points)
-
-
-def _grid():
-    x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
-    k = np.arange(25).reshape(5, 5)
-    a, b, c, d = (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1])
-    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-    return np.stack([x.ravel(), y.ravel(), np.zeros(25)], axis=1), faces
-
-
 def test_points_of_a_body_do_not_see_the_regions_of_another():
     ball = models.sphere(66)
     both = Mesh(
@@ -131,13 +117,3 @@ def test_the_points_turn_with_the_mesh_and_are_mirrored_with_it(flip):
     here = Interior.of(mesh, weights, BODY)
     assert_allclose(other.points, here.points @ flip.T, atol=1e-9)
     assert_allclose(other.volumes, here.volumes, rtol=1e-9)
-
-
-def test_a_large_mesh_has_as_many_points(monkeypatch):
-    monkeypatch.setattr(sizes, "DECIMATED", 500)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 400)
-    mesh = models.cactus(1500)
-    interior = Interior.of(mesh, np.ones((1, mesh.n_vertices)), BODY)
-    assert 100 < len(interior.points) <= 200
-    inside = winding_number(interior.points, mesh.vertices, mesh.faces)
-    assert np.mean(inside > 0.5) > 0.95

@@ -7,7 +7,7 @@ import pytest
 import pyvista as pv
 from campaign import every
 from numpy.testing import assert_allclose
-from open_meshes import combined, part_of
+from open_meshes import combined
 from organs import mesh_from, nearest_labels, surface_of
 from scipy import ndimage
 from solids import icosphere, rotation
@@ -53,15 +53,6 @@ def test_chambers_of_a_label_map_have_the_volumes_of_its_voxels(seed):
     labels = pieces(seed, 16)
     counts = np.sort(np.bincount(labels.ravel())[1:])
     assert_allclose(volumes_of(mesh_from(surface_of(labels))), counts[counts > 0], rtol=1e-9)
-
-
-@pytest.mark.parametrize(("seed", "size"), every(4, [(k, n) for k in range(8) for n in (10, 20)]))
-def test_chambers_of_a_smoothed_label_map_are_its_labels(seed, size):
-    surface = surface_of(labels := pieces(seed, size), 16)
-    expected, found = by_label(surface, labels), volumes_of(mesh_from(surface))
-    # Single voxels may be smoothed to nothing and become part of a neighbour.
-    found, expected = (each[each > 1e-3 * expected.sum()] for each in (found, expected))
-    assert_allclose(found, expected, rtol=1e-3)
 
 
 def with_slivers(seed: int, size: int) -> np.ndarray:
@@ -156,16 +147,6 @@ def test_a_cavity_in_a_chamber_and_a_divided_body_in_a_cavity():
     lids = lids_of(mesh)
     assert lids.encloses.all()
     assert_allclose(signed_volume(mesh.vertices, lids.closed(mesh)), 1.001 - hole)
-
-
-def test_a_wall_with_a_hole_divides_nothing():
-    mesh = compartments((0.5,), (0.5,), (0.5,))
-    inner = (np.abs(mesh.vertices[mesh.faces] - 0.5).max(axis=1) < 1e-9).any(axis=1)
-    some = np.flatnonzero(inner)[0]
-    holed = part_of(mesh, np.arange(mesh.n_faces) != some)
-    whole = lids_of(holed, False)
-    found = np.sort([signed_volume(holed.vertices, f) for f in whole.chambers.inside])
-    assert_allclose(found, [0.125] * 6 + [0.25])
 
 
 def test_sides_that_are_left_over_are_joined_to_the_chambers_that_they_close(monkeypatch):

@@ -14,7 +14,6 @@ from open_meshes import (
     cut,
     moebius_strip,
     open_box,
-    part_of,
     pipe,
     revolved,
     sheet,
@@ -186,13 +185,6 @@ def test_the_border_of_a_wall_is_no_hole_and_its_lid_adds_no_volume():
     assert volume == pytest.approx(3.0)
 
 
-def test_a_closed_mesh_has_no_lids_and_its_own_faces():
-    lids = lids_of(BALL)
-    assert lids.encloses.all()
-    assert not len(lids.faces)
-    assert lids.closed(BALL) is BALL.faces
-
-
 def test_the_option_decides_for_open_components():
     cap = SHEETS["shallow cap"]()
     mesh = together(open_box(), cap.with_vertices(cap.vertices + 5))
@@ -222,23 +214,6 @@ def test_nothing_encloses_a_volume_of_zero():
 def test_a_one_sided_surface_encloses_nothing(option):
     strip = moebius_strip()
     assert not lids_of(strip, option).has_volume
-
-
-def test_several_loops_may_touch_at_a_vertex():
-    mesh = models.sphere(642)
-    rings = [np.flatnonzero((mesh.faces == v).any(axis=1)) for v in (100, *_two_away(mesh, 100))]
-    touching = part_of(mesh, ~np.isin(np.arange(mesh.n_faces), np.concatenate(rings[:2])))
-    assert len(touching.borders) == 2
-    assert set(touching.borders[0]) & set(touching.borders[1])
-    lids = lids_of(touching)
-    volume = signed_volume(lids.extension @ touching.vertices, lids.closed(touching))
-    assert 0.98 < volume / signed_volume(mesh.vertices, mesh.faces) < 1.0
-
-
-def _two_away(mesh: Mesh, vertex: int) -> list[int]:
-    """Return a vertex that shares exactly one neighbour with *vertex*."""
-    near = [set(mesh.faces[(mesh.faces == v).any(axis=1)].ravel()) - {v} for v in range(200)]
-    return [v for v in range(200) if v not in near[vertex] and len(near[v] & near[vertex]) == 1]
 
 
 SPIKE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import CUBE, SOLIDS, icosphere, torus
+from solids import CUBE, icosphere, torus
 
 from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.mesh.loops import loops_of
@@ -29,14 +29,6 @@ def soups():
     for vertices, faces in (icosphere(2), torus(12, 8)):
         for share in (0.1, 0.5, 0.9):
             yield faces[rng.random(len(faces)) < share], len(vertices)
-
-
-def test_a_closed_mesh_has_no_border():
-    for solid in SOLIDS.values():
-        mesh = Mesh(*solid)
-        assert mesh.is_closed
-        assert mesh.borders == ()
-        assert mesh.boundary.shape == (0, 2)
 
 
 def test_the_boundary_of_a_boundary_is_zero():

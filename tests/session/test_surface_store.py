@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
 import io
 import json
-import pickle
 import re
 import zipfile
 
@@ -111,17 +109,6 @@ def test_active_arrays_texts_and_unnamed_arrays_come_back(tmp_path):
     assert np.signbit(np.asarray(found.point_data["not a number"])[found.points <= 0.1]).all()
 
 
-def test_copies_pickles_and_undo_keep_the_surface():
-    session = Session(Surface(tube()))
-    for other in (copy.deepcopy(session), copy.copy(session), pickle.loads(pickle.dumps(session))):
-        require_only_moved(session.surface.given, other.deformed)
-        assert other.mesh is other.surface.mesh
-    session.set_fixed([0, 1])
-    given = session.surface
-    session.undo()
-    assert session.surface is given
-
-
 def test_only_sessions_that_earlier_programs_can_read_have_version_1(tmp_path):
     lids = State(options=Options(lids=True))
     for session, version in (
@@ -136,14 +123,6 @@ def test_only_sessions_that_earlier_programs_can_read_have_version_1(tmp_path):
         assert header["version"] == version
         assert "lids" in header["options"] or version == 1 or session.options.lids is None
         assert again.options == session.options
-
-
-def test_without_the_surface_a_file_has_the_mesh_alone(tmp_path):
-    session = Session(Surface(tube()))
-    save_session(tmp_path / "a.segdeform", session, surface=False)
-    loaded = load_session(tmp_path / "a.segdeform")
-    assert loaded.surface is None
-    assert_array_equal(loaded.mesh.vertices, session.mesh.vertices)
 
 
 SMALL = Session(Surface(tube(8, 4)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import sausage
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
@@ -54,32 +53,6 @@ def test_what_crosses_without_it_does_not_with_it(fork, through):
     assert solution.steps < 60  # with the normals fixed in the Hessian, far more
 
 
-def test_a_pull_avoids_contact_as_well(fork):
-    mesh, x = fork[0].mesh, fork[0].mesh.vertices
-    tip = int(np.where(x[:, 0] > 0, x[:, 2], 0.0).argmax())
-    options = {"pins": fork[0].fixed, "n_regions": 1, "n_cage_vertices": 40, "refine": False}
-    free, avoiding = (
-        sd.pull(mesh, tip, x[tip] - [0.5, 0.0, 0.0], avoid_contact=on, **options)
-        for on in (False, True)
-    )
-    assert len(free.crossings()) > 30
-    assert not len(avoiding.crossings())
-    assert avoiding.handle_error < 1e-4
-    assert abs(avoiding.volume_change) < 1e-12
-    with pytest.raises(sd.errors.ArgumentError, match="avoid_contact"):
-        sd.pull(mesh, tip, x[tip], avoid_contact="yes")
-
-
-def test_crossings_at_rest_do_not_count(through, fork):
-    mesh = fork[0].mesh
-    crossed = mesh.with_vertices(through[0].vertices)
-    regions = sd.segment(crossed, 1)
-    deformer = sd.Deformer(crossed, regions, sd.fit_cages(crossed, regions, 30), avoid_contact=True)
-    contact = deformer._constraints.contact
-    assert contact.value_and_slope(deformer._problem.rest_cages)[0] == 0.0
-    assert not len(deformer.hold(handle=[0]).solve(crossed.vertices[[0]]).crossings())
-
-
 def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, monkeypatch):
     contact, p = fork[0]._constraints.contact, through[1]
     value, slope = contact.value_and_slope(p)
@@ -127,15 +100,6 @@ def test_on_a_way_into_contact_no_pair_is_missed(fork, through, compiled, monkey
     assert 2 <= len(lists) <= 20
     assert values[0] == 0.0
     assert values[-1] > 0.0
-
-
-def test_far_from_contact_no_bit_changes():
-    scene = sausage(2, is_coarse=True)
-    free, avoiding = scene.deformer(), scene.deformer(avoid_contact=True)
-    targets = scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.01]
-    assert avoiding._constraints.contact.surface.spacing < 0.2
-    expected, solution = free.solve(targets), avoiding.solve(targets)
-    assert np.array_equal(solution.vertices, expected.vertices)
 
 
 def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thin_part():
