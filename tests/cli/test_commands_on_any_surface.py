@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 import pyvista as pv
 from campaign import every
-from given_surfaces import GIVEN, holed, parts, require_only_moved, tube
+from given_surfaces import GIVEN, holed, require_only_moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 from organs import surface_of
 
 from vtk_segdeform.cli.main import main
-from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, triangles_of, write_mesh
 from vtk_segdeform.mesh import Mesh
@@ -53,19 +52,6 @@ def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
     assert ("volume kept under lids" in printed) == (not surface.mesh.is_closed)
 
 
-@pytest.mark.parametrize(("lids", "words"), [("on", "4 holes: volume kept"), ("off", "lids off")])
-def test_lids_are_chosen(lids, words, tmp_path, capsys):
-    path, out = file_of("holed", tmp_path), tmp_path / "out.vtp"
-    assert main(["deform", str(path), "-o", str(out), "--lids", lids, *BEND]) == 0
-    assert words in capsys.readouterr().out
-    mesh, bent = (Surface(read_polydata(each)).mesh for each in (path, out))
-    closed = lids_of(mesh, True).closed(mesh)
-    volumes = [
-        signed_volume(lids_of(mesh).extension @ each.vertices, closed) for each in (mesh, bent)
-    ]
-    assert (abs(volumes[1] / volumes[0] - 1) < 1e-12) == (lids == "on")
-
-
 def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):
     path, ids = file_of("tube", tmp_path), tmp_path / "top.txt"
     n = 16
@@ -76,15 +62,6 @@ def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):
     assert main(["deform", str(path), "-o", str(out), *words]) == 0
     moved = read_polydata(out).points[top] - read_polydata(path).points[top]
     assert_allclose(moved, np.tile([0.2, 0.0, 0.0], (n + 1, 1)), atol=5e-3)
-
-
-def test_a_sel_file_has_one_number_per_given_point(tmp_path):
-    path, sel, out = file_of("tube", tmp_path), tmp_path / "pose.sel", tmp_path / "out.vtp"
-    z = tube().points[:, 2]
-    np.savetxt(sel, np.where(z < 0.3, 0, np.where(z > 2.7, 2, 1)), fmt="%d")
-    words = ["--fixed", str(sel), "--handle", str(sel), "--translate", "0.2,0,0", *QUICK, *ROUGH]
-    assert main(["deform", str(path), "-o", str(out), *words]) == 0
-    assert_allclose(read_polydata(out).points[z < 0.3], tube().points[z < 0.3], atol=5e-3)
 
 
 def test_regions_are_written_at_the_given_points_and_read_again(tmp_path, capsys):
@@ -153,16 +130,6 @@ def test_check_tells_a_script_of_files_that_cannot_be_read(tmp_path, capsys):
         assert reason in found["reason"]
 
 
-def test_check_says_each_thing_once(tmp_path, capsys):
-    path = file_of("holed", tmp_path)
-    assert main(["check", str(path)]) == 0
-    assert capsys.readouterr().out.splitlines()[1:] == [
-        "It can be deformed as it is. 4 holes: volume kept under lids.",
-        "  welded 50 seam points",
-        "  4 borders of 16, 16, 8, 4 edges",
-    ]
-
-
 @pytest.mark.parametrize("away", [0.0, 1e4, 4e6])
 def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys):
     ball, path = sphere(2000), tmp_path / "ball.ply"
@@ -181,14 +148,6 @@ def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys)
     assert (found[0]["count"] > 0) == ("collapsed" in printed) == (away == 4e6)
 
 
-def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
-    two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
-    write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))
-    assert checked(tmp_path / "two.vtp", capsys)["self_intersections"] > 10
-    assert main(["check", str(tmp_path / "two.vtp")]) == 0
-    assert "pairs of faces intersect" in capsys.readouterr().out
-
-
 def test_check_names_what_cannot_be_deformed(tmp_path, capsys):
     lost = tube()
     lost.points[7] = np.nan
@@ -201,18 +160,6 @@ def test_check_names_what_cannot_be_deformed(tmp_path, capsys):
         assert word in found["reason"]
         assert main(["check", str(path)]) == 1
         assert "cannot be deformed" in capsys.readouterr().out
-
-
-def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
-    path, out = file_of("parts", tmp_path), tmp_path / "out.vtp"
-    words = ["--fixed", "z<15%", "--handle", "x>50%&z>85%", "--translate", "0.2,0,0", *OF_PARTS]
-    words += ROUGH
-    assert main(["deform", str(path), "-o", str(out), *words]) == 0
-    moved = read_polydata(out).points - parts().points
-    right = (parts().points[:, 0] > 1) & (parts().points[:, 0] < 5) & (parts().points[:, 2] > 2.6)
-    assert_allclose(moved[right][:, 0], 0.2, atol=5e-3)  # the stray at x = 9 does not count
-    stray = parts().n_points - 1
-    assert_array_equal(Surface(parts()).vertices_at([stray]), [])
 
 
 @pytest.fixture(scope="module")

@@ -26,12 +26,6 @@ def test_a_turn_keeps_its_pivot_and_its_axis_and_all_distances(axis, angle):
     assert_allclose(moved, pivot + (x - pivot) @ turn(axis, angle).T, atol=1e-12)
 
 
-def test_turning_back_undoes_a_turn():
-    there = motion.rotation([1, 2, 3], 0.8, [4, 5, 6])
-    back = motion.rotation([1, 2, 3], -0.8, [4, 5, 6])
-    assert_allclose(there @ back, np.eye(4), atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("text", "axis", "degrees"),
     [
@@ -65,13 +59,6 @@ def test_a_rotation_has_a_limited_number_of_turns():
 def test_a_vector_that_is_none_is_refused_by_name(text):
     with pytest.raises(ConstraintError, match="translate must be"):
         motion.parse_vector(text, "translate")
-
-
-def test_a_matrix_file_is_read_back(tmp_path):
-    matrix = motion.rotation([1, 2, 3], 0.8, [4, 5, 6])
-    path = tmp_path / "pose.def"
-    np.savetxt(path, matrix, header="the pose", fmt="%.17g")
-    assert_allclose(motion.read_matrix(path), matrix, atol=0)
 
 
 @pytest.mark.parametrize(

@@ -113,12 +113,6 @@ def test_attributes_become_arrays(tmp_path):
     assert_allclose(np.linalg.norm(surface.point_data["NORMAL"], axis=1), 1)
 
 
-def test_a_mirrored_mesh_is_oriented_outward_again(tmp_path):
-    document = octahedron(*OCTAHEDRON)
-    document.head["nodes"][0]["scale"] = [-1, 1, 1]
-    assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
-
-
 def test_positions_may_be_integers_interleaved_and_partly_replaced(tmp_path):
     document = Gltf()
     rows = np.zeros(6, [("p", "<i2", 3), ("gap", "<i2"), ("t", "<f4", 2)])
@@ -178,12 +172,6 @@ def test_a_buffer_outside_the_folder_of_the_model_is_not_read(tmp_path, kind):
         (tmp_path / "model" / "link.bin").symlink_to(tmp_path / "a.bin")
     with pytest.raises(MeshError, match=r"a\.gltf: buffer 0 .* not a file in the model's folder"):
         read_polydata(path)
-
-
-def test_an_image_outside_the_folder_does_not_matter(tmp_path):
-    document = octahedron(*OCTAHEDRON)
-    document.add("images", uri="../../../etc/passwd")
-    assert read_mesh(document.save(tmp_path / "a.gltf")).n_faces == 8
 
 
 def deep(levels):
@@ -333,41 +321,11 @@ def test_a_mesh_shown_by_many_nodes_is_read_once(tmp_path, monkeypatch):
     assert_array_equal(mesh.faces.reshape(50, -1, 3), faces + 6 * np.arange(50)[:, None, None])
 
 
-def test_nodes_that_share_a_mesh_have_morph_weights_and_orientations_of_their_own(tmp_path):
-    document = octahedron(*OCTAHEDRON)
-    vertices = np.asarray(OCTAHEDRON[0], dtype=float)
-    grown = document.array(vertices)
-    document.head["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": grown}]
-    document.head["nodes"] = [
-        {"mesh": 0, "weights": [0]},
-        {"mesh": 0, "weights": [1], "translation": [9, 0, 0]},
-        {"mesh": 0, "weights": [0], "scale": [-1, 1, 1], "translation": [20, 0, 0]},
-        {"mesh": 0, "weights": [0], "translation": [30, 0, 0]},
-    ]
-    document.head["scenes"][0]["nodes"] = [0, 1, 2, 3]
-    mesh = read_mesh(document.save(tmp_path / "a.glb"))
-    expected = [
-        vertices,
-        2 * vertices + [9, 0, 0],
-        vertices * [-1, 1, 1] + [20, 0, 0],
-        vertices + [30, 0, 0],
-    ]
-    assert_allclose(mesh.vertices, np.concatenate(expected))
-
-
 @pytest.mark.parametrize("levels", [10, 5_000])
 def test_a_deep_tree_of_nodes_is_read(tmp_path, levels):
     document = octahedron(*OCTAHEDRON)
     document.head["nodes"] = deep(levels)
     assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
-
-
-def test_deeply_nested_or_invalid_json_is_an_error(tmp_path):
-    path = tmp_path / "a.glb"
-    for text in (b"[" * 200_000, b"{", b"[]", b"\xff", b"null", b'{"asset":' * 50_000):
-        path.write_bytes(glb(text, b""))
-        with pytest.raises(MeshError, match=r"a\.glb: "):
-            read_polydata(path)
 
 
 def test_chunks_that_do_not_fit_the_file_are_errors(tmp_path):

@@ -89,14 +89,6 @@ def test_objects_of_vtk_are_taken_everywhere(tmp_path, name):
         sd.Mesh(given)
 
 
-def test_a_grid_keeps_its_arrays_and_types():
-    grid = ball().cast_to_unstructured_grid()
-    grid.point_data["heat"] = np.arange(18.0)
-    surface = sd.Surface(grid)
-    assert_array_equal(surface.given.point_data["heat"], grid.point_data["heat"])
-    assert_array_equal(surface.mesh.faces, icosphere(1)[1])
-
-
 def test_names_of_blocks_are_groups_and_lost_arrays_are_told(tmp_path, caplog):
     given = blocks()
     surface = sd.Surface(given)
@@ -152,16 +144,6 @@ def test_other_meshes_are_refused_with_the_line_that_converts_them(tmp_path, nam
     if name == "meshio":
         with pytest.raises(MeshError, match=r"must be a Mesh; got meshio\.Mesh\."):
             sd.segment(kind())
-
-
-def test_the_lines_for_grids_and_images_work():
-    image = pv.ImageData(dimensions=(3, 3, 3))
-    surface = sd.Surface(pv.wrap(image).extract_surface(algorithm=None))
-    assert surface.mesh.is_closed
-    grid = image.cast_to_unstructured_grid()
-    with pytest.raises(MeshError, match=r"not of a surface: Surface\(mesh\.extract_surface\(alg"):
-        sd.Surface(grid)
-    assert sd.Surface(grid.extract_surface(algorithm=None)).mesh.is_closed
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from solids import rotation
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.polygons import (
-    _failed,
     cells_of,
     corner_values,
     cut_into_triangles,
@@ -20,7 +19,6 @@ from vtk_segdeform.io.polygons import (
     polygons_of,
     rows,
     triangles_of,
-    unstripped,
 )
 
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -150,30 +148,6 @@ def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
         triangles_of(polydata)
 
 
-def test_no_polygons_have_no_triangles():
-    assert triangles_of(pv.PolyData()).shape == (0, 3)
-    assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1
-
-
-def test_polygons_that_were_cut_wrongly_are_found():
-    dart = flat((0, 0), (2, 0), (0.5, 0.5), (0, 2))
-    bent = dart + np.outer([0, 0, 1, 0], [0.0, 0.0, 0.5])
-    inside, outside = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]  # the second one is turned
-
-    def failed(points, *cuts):
-        counts = np.full(len(cuts), 4)
-        corners = np.tile(np.arange(4), len(cuts))
-        polygon = np.repeat(np.arange(len(cuts)), [len(each) for each in cuts])
-        return _failed(points, counts, corners, np.concatenate(cuts), polygon).tolist()
-
-    assert failed(dart, inside, outside, inside, inside[:1]) == [1, 3]
-    assert failed(dart @ TURN, outside, inside) == [0]
-    assert failed(bent, outside, inside) == []  # not planar: no side is the upper one
-    repeated = np.array([0, 1, 1, 3])  # has one triangle only
-    args = np.array([4]), repeated, np.array([[0, 1, 3]]), np.array([0])
-    assert _failed(dart, *args).tolist() == []
-
-
 @pytest.mark.parametrize("size", [4, 5, 7])
 @pytest.mark.parametrize("apart", [False, True])
 def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_at(size, apart):
@@ -193,12 +167,6 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         a, b, c = points[found].transpose(1, 0, 2)
         side = 1.0 if k < 2 + size else -1.0
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
-
-
-def test_the_same_corners_in_another_order_are_another_polygon():
-    square = flat((0, 0), (1, 0), (1, 1), (0, 1))
-    triangles, owner = cut(square, [0, 1, 3, 2], [0, 1, 2, 3])  # the first one crosses itself
-    assert_allclose(area_vectors(square, triangles[owner == 1])[:, 2], 0.5)
 
 
 def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
@@ -223,12 +191,6 @@ def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
     assert_array_equal(again.faces, [3, 0, 1, 2, 4, 4, 5, 6, 7, 3, 0, 1, 2, 3, 2, 1, 3, 3, 7, 6, 5])
     with pytest.raises(MeshError, match="faces use vertices 0 to 8, but there are 8"):
         polydata_of(points, np.array([3]), np.array([0, 1, 8]))
-
-
-def test_strips_are_cut_into_triangles_of_the_same_orientation():
-    found = unstripped(np.array([5, 3, 6]), np.array([0, 1, 2, 3, 4, 7, 8, 9, 0, 1, 2, 2, 3, 4]))
-    expected = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [7, 8, 9], [0, 1, 2], [3, 2, 4]]
-    assert_array_equal(found, expected)
 
 
 def test_values_of_corners_are_padded_and_read_back():

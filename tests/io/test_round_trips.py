@@ -236,14 +236,6 @@ def test_a_face_of_one_or_two_corners_is_kept_and_the_others_can_be_bent(
     assert_allclose(again.given.point_data["Normals"], given.point_data["Normals"], atol=1e-6)
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".glb"])
-def test_formats_of_triangles_leave_out_faces_of_two_corners(tmp_path, suffix):
-    counts, corners = polygons_of(prism(3))
-    given = polydata_of(prism(3).points, np.append(2, counts), np.append([0, 4], corners))
-    write_mesh(tmp_path / f"a{suffix}", given)
-    assert Surface.read(tmp_path / f"a{suffix}").mesh.n_faces == 8
-
-
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".stl"])
 @settings(EASY, max_examples=8)
 @given(surface=surfaces())
@@ -263,14 +255,3 @@ def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
         np.testing.assert_allclose(theirs.vertex_matrix().max(axis=0), surface.points.max(axis=0))
         return
     np.testing.assert_allclose(theirs.vertex_matrix(), surface.points, atol=1e-6)
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
-def test_a_thousand_surfaces_are_read_back_or_losses_are_reported(tmp_path, suffix):
-    @settings(EASY, max_examples=1000 if suffix in (".ply", ".obj", ".off") else 100)
-    @given(surface=surfaces())
-    def each(surface):
-        assert not lost_in(tmp_path / f"a{suffix}", surface)
-
-    each()

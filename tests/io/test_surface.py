@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, torus
 
 import vtk_segdeform as sd
-from vtk_segdeform.errors import ArgumentError, ConstraintError, MeshError
+from vtk_segdeform.errors import ArgumentError, MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.mesh import Kind
@@ -27,15 +27,6 @@ def triangles(vertices, faces):
 
 def texts(surface):
     return [str(each) for each in surface.workarounds]
-
-
-def test_a_triangle_mesh_is_its_own_mesh():
-    vertices, faces = icosphere(2)
-    surface = sd.Surface(triangles(vertices, faces))
-    assert_array_equal(surface.mesh.vertices, vertices)
-    assert_array_equal(surface.mesh.faces, faces)
-    assert_array_equal(surface.vertex_of, np.arange(len(vertices)))
-    assert surface.workarounds == ()
 
 
 def test_a_cube_with_seams_is_welded_and_each_workaround_says_where():
@@ -87,32 +78,6 @@ def test_all_that_differs_is_told():
     assert_array_equal(places[Kind.HOLE], np.unique([*faces[0], *faces[100], *fin]))
 
 
-def test_lines_vertex_cells_and_strips_are_allowed():
-    vertices, faces = icosphere(1)
-    n = len(vertices)
-    polydata = triangles(np.append(vertices, [[0, 0, 3.0], [np.nan, 0, 0]], axis=0), faces[4:])
-    polydata.lines = np.array([2, 0, n])
-    polydata.verts = np.array([1, n, 1, n + 1])
-    polydata.strips = np.concatenate([[3, *face] for face in faces[:4]])
-    surface = sd.Surface(polydata)
-    assert surface.mesh.is_two_manifold
-    assert texts(surface) == ["2 points are in no face"]
-    assert surface.vertex_of[n] == vertices[:, 2].argmax()
-    moved = surface.moved(2.0 * surface.mesh.vertices)
-    assert_array_equal(moved.points[:n], 2.0 * vertices)
-    assert np.isnan(moved.points[n + 1]).any()
-
-
-def test_single_precision_seams_are_welded_exactly():
-    vertices, faces = icosphere(3)
-    split = vertices[faces].reshape(-1, 3).astype(np.float32)
-    given = pv.PolyData.from_regular_faces(split, np.arange(len(split)).reshape(-1, 3))
-    surface = sd.Surface(given)
-    assert surface.mesh.is_two_manifold
-    assert surface.mesh.n_vertices == len(vertices)
-    assert surface.given.points.dtype == np.float32
-
-
 @pytest.mark.parametrize(
     ("polydata", "message"),
     [
@@ -138,18 +103,6 @@ def test_the_given_surface_is_not_changed():
     assert given == before
     moved = surface.moved(surface.mesh.vertices)
     assert_array_equal(moved.regular_faces, given.regular_faces)
-
-
-def test_a_handle_of_points_in_no_face_is_an_error():
-    given = pv.Sphere(theta_resolution=8, phi_resolution=6)
-    n = given.n_points
-    stray = pv.PolyData(np.vstack([given.points, [[0, 0, 2.0]]]), given.faces)
-    surface = sd.Surface(stray)
-    with pytest.raises(ConstraintError, match="no point of the handle is in a face"):
-        surface.targets_at([n], [[0.0, 0.0, 3.0]])
-    vertices, targets = surface.targets_at([0, n], [[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]])
-    assert len(vertices) == 1
-    assert_array_equal(targets, [[0.0, 0.0, 1.0]])
 
 
 def parametric(kind, radius):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import TETRAHEDRON, icosphere
+from solids import TETRAHEDRON
 from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh
@@ -100,27 +100,6 @@ def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
     assert lines[:2] == ["# Blender 4.2", "mtllib Körper.mtl"]
 
 
-def test_a_material_library_that_is_not_beside_the_file_is_told(tmp_path, caplog):
-    for folder in ("here", "there"):
-        (tmp_path / folder).mkdir()
-    (tmp_path / "here" / "a.obj").write_text(BLENDER, encoding="utf-8")
-    (tmp_path / "here" / "Körper.mtl").write_text("newmtl Haut")
-    surface = read_polydata(tmp_path / "here" / "a.obj")
-    write_mesh(tmp_path / "here" / "b.obj", surface)
-    assert caplog.text == ""
-    write_mesh(tmp_path / "there" / "b.obj", surface)
-    assert "the OBJ file refers to 'Körper.mtl': copy it to the same folder" in caplog.text
-    assert not (tmp_path / "there" / "Körper.mtl").exists()
-
-
-@pytest.mark.parametrize(
-    ("word", "group"), [("off", 0), ("0", 0), ("", 0), ("1", 1), ("7", 7), ("on", 1)]
-)
-def test_smoothing_groups_are_numbers(tmp_path, word, group):
-    (tmp_path / "a.obj").write_text(BLENDER.replace("s 0", f"s {word}"), encoding="utf-8")
-    assert read_polydata(tmp_path / "a.obj").cell_data["Smoothing"][0] == group
-
-
 def test_a_newline_in_a_name_does_not_start_a_line(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface.cell_data["Group"] = [0, 1, 2, 3]
@@ -166,23 +145,6 @@ def test_an_array_of_the_wrong_type_is_left_out_with_a_warning(tmp_path, what):
     assert not list(again.point_data) + list(again.cell_data)
 
 
-@pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
-def test_indices_before_the_first_are_errors(tmp_path, corner):
-    (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
-    with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
-        read_polydata(tmp_path / "a.obj")
-
-
-def test_unused_vertices_keep_texture_coordinates_per_point(tmp_path):
-    surface = to_polydata(Mesh(*TETRAHEDRON))
-    surface = pv.PolyData(np.vstack([surface.points, [9.0, 9.0, 9.0]]), surface.faces)
-    surface.point_data["uv"] = np.arange(10.0).reshape(5, 2)
-    surface.point_data.active_texture_coordinates_name = "uv"
-    write_mesh(tmp_path / "a.obj", surface)
-    again = read_polydata(tmp_path / "a.obj")
-    assert_array_equal(again.active_texture_coordinates, surface.point_data["uv"])
-
-
 @pytest.mark.parametrize("reader", ["vtk", "pymeshlab"])
 def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp_path, reader):
     surface = prism(5)
@@ -205,16 +167,6 @@ def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp
         assert meshset.current_mesh().face_number() == 5 * 2 + 2 * 3
     np.testing.assert_allclose(points, surface.points, atol=1e-6)
     assert n_faces == surface.n_cells
-
-
-def test_a_sphere_with_smoothing_is_as_exact_as_one_without(tmp_path):
-    surface = to_polydata(Mesh(*icosphere(2, radius=1 / 3)))
-    surface.cell_data["Smoothing"] = np.ones(surface.n_cells, dtype=int)
-    write_mesh(tmp_path / "a.obj", surface)
-    again = read_polydata(tmp_path / "a.obj")
-    assert_array_equal(again.points, surface.points)
-    assert_array_equal(again.faces, surface.faces)
-    assert set(again.cell_data["Smoothing"]) == {1}
 
 
 TETRA = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
@@ -280,19 +232,6 @@ def test_a_word_of_several_numbers_is_no_index(tmp_path, word):
     text = f"vt 0 0\nvt 1 0\n{TETRA}".replace("f 1 3 2", f"f {word} 3/1 2/1")
     (tmp_path / "a.obj").write_text(re.sub(r"f (\d) (\d) (\d)", r"f \1/1 \2/1 \3/1", text))
     with pytest.raises(MeshError, match=r"a face refers to '[12]"):
-        read_polydata(tmp_path / "a.obj")
-
-
-def test_corners_of_one_face_may_be_of_different_forms(tmp_path):
-    (tmp_path / "a.obj").write_text(f"vt 5 6\nvn 0 0 1\n{TETRA[: TETRA.index('f')]}f 1/1 2 3/1/1")
-    surface = read_polydata(tmp_path / "a.obj")
-    assert_array_equal(surface.regular_faces[-1], [0, 1, 2])
-    assert_array_equal(surface.cell_data["TextureCorners"][-1], [5, 6, np.nan, np.nan, 5, 6])
-
-
-def test_a_plane_is_no_surface_in_space(tmp_path):
-    (tmp_path / "a.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3")
-    with pytest.raises(MeshError, match="vertex 1 is '0 0'; must be 3 numbers"):
         read_polydata(tmp_path / "a.obj")
 
 

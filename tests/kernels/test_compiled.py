@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import functools
-import importlib
 import sys
 import threading
 import time
@@ -49,11 +48,7 @@ from vtk_segdeform.solver.exact_volume import moved_along, slopes_along
 from vtk_segdeform.solver.volume_constraints import region_volumes, violations
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 
-MESH = models.torus(3000)
 RNG = np.random.default_rng(2)
-MOVE = RNG.normal(size=MESH.vertices.shape)
-SHORT = MESH.faces.astype(np.int32)  # as volume constraints have them, for one compilation less
-SHEET = np.asarray(sheet(4).points, float), triangles_of(sheet(4))
 
 
 @pytest.fixture
@@ -375,12 +370,6 @@ def test_triangular_solves_agree(twin, coupled, n, count, rng):
         assert_allclose(quick, solved, atol=1e-9 * np.abs(solved).max())
 
 
-def test_results_do_not_depend_on_the_number_of_threads(monkeypatch):
-    volume = volume_along(MESH.vertices, MOVE, SHORT)
-    monkeypatch.setattr(threads, "n_threads", lambda: 1)
-    assert_array_equal(volume_along(MESH.vertices, MOVE, SHORT), volume)
-
-
 def test_every_row_is_processed_once_and_in_other_threads_than_the_callers(monkeypatch):
     monkeypatch.setattr(threads, "n_threads", lambda: 2)
     done, workers = np.zeros(1000, dtype=int), set()
@@ -484,15 +473,6 @@ def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions, r
     columns, w = subspace.nonzeros(some)
     assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
     assert_array_equal(w, dense[np.ix_(some, columns)])
-
-
-def test_kernels_are_compiled_without_a_cache_folder(monkeypatch):
-    caching = pytest.importorskip("numba.core.caching")
-    kernels = importlib.import_module("vtk_segdeform.kernels.compiled.kernels")
-    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
-    twice = kernels.kernel()()(lambda x: x + x)
-    assert twice(1.5) == 3.0
-    assert twice.signatures
 
 
 def test_set_up_runs_a_trial_step_so_that_the_first_frame_compiles_nothing(monkeypatch):
@@ -631,12 +611,6 @@ def test_corners_of_lines_are_read_alike(twin, monkeypatch, text, expected):
     if expected is not None:
         assert quick[1][: len(expected)].tolist() == expected
         assert [each.tolist() for each in quick] == [each.tolist() for each in slow]
-
-
-def test_corners_that_are_given_in_different_ways_are_read_at_once(twin, monkeypatch):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    quick, _ = twin(lambda: Lines(b"f 1 2/3 4//5 6/7/8\n", ("v", "f")).corners("f"))
-    assert quick[1].tolist() == [[1, 0, 0], [2, 3, 0], [4, 0, 5], [6, 7, 8]]
 
 
 STL = (

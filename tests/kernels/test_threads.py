@@ -145,12 +145,6 @@ def test_blas_threads_are_restored_though_that_is_interrupted(blas, monkeypatch)
     assert blas.threads == 8
 
 
-def test_without_threadpoolctl_nothing_is_limited(monkeypatch):
-    monkeypatch.setattr(threads, "_blas_limit", lambda: None)
-    with threads.one_blas_thread():
-        pass
-
-
 def test_threads_take_quick_turns_until_the_last_one_has_ended():
     before = sys.getswitchinterval()
     inside, first, second = [], threading.Event(), threading.Event()
@@ -179,14 +173,3 @@ def test_threads_take_quick_turns_until_the_last_one_has_ended():
             thread.join()
     assert max(inside) < 0.5 * before
     assert sys.getswitchinterval() == pytest.approx(before)
-
-
-def test_turns_shorter_than_quick_ones_stay():
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(1e-5)
-    try:
-        with quick_turns():
-            assert sys.getswitchinterval() == pytest.approx(1e-5)
-        assert sys.getswitchinterval() == pytest.approx(1e-5)
-    finally:
-        sys.setswitchinterval(before)

@@ -74,16 +74,6 @@ def test_a_brush_stroke_adds_the_vertices_along_its_path_in_one_step(desk):
     assert np.array_equal(desk.session.regions.membership[1], before)
 
 
-def test_a_second_stroke_adds_to_the_fixed_vertices(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    desk.hand.drag([(2, 2), (398, 120)])
-    first = desk.session.fixed
-    desk.hand.drag([(2, 300), (398, 398)])
-    assert len(first) > 0
-    assert np.isin(first, desk.session.fixed).all()
-    assert (desk.points[desk.session.fixed, 2] > 0.0).any()
-
-
 def test_control_erases(desk):
     desk.selector.region, desk.selector.radius = 0, 0.15
     both = desk.session.regions.membership.all(axis=0)
@@ -195,17 +185,6 @@ def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
     assert (picture(desk.view) == idle).all()
 
 
-def test_a_tiny_rectangle_selects_nothing(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    nearest = desk.points[desk.points[:, 1].argmin()]
-    x, y = (int(p) for p in desk.hand.at(nearest))  # just below and left of a vertex
-    desk.hand.drag([(x, y), (x + 1, y + 1)])
-    desk.hand.click((x, y))
-    assert len(desk.session.fixed) == 0
-    desk.hand.drag([(x - 2, y - 2), (x + 3, y + 3)])
-    assert len(desk.session.fixed) == 1
-
-
 def test_a_click_selects_a_connected_part(desk):
     desk.selector.tool, desk.selector.paints = Tool.COMPONENT, Paint.HANDLE
     desk.hand.click(desk.under(0.1, 0.1))
@@ -228,16 +207,6 @@ def test_fixed_vertices_and_handles_remain_disjoint(desk):
     desk.selector.paints = Paint.FIXED
     desk.hand.drag([(2, 300), (398, 398)])
     assert isinstance(desk.hand.failures.pop(), ConstraintError)
-
-
-def test_a_second_handle_gets_its_own_name_and_vertices(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
-    desk.hand.drag([(100, 300), (200, 390)])
-    desk.selector.handle = None
-    desk.hand.drag([(200, 300), (300, 390)])
-    assert list(desk.session.handles) == ["handle 1", "handle 2"]
-    one, two = desk.session.handles.values()
-    assert not np.intersect1d(one, two).size
 
 
 def test_vertices_of_no_other_region_cannot_be_erased(
@@ -313,30 +282,6 @@ def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
     assert not ((sides > -0.6) & (sides < 0.6)).any()
 
 
-def test_the_preview_shows_only_vertices_that_will_change(desk):
-    desk.session.set_fixed(desk.points[:, 2] > 0.5)
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
-    idle = picture(desk.view).astype(int)
-    desk.hand.press((2, 2))
-    desk.hand.move((398, 398))
-    now = picture(desk.view).astype(int)
-    (x, above), (_, below) = desk.under(0.0, 0.7), desk.under(0.0, 0.2)
-    assert np.array_equal(now[400 - round(above), round(x)], idle[400 - round(above), round(x)])
-    red, green, blue = now[400 - round(below), round(x)]
-    assert red > 3 * max(green, blue)
-    desk.hand.key("Escape")
-    desk.hand.release()
-
-
-def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    label = desk.session.history.undo_label
-    desk.hand.drag([(2, 2), (30, 30)])
-    desk.hand.drag([(2, 2), (30, 30)], control=True)
-    desk.hand.drag([desk.under(-0.2, -0.2), desk.under(0.2, 0.2)], control=True)
-    assert desk.session.history.undo_label == label
-
-
 def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.hand.drag([(2, 200), (398, 398)])
@@ -400,21 +345,6 @@ def test_the_ring_has_the_radius_of_the_brush(desk):
     assert widths[1] / widths[0] == pytest.approx(2.0, abs=0.2)
     desk.hand.hover((5, 5))
     assert (picture(desk.view) == idle).all()
-
-
-def test_the_ring_disappears_with_the_pointer_and_with_the_tool(desk):
-    idle = picture(desk.view)
-    leave = [
-        lambda: desk.hand.event("LeaveEvent"),
-        lambda: setattr(desk.selector, "tool", Tool.LASSO),
-        lambda: desk.selector.Off(),
-    ]
-    for leaves in leave:
-        desk.selector.tool = Tool.BRUSH
-        desk.hand.hover(desk.under(0.0, 0.0))
-        assert (picture(desk.view) != idle).any()
-        leaves()
-        assert (picture(desk.view) == idle).all()
 
 
 def test_grow_and_shrink_change_one_ring_of_neighbours(desk):
