@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from solids import CUBE, SOLIDS, icosphere, rotation, two_components
+from solids import CUBE, SOLIDS, icosphere, rotation, together, two_components
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.mesh import faults as search
@@ -29,15 +29,6 @@ def kinds(vertices, faces):
     found = {fault.kind: fault.count for fault in report.faults + report.notes}
     assert len(found) == len(report.faults + report.notes)  # each kind once
     return {kind: n for kind, n in found.items() if kind not in HARMLESS}
-
-
-def together(*solids):
-    """Return solids as one mesh, with coincident vertices merged."""
-    vertices = np.concatenate([v for v, _ in solids])
-    starts = np.cumsum([0] + [len(v) for v, _ in solids])
-    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
-    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
-    return vertices, number.reshape(-1)[faces]
 
 
 def test_a_missing_face_leaves_three_open_edges_around_one_hole():

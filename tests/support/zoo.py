@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere, torus
+from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere, joined, torus
 
 Soup = tuple[Any, Any]
 
@@ -50,13 +50,6 @@ def cells(filled: Any, finer: int = 1) -> Soup:
     places, number = np.unique(np.concatenate(quads).reshape(-1, 3), axis=0, return_inverse=True)
     a, b, c, d = number.reshape(-1, 4).T
     return places / finer, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-
-
-def joined(*soups: Soup) -> Soup:
-    """Return several surfaces as one."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in soups)])
-    faces = [f + start for (_, f), start in zip(soups, starts, strict=False)]
-    return np.concatenate([v for v, _ in soups]), np.concatenate(faces)
 
 
 def moved(soup: Soup, scale: Any = 1.0, shift: Any = (0.0, 0.0, 0.0)) -> Soup:
