@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, picture, plain_view
-from vtkmodules.util.numpy_support import vtk_to_numpy
+from hands import Hand, Painter, draw_seldom, look_along_y, picture, plain_view
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Regions, Session, models
@@ -16,7 +15,7 @@ from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionS
 from vtk_segdeform.widgets.scene.view import View
 
 
-class Desk:
+class Desk(Painter):
     """A sphere seen along y, z up, with a selector and a hand."""
 
     def __init__(self, *, halves=True):
@@ -26,10 +25,7 @@ class Desk:
             z = self.session.mesh.vertices[:, 2]
             self.session.set_regions(Regions.from_masks(self.session.mesh, [z > -0.2, z < 0.2]))
         self.selector = RegionSelector(self.view, self.session)
-        self.view.camera.SetPosition(0.0, -4.0, 0.0)
-        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
-        self.view.renderer.ResetCamera()
-        self.view.render()
+        look_along_y(self.view)
         draw_seldom(self.view)
         self.hand = Hand(self.view)
         self.selector.On()
@@ -37,16 +33,6 @@ class Desk:
     @property
     def points(self):
         return self.session.mesh.vertices
-
-    @property
-    def colours(self):
-        """(n, 3) uint8: the colours of the vertices."""
-        shown = self.selector.surface.polydata.GetPointData().GetScalars()
-        return np.array(vtk_to_numpy(shown))
-
-    def under(self, x, z):
-        """Return the pixel of the point (x, y, z) on the near side of the sphere."""
-        return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
 
 
 @pytest.fixture
