@@ -142,6 +142,13 @@ def test_a_cancelled_call_leaves_the_deformer_as_it_was(beginning, act):
         require_unchanged(beginning, act, last)
 
 
+@pytest.mark.campaign
+@pytest.mark.parametrize(("beginning", "act"), ALL_CANCELLED)
+def test_so_does_one_that_is_cancelled_anywhere(beginning, act):
+    for last in range(number_of_calls(beginning, act)):
+        require_unchanged(beginning, act, last)
+
+
 def number_of_calls(beginning, act) -> int:
     """Return how often *act* calls its progress callback."""
     calls = []

@@ -255,3 +255,14 @@ def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
         np.testing.assert_allclose(theirs.vertex_matrix().max(axis=0), surface.points.max(axis=0))
         return
     np.testing.assert_allclose(theirs.vertex_matrix(), surface.points, atol=1e-6)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
+def test_a_thousand_surfaces_are_read_back_or_losses_are_reported(tmp_path, suffix):
+    @settings(EASY, max_examples=1000 if suffix in (".ply", ".obj", ".off") else 100)
+    @given(surface=surfaces())
+    def each(surface):
+        assert not lost_in(tmp_path / f"a{suffix}", surface)
+
+    each()

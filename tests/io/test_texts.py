@@ -11,6 +11,8 @@ import logging
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from solids import CUBE
 from vtkmodules.vtkCommonCore import vtkStringArray
 
@@ -178,3 +180,31 @@ def test_texts_with_lone_surrogates_do_not_abort_the_process():
     surface = cube()
     set_names(surface, "notes", ["\ud800", "a\0b"])
     assert contents(surface)["Field", "notes"] == ["?", "a_b"]
+
+
+def storable_once(text):
+    """Return what is left of a text in every format: names that are equal then become one."""
+    raw = text if isinstance(text, bytes) else text.encode("utf-8", "surrogatepass")
+    return " ".join(storable(raw).split())
+
+
+ANY = st.sampled_from(TEXTS) | st.text(max_size=12) | st.binary(max_size=12)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_any_texts_are_read_back_or_reported(tmp_path, suffix):
+    @settings(
+        deadline=None, derandomize=True, max_examples=300,
+        suppress_health_check=list(HealthCheck),
+    )  # fmt: skip
+    @given(
+        place=st.sampled_from(PLACES),
+        texts=st.lists(ANY, min_size=1, max_size=3, unique_by=storable_once),
+    )
+    def each(place, texts):
+        surface = cube()
+        place(surface, texts)
+        assert changed(tmp_path, suffix, surface) == []
+
+    each()

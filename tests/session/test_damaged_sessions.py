@@ -128,6 +128,12 @@ def refusal_of(path):
     return refusal
 
 
+def every_change(header):
+    for path in places(header):
+        for new in [*VALUES, MISSING] if path else VALUES:
+            yield path, new
+
+
 def test_a_header_with_a_value_of_another_kind_is_read_or_refused(tmp_path, members):
     header, content = members
     values, refused = cycle([*VALUES, MISSING]), 0
@@ -200,6 +206,38 @@ def test_a_description_of_an_array_that_is_cut_off_is_refused(tmp_path, members)
         assert data != content["fixed.npy"]
         damaged = content | {"fixed.npy": data}
         assert require_read_or_refused(tmp_path / "a.segdeform", header, damaged)
+
+
+@pytest.mark.campaign
+def test_every_value_and_every_array_replaced_by_every_other(tmp_path, members):
+    header, content = members
+    path = tmp_path / "a.segdeform"
+    for where, new in every_change(header):
+        require_read_or_refused(path, replaced(header, where, new), content)
+    for name, data in content.items():
+        for other in other_arrays(data):
+            require_read_or_refused(path, header, content | {name: bytes_of(other)})
+        without = {key: value for key, value in content.items() if key != name}
+        require_read_or_refused(path, header, without)
+        for at in range(min(len(data), 128)):  # the header of the array
+            for letter in b"\0(,{'9-":
+                damaged = data[:at] + bytes([letter]) + data[at + 1 :]
+                require_read_or_refused(path, header, content | {name: damaged})
+
+
+@pytest.mark.campaign
+def test_any_damage_of_the_archive_is_refused_or_harmless(tmp_path, members):
+    header, content = members
+    path, rng = tmp_path / "a.segdeform", np.random.default_rng(5)
+    require_read_or_refused(path, header, content)
+    sound = path.read_bytes()
+    for _ in range(3000):
+        broken = bytearray(sound)
+        start = len(sound) - 4000 if rng.random() < 0.7 else 0  # the directory
+        for place in rng.integers(start, len(sound), rng.integers(1, 4)):
+            broken[place] = rng.integers(256)
+        path.write_bytes(broken)
+        refusal_of(path)
 
 
 def test_a_compressed_member_is_refused_before_it_is_unpacked(tmp_path, members):

@@ -1,14 +1,12 @@
 """The operations on the creatures of the zoo, each of which checks its result.
 
-Operations raise the errors of the package; errors that the filter and the command line only report
-become a `ReportedError`.
+Operations raise the errors of the package; those that the filter only reports become a
+`ReportedError`.
 """
 
 from __future__ import annotations
 
-import io
-from contextlib import redirect_stdout, suppress
-from pathlib import Path
+from contextlib import suppress
 
 import numpy as np
 import pyvista as pv
@@ -16,18 +14,16 @@ from any_surface import triangles
 from solids import rotation
 
 import vtk_segdeform as sd
-from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError, SegDeformError
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
 from vtk_segdeform.filters.surfaces import surface
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.io import triangles_of
-from vtk_segdeform.io.convert import read_polydata
 from vtk_segdeform.mesh import mesh_of
 
 
 class ReportedError(SegDeformError):
-    """An error message of the filter or the command line, neither of which raises."""
+    """A report of faults, or an error message of the filter, which does not raise."""
 
 
 def volume(mesh, vertices=None):
@@ -211,47 +207,10 @@ def pipeline(vertices, faces):
     require_right_surface(own, bent_surface)
 
 
-def as_off(vertices, faces):
-    """Write any triangles to an OFF file."""
-    vertices, faces = np.asarray(vertices), np.asarray(faces)
-    rows = [" ".join(map(str, row)) for row in np.atleast_2d(vertices).tolist()]
-    rows += [" ".join(map(str, [len(row), *row])) for row in np.atleast_2d(faces).tolist() if row]
-    Path("zoo.off").write_text("\n".join(["OFF", f"{len(vertices)} {len(faces)} 0", *rows, ""]))
-
-
-def commanded(*words):
-    """Run the command line, and raise the errors that it prints."""
-    with redirect_stdout(io.StringIO()) as printed:
-        try:
-            code = main(["--debug", *words])
-        except MeshError as missed:  # it has a result nevertheless
-            if "written, but a handle misses its target" not in str(missed):
-                raise
-            code = 0
-    if code:
-        raise ReportedError(printed.getvalue())
-
-
-def check_command(vertices, faces):
-    as_off(vertices, faces)
-    commanded("check", "zoo.off")
-
-
-def deform_command(vertices, faces):
-    as_off(vertices, faces)
-    x = np.nan_to_num(np.asarray(vertices, float)).reshape(-1, 3)
-    axis = "xyz"[np.ptp(x, axis=0).argmax() if len(x) else 0]
-    words = ["deform", "zoo.off", "-o", "bent.off", "--fixed", f"{axis}<12%", "--handle"]
-    words += [f"{axis}>88%", "--rotate", "y,15", "--regions", "2", "--cage-vertices", "60"]
-    commanded(*words)
-    require_right_surface(sd.Surface.read("zoo.off"), read_polydata("bent.off"))
-
-
 OPERATIONS = {
     "find_faults": check_faults, "repair": repair, "Mesh": check_mesh, "segment": segment,
     "fit_cages": fit, "Deformer": solve, "deform": deform, "Session": drag,
     "Surface": drag_surface, "filter": pipeline,
-    "segdeform check": check_command, "segdeform deform": deform_command,
 }  # fmt: skip
-OF_SURFACES = {"Surface", "filter", "segdeform check", "segdeform deform"}
+OF_SURFACES = {"Surface", "filter"}
 TAKE_ANY_ARRAYS = OPERATIONS.keys() - OF_SURFACES
