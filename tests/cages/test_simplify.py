@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from solids import CUBE, icosphere, rotation, torus
+from solids import CUBE, icosphere, rotation, torus, two_components
 
 from vtk_segdeform.cages.cage import cage_faults
 from vtk_segdeform.cages.simplify import roundness, simplify
@@ -37,6 +37,13 @@ def test_simplifying_preserves_the_topology_and_reaches_n_vertices(solid, genus)
         assert len(vertices) - len(faces) // 2 == 2 - 2 * genus
         assert cage_faults(vertices, faces) == ()
         assert roundness(vertices, faces).min() > 0.1
+
+
+@pytest.mark.usefixtures("either")
+def test_simplifying_stops_where_every_component_is_a_tetrahedron():
+    vertices, faces = simplify(*two_components(), 3)
+    assert len(vertices) == 8
+    assert cage_faults(vertices, faces) == ()
 
 
 @pytest.mark.usefixtures("either")

@@ -282,6 +282,13 @@ def test_version_says_which_libraries_are_missing_for_full_speed(
     assert lines == [f"segdeform {vtk_segdeform.__version__}", *filter(None, [advice])]
 
 
+@pytest.mark.parametrize("known", [0, 3])
+def test_version_says_if_the_reading_of_files_cannot_be_confined(known, monkeypatch, capsys):
+    monkeypatch.setattr("vtk_segdeform.files.landlock.version", lambda: known)
+    assert main(["--version"]) == 0
+    assert ("Landlock" in capsys.readouterr().out) == (not known)
+
+
 def test_version_and_help_end_well(capsys):
     assert main(["--version"]) == 0
     assert vtk_segdeform.__version__ in capsys.readouterr().out

@@ -17,6 +17,7 @@ from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.io import convert
 from vtk_segdeform.io import surface as surface_module
 from vtk_segdeform.io.array_names import set_names
+from vtk_segdeform.pictures import canvas
 from vtk_segdeform.solver import Solution, Status
 
 BAR = models.bar(divisions=(3, 3, 9))
@@ -62,6 +63,21 @@ def test_a_picture_that_cannot_be_written_is_an_error_before_the_solve(
     assert set(os.listdir(folder)) == before
 
 
+def test_a_picture_that_fails_after_the_solve_is_an_error_too(folder, monkeypatch, capsys):
+    real = os.replace
+
+    def full(draft, target):
+        if str(target).endswith(".png"):
+            raise OSError(28, "No space left on device")
+        real(draft, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(canvas, "_HEIGHT", 100)
+    assert main(["deform", "bar.ply", "-o", "out.ply", *POSE, "--picture", "a.png"]) == 1
+    assert "a.png: cannot be written (No space left" in capsys.readouterr().err
+    assert sorted(os.listdir(folder)) == ["bar.ply", "out.ply"]
+
+
 def test_a_selection_may_be_longer_than_a_name_of_a_file(folder):
     long = "&".join([f"z>{k}%" for k in range(90)])
     assert len(long) > 255
@@ -90,6 +106,15 @@ def test_a_mesh_that_exceeds_memory_is_an_error_that_names_it(folder, monkeypatc
     assert main(["check", "vast.obj"]) == 1
     told = capsys.readouterr().err
     assert told == "segdeform check: vast.obj: not enough memory to read this file (1.4 GB)\n"
+
+
+def test_work_that_exceeds_memory_is_an_error_in_one_line(folder, monkeypatch, capsys):
+    def solve(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr(commands.Deformer, "solve", solve)
+    assert main(["deform", "bar.ply", "-o", "bent.ply", *POSE]) == 1
+    assert capsys.readouterr().err.endswith("segdeform deform: out of memory\n")
 
 
 @pytest.mark.parametrize(

@@ -129,3 +129,16 @@ def test_a_point_in_the_middle_of_a_large_face_is_refused_until_it_is_subdivided
     point = SurfacePoint.nearest(after.mesh, np.array([2.93, 0.37, 1.0]))
     assert len(point.corners) == 3
     assert_allclose(point.at(Surface.read(out).mesh.vertices), [2.93, 0.37, 1.8], atol=1e-3)
+
+
+def test_a_pin_in_the_middle_of_a_large_face_is_refused(beam, tmp_path, capsys):
+    words = ["--at", "0.1,0.1,1", "--to", "0.1,0.1,1.5", "--pin", "3,0.5,0", *QUICK]
+    assert main(["pull", beam, "-o", str(tmp_path / "out.ply"), *words]) == 2
+    assert "--pin: no vertex is near this point" in capsys.readouterr().err
+
+
+def test_edges_are_subdivided_by_a_sensible_share_only(beam, tmp_path, capsys):
+    for edge in ("0", "-1", "nan", "101"):
+        words = ["subdivide", beam, "-o", str(tmp_path / "out.ply"), f"--edge={edge}"]
+        assert main(words) == 2
+        assert "--edge must be from 0.5 to 100" in capsys.readouterr().err

@@ -126,3 +126,15 @@ def test_a_file_that_does_not_fit_the_mesh_is_refused(ball, tmp_path, content, m
     path.write_text(content)
     with pytest.raises(ConstraintError, match=message):
         parse_selection(str(path), ball.vertices)
+
+
+def test_a_sel_file_of_another_mesh_is_refused(ball, tmp_path):
+    path = tmp_path / "other.sel"
+    path.write_text("0 1 2")
+    with pytest.raises(ConstraintError, match="one number per point, 66 numbers; got 3"):
+        parse_selection(str(path), ball.vertices, role="fixed")
+
+
+def test_an_array_of_vectors_selects_nothing_sensible_and_is_refused(ball):
+    with pytest.raises(ConstraintError, match="one number per point"):
+        parse_selection("normals", ball.vertices, point_arrays={"normals": ball.vertices})

@@ -64,6 +64,15 @@ def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
     assert "wall: " in capsys.readouterr().out
 
 
+def test_a_goal_that_cannot_be_met_is_an_error_although_the_mesh_is_written(
+    given, tmp_path, capsys
+):
+    out = tmp_path / "out.vtp"
+    assert main(["deform", given, "-o", str(out), "--volume", "cavity=1e9", *QUICK]) == 1
+    assert "was written, but a volume is off by" in capsys.readouterr().err
+    assert out.exists()
+
+
 def test_organs_of_a_label_map_are_called_by_their_labels(tmp_path, capsys):
     path, out = tmp_path / "organs.vtp", tmp_path / "out.vtp"
     labels = np.zeros((12, 12, 12), dtype=int)

@@ -110,6 +110,13 @@ def test_a_pull_grabs_a_point_with_a_vertex_of_its_face_within_the_radius():
     assert arguments.place_text(MESH, SurfacePoint.at_vertex(0)) == "1,0,0"
 
 
+def test_a_radius_is_15_percent_of_the_diagonal_by_default():
+    assert arguments.checked_radius(MESH, None) == pytest.approx(0.15 * D)
+    assert arguments.checked_radius(MESH, 2) == 2.0
+    for wrong in (0.0, -1.0, np.inf, np.nan, "1"):
+        refused("radius must be a positive number or None", arguments.checked_radius, MESH, wrong)
+
+
 def test_the_locality_decides_the_reach_and_what_follows():
     assert [arguments.checked_locality(each) for each in (None, 0, 1)] == [None, 0.0, 1.0]
     for wrong in (-0.1, 1.1, np.nan, "1"):

@@ -389,6 +389,11 @@ def test_a_block_that_fails_leaves_the_deformer_as_it_was():
     )
 
 
+def test_a_cache_that_is_no_path_is_refused_by_name():
+    with pytest.raises(ArgumentError, match=r"^cache must be"):
+        SCENE.deformer(cache=3.5)
+
+
 @pytest.mark.parametrize("beside", [False, True])
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_a_pull_is_the_same_in_every_unit(scale, beside):

@@ -77,6 +77,12 @@ def test_a_scaled_pose_is_near_that_with_the_whole_mesh(monkeypatch):
     assert away < 3e-3 * SCENE.mesh.diagonal
 
 
+@pytest.mark.usefixtures("scaled")
+def test_volumes_of_regions_are_restored_one_by_one():
+    solution = SCENE.deformer(preserve_region_volumes=True).solve(TARGETS)
+    assert np.abs(solution.region_volume_change).max() < 1e-12
+
+
 def test_bodies_whose_coarse_volume_vanishes_keep_theirs(monkeypatch):
     monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
     monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 40)

@@ -143,6 +143,12 @@ def test_steadying_anchors_make_the_pose_a_minimum_and_are_absent_where_it_is_on
     assert least_curvature(0.49 * weight) < -rounding
 
 
+def test_the_search_for_steadying_anchors_ends_where_none_are_enough():
+    solver, p = held()._constraints.solver, held()._path.p
+    without = replace(solver, energy=replace(solver.energy, mass=0.0 * solver.energy.mass))
+    assert without.steadying(p * [1.0, 1.0, 0.2], solver.energy.scale) == 0.0
+
+
 @functools.cache
 def strongly_bent():
     deformer = SCENE.held()

@@ -92,6 +92,17 @@ def test_curvatures_under_one_moment_are_as_the_inverse_of_the_stiffness(ratio):
     assert half[0] / half[1] == pytest.approx(ratio, rel=0.05)
 
 
+def test_the_same_stiffness_everywhere_changes_nothing():
+    targets = X[UPPER] + [0.4, 0.1, -0.2]
+    plain = bar_deformer().hold(fixed=LOWER, handle=UPPER)
+    before = plain.finish(plain.solve(targets)).vertices
+    for same in (0.0, 7.5):
+        alike = bar_deformer().stiffened(np.full(len(X), same)).hold(fixed=LOWER, handle=UPPER)
+        assert_array_equal(alike.finish(alike.solve(targets)).vertices, before)
+    other = of_two_materials(1.5).hold(fixed=LOWER, handle=UPPER)
+    assert np.abs(other.solve(targets).vertices - before).max() > 1e-3
+
+
 def test_only_ratios_of_stiffness_matter():
     targets, given = X[UPPER] + [0.4, 0.1, -0.2], np.where(HEIGHT < LENGTH / 2, 1.0, 3.0)
     one, other = (

@@ -205,6 +205,17 @@ def test_what_is_no_plane_is_named(symmetry):
         deformer().hold(symmetry=symmetry)
 
 
+def test_symmetry_can_be_switched_off():
+    symmetric = deformer().hold(fixed=FEET, handle=HAND, symmetry="x")
+    assert symmetric.mirror is not None
+    assert len(symmetric.handle) == len(HAND)
+    again = symmetric.hold(fixed=FEET, handle=HAND, symmetry=None)
+    assert again.mirror is None
+    plain = deformer().hold(fixed=FEET, handle=HAND)
+    targets = X[HAND] + UP
+    assert np.array_equal(again.solve(targets).vertices, plain.solve(targets).vertices)
+
+
 def test_a_body_beside_the_plane_and_its_twin_move_alike():
     """Two bodies, each the mirror image of the other; nothing is on the plane."""
     one = crab(3)

@@ -207,6 +207,18 @@ def test_a_bound_holds_exactly_if_it_is_active_and_changes_nothing_if_not():
     assert_allclose(equal.volumes["wall"], active.volumes["wall"], rtol=EXACT)
 
 
+def test_a_bound_is_released_when_the_pose_returns():
+    deformer = held(hollow(), volumes={"wall": "at most keep"})
+    there = pulled(deformer)
+    there[:, 0] += 0.5
+    x = deformer.mesh.vertices
+    bent = deformer.solve(there)
+    assert bent.volume_error < EXACT
+    back = deformer.solve(x[deformer.handle])
+    assert back.volume_error < EXACT
+    assert np.abs(back.vertices - x).max() < 1e-3
+
+
 def test_a_bound_holds_in_the_finish_that_would_pass_it():
     free = held(hollow(), volumes={"whole": "free"})
     solution = free.solve(pulled(free, 60.0))

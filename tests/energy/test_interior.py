@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform import models
+from vtk_segdeform import models, sizes
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.energy import Interior, with_interior
 from vtk_segdeform.mesh import Mesh, winding_number
@@ -117,3 +117,13 @@ def test_the_points_turn_with_the_mesh_and_are_mirrored_with_it(flip):
     here = Interior.of(mesh, weights, BODY)
     assert_allclose(other.points, here.points @ flip.T, atol=1e-9)
     assert_allclose(other.volumes, here.volumes, rtol=1e-9)
+
+
+def test_a_large_mesh_has_as_many_points(monkeypatch):
+    monkeypatch.setattr(sizes, "DECIMATED", 500)
+    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 400)
+    mesh = models.cactus(1500)
+    interior = Interior.of(mesh, np.ones((1, mesh.n_vertices)), BODY)
+    assert 100 < len(interior.points) <= 200
+    inside = winding_number(interior.points, mesh.vertices, mesh.faces)
+    assert np.mean(inside > 0.5) > 0.95

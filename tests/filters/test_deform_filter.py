@@ -310,6 +310,13 @@ def test_points_at_a_seam_move_together_and_their_normals_agree():
     assert np.abs(cosines).min() > 0.98
 
 
+@pytest.mark.parametrize(("lids", "count"), [(True, 4), (None, 4), (False, 0)])
+def test_lids_are_chosen(lids, count):
+    _, own = bent(GIVEN["holed"](), Lids=lids)
+    assert own["Lids"] == count
+    assert own["HasVolume"] == [count > 0]
+
+
 def test_targets_are_those_of_given_points():
     surface = tube()
     top = np.flatnonzero(surface.points[:, 2] > 2.7)[::-1]

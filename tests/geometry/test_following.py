@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import rotation
 
 from vtk_segdeform.geometry import Carrying, carriers, towards
+from vtk_segdeform.mesh import Mesh
 
 BAR = rod(0.5, 0.0, 4.0)
 
@@ -45,6 +46,14 @@ def test_what_is_inside_follows():
     assert_array_equal(carriers(joined(BAR, (inner[0], inner[1][:, ::-1]))), [0, 0])
 
 
+def test_what_is_inside_follows_wherever_it_is():
+    wide = ball(2.0, [0.0, 0.0, 0.0], 3)
+    for place in ([0.0, 0.0, 0.0], [0.0, 0.0, -0.9], [0.7, 0.5, 0.4]):
+        x, faces = ball(0.5, place)
+        assert_array_equal(carriers(joined(wide, (x, faces[:, ::-1]))), [0, 0])
+    assert_array_equal(carriers(joined(wide, ball(0.5, [0.0, 0.0, 2.9]))), [0, 1])
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_followers_do_not_depend_on_the_frame(scale):
     mesh = joined(BAR, tube(0.6, 0.7, 1.0, 3.0), beside(0.1), ball(0.1, [0.0, -0.62, 3.5]))
@@ -52,6 +61,22 @@ def test_followers_do_not_depend_on_the_frame(scale):
     moved = mesh.with_vertices(scale * (mesh.vertices @ turn.T + [5.0, -7.0, 2.0]))
     assert_array_equal(carriers(mesh), [0, 0, 1, 0])
     assert_array_equal(carriers(moved), carriers(mesh))
+
+
+def test_many_small_components_follow_the_nearest_large_one():
+    at = [[0.53 * np.cos(k), 0.53 * np.sin(k), 0.2 + 0.09 * k] for k in range(40)]
+    far = [[3.0, 0.0, z] for z in (0.0, 1.0, 2.0)]
+    mesh = joined(BAR, beside(0.5), *(ball(0.03, place, 0) for place in [*at, *far]))
+    assert_array_equal(carriers(mesh), [0, 1, *[0] * 40, *range(42, 45)])
+
+
+def test_a_root_carries_and_a_free_component_is_alone():
+    mesh = joined(BAR, tube(0.6, 0.7, 1.0, 3.0), tube(0.73, 0.8, 1.0, 3.0))
+    assert_array_equal(carriers(mesh), [0, 0, 1])
+    assert_array_equal(carriers(mesh, roots=np.array([1])), [1, 1, 1])
+    assert_array_equal(carriers(mesh, roots=np.array([0, 2])), [0, 2, 2])
+    assert_array_equal(carriers(mesh, {1: "free"}), [0, 1, 0])
+    assert_array_equal(carriers(mesh, {2: 0}, roots=np.array([0, 2])), [0, 2, 0])
 
 
 def test_trees_can_be_turned_towards_other_roots():
@@ -88,3 +113,9 @@ def test_carried_weights_sum_to_one():
     carried = Carrying(mesh, np.array([0, 0])).carried(given)
     assert_allclose(carried.sum(axis=1), 1.0, atol=1e-9)
     assert carried.min() > -1e-9
+
+
+def test_a_mesh_of_one_component_has_no_followers():
+    mesh = Mesh(*BAR)
+    assert_array_equal(carriers(mesh), [0])
+    assert not Carrying(mesh, carriers(mesh)).is_carried.any()

@@ -111,6 +111,13 @@ def waves(n=20):
 
 
 @pytest.mark.usefixtures("either")
+def test_an_open_sheet_has_no_local_volume():
+    mesh = waves()
+    posed = np.random.default_rng(0).normal(size=mesh.vertices.shape)
+    assert not local_volume_change(mesh, posed).any()
+
+
+@pytest.mark.usefixtures("either")
 def test_a_sheet_beside_a_body_does_not_change_its_local_volume():
     body = Mesh(*MESHES["sphere"])
     both = together(waves(), body)

@@ -99,6 +99,11 @@ def test_the_step_reaches_the_target_volume(mesh, seed):
     assert signed_volume(vertices + t * d, faces) == pytest.approx(target, rel=1e-14 * 4)
 
 
+def test_the_step_is_zero_if_the_volume_is_constant():
+    assert step_to_volume(np.zeros(4), 0.0) == 0.0
+    assert step_to_volume(np.array([5.0, 0.0, 0.0, 0.0]), 6.0) == 0.0
+
+
 def test_an_unreachable_target_gives_the_closest_step():
     # 4 + 2 t - t^2 is at most 5, at t = 1.
     assert step_to_volume(np.array([4.0, 2.0, -1.0, 0.0]), 9.0) == pytest.approx(1.0, rel=1e-12)

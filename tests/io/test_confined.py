@@ -107,6 +107,24 @@ def test_one_process_reads_one_file_after_another(tmp_path, fresh):
     assert read_mesh(tmp_path / "a.vtp").n_vertices == 8
 
 
+def test_files_are_read_by_several_threads(tmp_path, fresh):
+    for k in range(4):
+        write_mesh(tmp_path / f"{k}.vtp", Mesh(np.asarray(CUBE[0]) + k, CUBE[1]))
+    found = {}
+
+    def read(k):
+        found[k] = read_mesh(tmp_path / f"{k}.vtp").vertices
+
+    threads = [threading.Thread(target=read, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for k in range(4):
+        assert_array_equal(found[k], np.asarray(CUBE[0]) + k)
+    assert len(confined._idle) == 1
+
+
 def hdf(path, **other):
     """Write a VTKHDF file of a cube whose points are those of *other*, in another file."""
     h5py = pytest.importorskip("h5py")
@@ -349,3 +367,18 @@ def test_a_reader_that_another_program_ends_is_not_blamed_on_the_file(tmp_path, 
     with pytest.raises(MeshError, match=r"another program ended the reader \(SIGKILL\)"):
         read_mesh(tmp_path / "a.vtp")
     assert read_mesh(tmp_path / "a.vtp").n_vertices == 8
+
+
+def test_memory_in_use_is_known_without_proc(monkeypatch):
+    pytest.importorskip("resource")
+    monkeypatch.setattr(reading_child, "Path", lambda _: Path("not there"))
+    assert 1 << 20 < reading_child._memory_in_use() < 1 << 40
+
+
+@MESHLAB
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
+def test_pymeshlab_cannot_open_names_that_are_not_utf_8(tmp_path):
+    path = tmp_path / os.fsdecode(b"\xff.x3d")
+    path.write_text(X3D.format(SHAPE))
+    with pytest.raises(MeshError, match="its name is not valid UTF-8"):
+        read_mesh(path)

@@ -95,6 +95,34 @@ def test_invalid_files_are_errors_that_name_the_file(tmp_path, suffix, what, cap
     capfd.readouterr()
 
 
+def test_nan_is_read_and_reported_as_a_fault(tmp_path):
+    path = tmp_path / "nan.off"
+    path.write_text(
+        "OFF\n4 4 0\n0 0 0\n1 0 0\nnan 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 2 0 3\n"
+    )
+    assert np.isnan(read_polydata(path).points).sum() == 1
+    with pytest.raises(MeshError, match=r"nan.off: .*1 vertex with NaN or infinite"):
+        read_mesh(path)
+
+
+def test_errors_say_what_is_wrong_with_the_file(tmp_path):
+    with pytest.raises(MeshError, match=r"nowhere\.obj: there is no such file"):
+        read_mesh(tmp_path / "nowhere.obj")
+    (tmp_path / "a.xyz").write_text("1 2 3")
+    with pytest.raises(MeshError, match=r"\.xyz files cannot be read; use one of .*\.obj"):
+        read_mesh(tmp_path / "a.xyz")
+    pv.ImageData(dimensions=(3, 3, 3)).cast_to_unstructured_grid().save(tmp_path / "a.vtu")
+    with pytest.raises(MeshError, match="other than triangles"):
+        read_mesh(tmp_path / "a.vtu")
+    pv.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
+    with pytest.raises(MeshError, match="extract its surface first"):
+        read_mesh(tmp_path / "image.vtk")
+    with pytest.raises(MeshError, match=r"\.jpg files cannot be written"):
+        write_mesh(tmp_path / "a.jpg", shuffled())
+    with pytest.raises(MeshError, match="no folder"):
+        write_mesh(tmp_path / "no" / "a.obj", shuffled())
+
+
 @pytest.mark.parametrize("suffix", [*EXACT, ".stl", ".vtu", ".glb", ".gltf"])
 def test_an_empty_file_is_called_empty(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_bytes(b"")

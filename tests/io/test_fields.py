@@ -114,6 +114,14 @@ def test_fibres_of_a_bent_plate_are_along_it():
     assert_allclose(moved.point_data["along"], tangent, atol=0.03)
 
 
+def test_the_displacement_is_an_array():
+    given = block("quadrilaterals")
+    surface = Surface(given)
+    moved = surface.moved(surface.mesh.vertices * 2.0 + 1.0, displacement="u")
+    assert_allclose(moved.point_data["u"], given.points + 1.0, atol=1e-6)
+    assert "u" not in given.point_data
+
+
 def test_points_of_degenerate_faces_and_of_no_face_stay_finite():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0.5, 0.5, 0], [7, 7, 7]], float)
     faces = np.array([[3, 0, 1, 2], [3, 1, 3, 2], [3, 1, 4, 2]]).ravel()  # the last has no area

@@ -113,6 +113,12 @@ def test_attributes_become_arrays(tmp_path):
     assert_allclose(np.linalg.norm(surface.point_data["NORMAL"], axis=1), 1)
 
 
+def test_a_mirrored_mesh_is_oriented_outward_again(tmp_path):
+    document = octahedron(*OCTAHEDRON)
+    document.head["nodes"][0]["scale"] = [-1, 1, 1]
+    assert read_mesh(document.save(tmp_path / "a.glb")).n_faces == 8
+
+
 def test_positions_may_be_integers_interleaved_and_partly_replaced(tmp_path):
     document = Gltf()
     rows = np.zeros(6, [("p", "<i2", 3), ("gap", "<i2"), ("t", "<f4", 2)])

@@ -9,7 +9,7 @@ import logging
 import numpy as np
 import pytest
 import pyvista as pv
-from gltf_files import Gltf
+from gltf_files import Gltf, octahedron
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import OCTAHEDRON, icosphere
 
@@ -132,6 +132,30 @@ def test_writing_again_and_again_does_not_grow_the_file(tmp_path):
         path = tmp_path / f"{k}.glb"
         sizes.append(path.stat().st_size)
     assert max(sizes[1:]) - min(sizes[1:]) < 300
+
+
+def test_nodes_that_share_a_mesh_get_their_own_where_they_differ(tmp_path):
+    document = octahedron(*OCTAHEDRON)
+    document.head["nodes"] = [
+        {"mesh": 0, "name": str(k), "translation": [4.0 * k, 0, 0]} for k in range(4)
+    ]
+    document.head["nodes"][3]["scale"] = [-1, 2, 1]  # mirrored
+    document.head["scenes"][0]["nodes"] = [0, 1, 2, 3]
+    path = document.save(tmp_path / "a.glb")
+
+    def move(vertices):
+        moved = vertices.copy()
+        moved[6:] = bent(vertices[6:])  # all but the first
+        return moved
+
+    require_moved(*moved_file(path, tmp_path / "b.glb", move))
+    head = Document((tmp_path / "b.glb").read_bytes()).json
+    assert [node["mesh"] for node in head["nodes"]] == [0, 1, 2, 3]
+    lift = moved_file(path, tmp_path / "c.glb", lambda x: x + np.repeat([[0], [1]], 12, 0))
+    require_moved(*lift)
+    head = Document((tmp_path / "c.glb").read_bytes()).json
+    assert head["nodes"][0]["mesh"] == head["nodes"][1]["mesh"] == 0
+    assert 0 not in {node["mesh"] for node in head["nodes"][2:]}
 
 
 def test_positions_that_are_interleaved_sparse_or_shared_are_moved(tmp_path, rng):
@@ -353,6 +377,17 @@ def test_positions_that_are_not_plain_bytes_become_new_ones(tmp_path, change):
     assert "extensions" not in new.json["bufferViews"][accessor["bufferView"]]
 
 
+def test_positions_that_are_zero_and_of_no_bytes_become_new_ones(tmp_path):
+    document = Gltf()
+    position = document.add("accessors", componentType=5126, count=len(BALL), type="VEC3")
+    primitive = {"attributes": {"POSITION": position}}
+    primitive["targets"] = [{"POSITION": document.array(BALL)}]
+    primitive["indices"] = document.array(TRIANGLES.ravel(), "u2")
+    document.add("nodes", mesh=document.add("meshes", primitives=[primitive], weights=[1.0]))
+    path = document.save(tmp_path / "a.glb")
+    require_moved(*moved_file(path, tmp_path / "b.glb"))
+
+
 @pytest.mark.parametrize("suffix", [".glb", ".gltf"])
 def test_skins_and_morph_targets_show_the_new_positions(tmp_path, suffix, caplog, rng):
     document = Gltf()
@@ -403,6 +438,23 @@ def test_a_gltf_with_other_files_becomes_one_file(tmp_path):
             assert new.buffer(0)[start : start + view["byteLength"]] == PNG
             assert image["mimeType"] == "image/png"
         assert len(new.json["buffers"]) == 1
+
+
+def test_a_surface_with_other_faces_or_a_damaged_document_becomes_a_new_document(tmp_path, caplog):
+    surface = read_polydata(seamed().save(tmp_path / "a.glb"))
+    part = surface.copy()
+    part.faces = surface.faces[: 4 * 50]
+    write_mesh(tmp_path / "b.glb", part)
+    assert "materials, textures and nodes are left out" in caplog.text
+    assert read_polydata(tmp_path / "b.glb").n_cells == 50
+    for damage in (b"", b"glTF", np.asarray(surface.field_data["glTF"]).tobytes()[:-40]):
+        surface.field_data["glTF"] = np.frombuffer(damage + b"\0", "u1")
+        write_mesh(tmp_path / "b.glb", surface)
+        assert_allclose(read_polydata(tmp_path / "b.glb").points, surface.points, atol=1e-6)
+    assert "is not used" in caplog.text
+    surface.points[0] = np.nan
+    with pytest.raises(MeshError, match=r"b\.glb: .*NaN"):
+        write_mesh(tmp_path / "b.glb", surface)
 
 
 def test_a_new_document_has_positions_normals_texture_and_colours(tmp_path, rng):

@@ -169,6 +169,21 @@ def test_the_matrix_of_a_layer_is_applied_and_equal_names_get_a_number():
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
+def test_quadrangles_are_cut_and_other_types_are_errors():
+    cube = pv.Cube().clean()
+    cube.cell_data["quality"] = np.arange(6.0)
+    again = meshlab.from_meshset(meshlab.to_meshset(cube))
+    assert again.n_cells == 12
+    assert_array_equal(np.sort(again.cell_data["quality"]), np.repeat(np.arange(6.0), 2))
+    for wrong in (3, {"a": "b"}, pv.ImageData()):
+        with pytest.raises(MeshError, match="expected a Mesh, a Surface, a PolyData, a Session"):
+            meshlab.to_meshset(wrong)
+    for ask in (meshlab.from_meshset, meshlab.selected_vertices):
+        with pytest.raises(MeshError, match="has no layer"):
+            ask(meshlab.to_meshset({}))
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
 @pytest.mark.parametrize("suffix", every(8, sorted(meshlab.WRITES)))
 def test_files_in_formats_of_pymeshlab_are_written_and_read(tmp_path, suffix):
     mesh = Mesh(*icosphere(2))

@@ -9,12 +9,12 @@ import pytest
 from any_surface import capsule, polygons, split
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from solids import icosphere
+from solids import icosphere, rotation
 from test_meshlab import painted, same, with_pymeshlab, without_pymeshlab  # noqa: F401
 from zoo_operations import bent, ends
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import Surface, meshlab
+from vtk_segdeform.io import Surface, meshlab, meshlab_project
 from vtk_segdeform.io.convert import to_polydata, write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
 from vtk_segdeform.mesh.mesh import Mesh
@@ -147,6 +147,17 @@ def test_a_project_that_meshlab_saved_is_opened(tmp_path, monkeypatch):
     assert_array_equal(layers["one"]["RGBA"], painted()["RGBA"])
 
 
+def test_the_matrix_of_a_layer_is_applied(tmp_path):
+    turn = rotation([1, 2, 3], 0.5)
+    matrix = np.vstack([np.column_stack([turn, [1, 2, 3]]), [0, 0, 0, 1]])
+    path = project(
+        tmp_path, "ball.ply", "ball.ply", matrix=" ".join(map(repr, matrix.ravel().tolist()))
+    )
+    layers = read_project(path)
+    assert list(layers) == ["a", "a 2"]
+    assert_allclose(layers["a 2"].points, BALL.vertices @ turn.T + [1, 2, 3], atol=1e-14)
+
+
 def test_writing_again_replaces_all_layers_and_no_other_files(tmp_path):
     write_project(tmp_path / "work.mlp", {"a": BALL, "b": BALL, "c": BALL})
     for name in ("notes.ply", "7.ply", "../work-0.ply"):
@@ -238,3 +249,9 @@ def test_nothing_is_written_if_the_project_cannot_be(tmp_path):
     with pytest.raises(MeshError, match="no such file"):
         read_project(tmp_path / "a.mlp")
     assert files(tmp_path) == ["taken.layers"]
+
+
+def test_a_large_file_is_not_parsed(tmp_path, monkeypatch):
+    monkeypatch.setattr(meshlab_project, "_LARGEST", 10)
+    with pytest.raises(MeshError, match="too large"):
+        read_project(project(tmp_path, "ball.ply"))

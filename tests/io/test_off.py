@@ -10,10 +10,14 @@ from numpy.testing import assert_array_equal
 from solids import OCTAHEDRON, TETRAHEDRON
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io.convert import from_polydata, read_polydata
+from vtk_segdeform.io.convert import from_polydata, read_polydata, write_mesh
+from vtk_segdeform.io.polygons import polydata_of
 
 VERTICES, FACES = TETRAHEDRON[0] / 3, TETRAHEDRON[1]
 BYTES = np.array([[0, 7, 255, 9], [2, 128, 0, 255], [254, 1, 0, 0], [40, 50, 60, 70]])
+
+
+LOW = np.array([[0, 1, 1, 1], [1, 0, 0, 1], [0, 0, 0, 0], [1, 1, 1, 0]])  # bytes as well
 
 
 def save(path, *, header="OFF", columns=None, colours=None):
@@ -60,6 +64,18 @@ def test_colours_of_bytes_and_of_fractions_are_the_same(tmp_path, way, where, wi
         assert_array_equal(surface.cell_data[name], table[::-1])
     assert_array_equal(surface.points, VERTICES)
     assert_array_equal(from_polydata(surface).faces, FACES)
+
+
+@pytest.mark.parametrize("of_faces", [False, True])
+@pytest.mark.parametrize("table", [BYTES, LOW, 0 * LOW, BYTES[:, :3], LOW[:, :3], LOW + 1])
+def test_colours_that_are_written_are_read_back(tmp_path, table, of_faces):
+    surface = polydata_of(VERTICES, np.full(4, 3), FACES.ravel())
+    name = "RGB" if table.shape[1] == 3 else "RGBA"
+    attributes = surface.cell_data if of_faces else surface.point_data
+    attributes[name] = table.astype(np.uint8)
+    write_mesh(tmp_path / "a.off", surface)
+    again = read_polydata(tmp_path / "a.off")
+    assert_array_equal((again.cell_data if of_faces else again.point_data)[name], table)
 
 
 NORMAL, COLOUR, TEXTURE = ["0.6", "0.8", "0.0"], ["255", "7", "9", "200"], ["0.25", "0.5"]

@@ -146,6 +146,16 @@ def test_other_meshes_are_refused_with_the_line_that_converts_them(tmp_path, nam
             sd.segment(kind())
 
 
+def test_the_lines_for_grids_and_images_work():
+    image = pv.ImageData(dimensions=(3, 3, 3))
+    surface = sd.Surface(pv.wrap(image).extract_surface(algorithm=None))
+    assert surface.mesh.is_closed
+    grid = image.cast_to_unstructured_grid()
+    with pytest.raises(MeshError, match=r"not of a surface: Surface\(mesh\.extract_surface\(alg"):
+        sd.Surface(grid)
+    assert sd.Surface(grid.extract_surface(algorithm=None)).mesh.is_closed
+
+
 @pytest.mark.parametrize(
     "wrong", [pv.MultiBlock(), pv.MultiBlock([None]), vtkPartitionedDataSetCollection(), 3, None]
 )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import TETRAHEDRON, icosphere
+from solids import CUBE, TETRAHEDRON, icosphere
 from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh, sizes
@@ -144,6 +144,20 @@ def test_an_inconsistent_header_is_an_error(tmp_path, rest, rows, message):
         read_polydata(tmp_path / "a.ply")
 
 
+def test_colours_of_other_types_are_not_converted_to_bytes(tmp_path):
+    rest = FACES.format(m=1)
+    colours = "property {0} red\nproperty {0} green\nproperty {0} blue\n"
+    for kind, row, name, value in [
+        ("float", "0.2 0.4 1", "RGB", [51, 102, 255]),
+        ("ushort", "300 1 2", "red", 300),
+        ("uchar", "3 1 2", "RGB", [3, 1, 2]),
+    ]:
+        lines = [f"{x} {y} {z} {row}" for x, y, z in CUBE[0]]
+        head = HEADER.format(kind="ascii", n=8, rest=colours.format(kind) + rest)
+        (tmp_path / "a.ply").write_text(head + "\n".join([*lines, "3 0 1 2"]))
+        assert np.asarray(read_polydata(tmp_path / "a.ply").point_data[name][0]).tolist() == value
+
+
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
 def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
     vertices, faces = TETRAHEDRON
@@ -163,6 +177,13 @@ def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
             read_polydata(tmp_path / "a.ply")
     (tmp_path / "a.ply").write_bytes(whole)
     assert read_mesh(tmp_path / "a.ply").n_faces == 4
+
+
+def test_a_word_among_numbers_is_shown(tmp_path):
+    whole = text(TETRAHEDRON[0], ["3 0 1 2"], FACES.format(m=1))
+    (tmp_path / "a.ply").write_text(whole.replace("3 0 1 2", "3 0 one 2"))
+    with pytest.raises(MeshError, match="'one' where a number is expected"):
+        read_polydata(tmp_path / "a.ply")
 
 
 def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path):

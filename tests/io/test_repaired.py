@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_allclose, assert_array_equal
 
 import vtk_segdeform.widgets.plugin  # noqa: F401  registers mesh.segdeform
+from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.io import convert
 from vtk_segdeform.io.polygons import cut_into_triangles, polydata_of, polygons_of
 from vtk_segdeform.io.repaired import repair_surface
 
@@ -175,6 +179,19 @@ def test_a_polygon_that_loses_a_part_becomes_triangles_and_is_reported():
     assert_array_equal(np.sort(closed.cell_data["material"][counts == 3]), [0, 8])
 
 
+def test_values_merged_by_welding_are_reported():
+    surface = box()
+    corners = polygons_of(surface)[1]
+    apart = polydata_of(np.asarray(surface.points)[corners], np.full(surface.n_cells, 4),
+                        np.arange(len(corners)))  # fmt: skip
+    apart.point_data["u"] = np.zeros(apart.n_points)
+    apart.point_data["u"][3] = 1.0
+    closed, done = repair_surface(apart)
+    assert (polygons_of(closed)[0] == 4).all()
+    assert closed.n_points == surface.n_points
+    assert done.steps[1:] == ("keep one of several values of u at 1 welded vertex",)
+
+
 def test_strips_and_loose_cells_are_reported():
     strip = pv.PolyData(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]))
     strip.verts, strip.lines = np.array([1, 3]), np.array([2, 0, 3])
@@ -185,3 +202,34 @@ def test_strips_and_loose_cells_are_reported():
     assert_array_equal(closed.cell_data["tag"], [8, 8, 0, 0])
     for step in ("remove 1 vertex cell", "remove 1 line", "cut 1 strip into triangles"):
         assert step in done.steps
+
+
+def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):
+    surface = box(drop=[5])
+    with caplog.at_level(logging.INFO, logger="vtk_segdeform"):
+        closed = surface.segdeform.repair()
+    assert closed.segdeform.check().is_closed
+    assert closed.n_cells > surface.n_cells == 6 * N * N - 1
+    assert "fill 1 hole of 4 edges" in caplog.text
+    caplog.clear()
+    left = surface.segdeform.repair(largest_hole=3)
+    assert not left.segdeform.check().is_closed
+    assert "largest_hole=4 (--largest-hole 4 on the command line)" in caplog.text
+
+
+def test_the_command_line_fills_holes_up_to_the_given_size(tmp_path, capsys):
+    path, out = tmp_path / "open.obj", tmp_path / "closed.obj"
+    convert.write_mesh(path, box(drop=[5]))
+    command = ["check", str(path), "--repair", "-o", str(out)]
+    assert main([*command, "--largest-hole", "3"]) == 1
+    text = capsys.readouterr().out
+    assert "1 hole remains open, of 4 edges" in text
+    assert "largest_hole=4 (--largest-hole 4" in text
+    assert main([*command, "--largest-hole", "4"]) == 0
+    assert "repaired: fill 1 hole of 4 edges" in capsys.readouterr().out
+    closed = convert.read_polydata(out)
+    counts = polygons_of(closed)[0]
+    assert np.count_nonzero(counts == 4) == 6 * N * N - 1
+    assert "TextureCoordinates" in closed.point_data or "TextureCorners" in closed.cell_data
+    assert main([*command, "--largest-hole", "four"]) == 2
+    assert "--largest-hole" in capsys.readouterr().err

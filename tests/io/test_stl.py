@@ -76,6 +76,13 @@ def test_text_in_any_case_with_any_ends_of_lines_is_read(tmp_path):
         assert ("Group" in again.cell_data) == (text is not unnamed)
 
 
+def test_text_in_utf_16_says_so(tmp_path):
+    path, data = octahedron(tmp_path, binary=False)
+    path.write_text(data.decode(), encoding="utf-16")
+    with pytest.raises(MeshError, match=r"a\.stl: is UTF-16 text; save it as UTF-8"):
+        read_polydata(path)
+
+
 def test_a_vertex_that_is_not_numbers_is_named(tmp_path):
     path, data = octahedron(tmp_path, binary=False)
     path.write_bytes(re.sub(rb"vertex (\S+) (\S+)", rb"vertex \1 x\2", data, count=1))
@@ -235,3 +242,10 @@ def test_a_solid_that_is_cut_off_is_an_error_or_told(tmp_path, caplog):
     without_ends = [line for line in lines if not line.startswith("endsolid i")]
     (tmp_path / "a.stl").write_text("\n".join(without_ends))
     assert names_of(read_polydata(tmp_path / "a.stl")) == 4 * ["inlet"] + 4 * ["outer wall"]
+
+
+def test_positions_beyond_single_precision_are_refused(tmp_path):
+    far = to_polydata(Mesh(OCTAHEDRON[0] * 1e39, OCTAHEDRON[1]))
+    with pytest.raises(MeshError, match=r"a\.stl: has positions that STL cannot store"):
+        write_mesh(tmp_path / "a.stl", far)
+    assert not (tmp_path / "a.stl").exists()

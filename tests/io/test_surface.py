@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, torus
 
 import vtk_segdeform as sd
-from vtk_segdeform.errors import ArgumentError, MeshError
+from vtk_segdeform.errors import ArgumentError, ConstraintError, MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import polydata_of
 from vtk_segdeform.mesh import Kind
@@ -103,6 +103,18 @@ def test_the_given_surface_is_not_changed():
     assert given == before
     moved = surface.moved(surface.mesh.vertices)
     assert_array_equal(moved.regular_faces, given.regular_faces)
+
+
+def test_a_handle_of_points_in_no_face_is_an_error():
+    given = pv.Sphere(theta_resolution=8, phi_resolution=6)
+    n = given.n_points
+    stray = pv.PolyData(np.vstack([given.points, [[0, 0, 2.0]]]), given.faces)
+    surface = sd.Surface(stray)
+    with pytest.raises(ConstraintError, match="no point of the handle is in a face"):
+        surface.targets_at([n], [[0.0, 0.0, 3.0]])
+    vertices, targets = surface.targets_at([0, n], [[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]])
+    assert len(vertices) == 1
+    assert_array_equal(targets, [[0.0, 0.0, 1.0]])
 
 
 def parametric(kind, radius):

@@ -235,6 +235,12 @@ def test_a_word_of_several_numbers_is_no_index(tmp_path, word):
         read_polydata(tmp_path / "a.obj")
 
 
+def test_a_plane_is_no_surface_in_space(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3")
+    with pytest.raises(MeshError, match="vertex 1 is '0 0'; must be 3 numbers"):
+        read_polydata(tmp_path / "a.obj")
+
+
 @pytest.mark.parametrize(
     ("colours", "expected"),
     [

@@ -124,6 +124,13 @@ def test_kernels_are_compiled_here_if_the_process_fails_or_cannot_start(folder, 
     assert not is_pending()
 
 
+def test_kernels_are_compiled_here_if_no_folder_can_be_written_to(folder, monkeypatch):
+    _stamp.cache_clear()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    assert compiled_kernels() is dispatch._module()
+    assert not compilation._started
+
+
 def test_the_stamp_is_where_numba_has_its_cache(folder, monkeypatch):
     assert _stamp().parent == folder
     (folder / "file").touch()
@@ -166,6 +173,20 @@ def test_one_process_compiles_at_a_time_and_another_after_one_that_was_killed(fo
     until(lambda: compilation._is_locked(_stamp()))
     begin()
     assert len(compilation._started) == 1
+
+
+def test_a_process_that_found_another_at_work_is_followed_by_one_that_compiles(folder, monkeypatch):
+    with monkeypatch.context() as before:
+        before.setattr(compilation, "_CODE", "# {}")
+        begin()
+        assert compilation._started.pop().result() == 0
+        begin()
+        (first,) = compilation._started
+        first.result()
+    assert is_pending()
+    begin()
+    until(lambda: compilation._is_locked(_stamp()))
+    assert compilation._started != [first]
 
 
 @pytest.fixture

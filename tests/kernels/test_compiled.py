@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import importlib
 import sys
 import threading
 import time
@@ -473,6 +474,15 @@ def test_the_cages_of_each_vertex_are_found_for_any_number_of_regions(regions, r
     columns, w = subspace.nonzeros(some)
     assert_array_equal(columns, np.flatnonzero(np.repeat(membership[:, some].any(axis=1), 2)))
     assert_array_equal(w, dense[np.ix_(some, columns)])
+
+
+def test_kernels_are_compiled_without_a_cache_folder(monkeypatch):
+    caching = pytest.importorskip("numba.core.caching")
+    kernels = importlib.import_module("vtk_segdeform.kernels.compiled.kernels")
+    monkeypatch.setattr(caching.CompileResultCacheImpl, "_locator_classes", [])
+    twice = kernels.kernel()()(lambda x: x + x)
+    assert twice(1.5) == 3.0
+    assert twice.signatures
 
 
 def test_set_up_runs_a_trial_step_so_that_the_first_frame_compiles_nothing(monkeypatch):

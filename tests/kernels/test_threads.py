@@ -145,6 +145,12 @@ def test_blas_threads_are_restored_though_that_is_interrupted(blas, monkeypatch)
     assert blas.threads == 8
 
 
+def test_without_threadpoolctl_nothing_is_limited(monkeypatch):
+    monkeypatch.setattr(threads, "_blas_limit", lambda: None)
+    with threads.one_blas_thread():
+        pass
+
+
 def test_threads_take_quick_turns_until_the_last_one_has_ended():
     before = sys.getswitchinterval()
     inside, first, second = [], threading.Event(), threading.Event()

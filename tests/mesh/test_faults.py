@@ -154,6 +154,20 @@ def test_the_smallest_meshes_do_not_break_the_search(vertices, faces, expected):
     assert kinds(vertices, faces) == expected
 
 
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (np.zeros((4, 2)), [[0, 1, 2]], r"vertices must have shape \(n, 3\); got \(4, 2\)"),
+        (np.zeros((4, 3)), [[0, 1, 2, 3]], r"faces must have shape \(m, 3\), triangles"),
+        (np.zeros((4, 3)), [[0.0, 1.0, 2.0]], "faces must contain integers; got float64"),
+        (np.array([["a", "b", "c"]]), [[0, 0, 0]], "vertices must contain numbers"),
+    ],
+)
+def test_arrays_of_the_wrong_shape_or_type_are_an_error(vertices, faces, message):
+    with pytest.raises(ValueError, match=message):
+        find_faults(vertices, faces)
+
+
 def test_faults_of_random_triangles_agree_with_plain_counting():
     rng = np.random.default_rng(11)
     for _ in range(50):

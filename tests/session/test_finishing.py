@@ -14,7 +14,7 @@ from solids import rotation
 
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
-from vtk_segdeform.errors import CageError, ConstraintError, SessionError
+from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, SessionError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
@@ -161,6 +161,23 @@ def test_what_is_fixed_or_grabbed_after_a_finish_stays_where_it_is():
     before = session.vertices
     session.pull(vertex, before[vertex])
     assert np.abs(session.vertices - before).max() < 1e-9 * unit
+
+
+def test_a_finish_that_is_cancelled_or_late_changes_nothing():
+    session = dragged(ready())
+    before = session.state
+
+    def cancel(*_: object) -> None:
+        raise Cancelled("Cancelled")
+
+    with pytest.raises(Cancelled):
+        session.finish(progress=cancel)
+    assert session.state is before
+    late = session.finishing()()
+    dragged(session, -0.1)
+    now = session.state
+    assert not session.accept_finish(late)
+    assert session.state is now
 
 
 def test_what_cannot_be_finished_is_told():

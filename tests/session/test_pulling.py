@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session.pulls import grabbed, locality_of
+from vtk_segdeform.session.pulls import can_grab, grabbed, locality_of
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
@@ -208,6 +208,24 @@ def test_a_matrix_turns_the_surface_around_the_point():
     assert session.commit() == "drag pull 1"
     assert session.undo() == "drag pull 1"
     assert not session.history.can_undo
+
+
+def test_the_rotation_so_far_turns_nothing():
+    session = ready()
+    assert_array_equal(session.turned(), np.eye(3))
+    tip = int(X[:, 0].argmax())
+    for share in (0.25, 0.5, 0.75, 1.0):
+        session.pull(tip, X[tip] + share * 0.3 * D * np.array([-0.5, 0.0, 1.0]), max_steps=8)
+    session.refine()
+    before, so_far = session.vertices.copy(), session.turned()
+    assert (np.trace(so_far) - 1.0) / 2.0 < np.cos(0.5)
+    matrix = np.eye(4)
+    matrix[:3, :3] = so_far
+    matrix[:3, 3] = before[tip] - so_far @ X[tip]
+    session.pull(tip, matrix)
+    assert np.abs(session.vertices - before).max() < 0.002 * D
+    session.commit()
+    assert_array_equal(session.turned(), np.eye(3))
 
 
 @pytest.mark.parametrize("share", every(2, [0.7, 0.35]))
@@ -556,3 +574,13 @@ def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
     assert again.state.locality.point == INSIDE
     again.refine()
     assert moved(again, session.vertices) < 1e-4
+
+
+def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():
+    session = ready()
+    assert can_grab(session.mesh, INSIDE)
+    assert not can_grab(session.mesh, INSIDE, radius=0.001 * D)
+    assert can_grab(session.mesh, HIGH, radius=0.001 * D)
+    with pytest.raises(ConstraintError, match="no vertex is near this point"):
+        session.pull(INSIDE, INSIDE.at(X) + UP, radius=0.001 * D)
+    assert session.state.pose is None

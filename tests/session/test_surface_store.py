@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import io
 import json
+import pickle
 import re
 import zipfile
 
@@ -107,6 +109,17 @@ def test_active_arrays_texts_and_unnamed_arrays_come_back(tmp_path):
     last = found.GetPointData().GetNumberOfArrays() - 1
     assert found.GetPointData().GetAbstractArray(last).GetName() is None
     assert np.signbit(np.asarray(found.point_data["not a number"])[found.points <= 0.1]).all()
+
+
+def test_copies_pickles_and_undo_keep_the_surface():
+    session = Session(Surface(tube()))
+    for other in (copy.deepcopy(session), copy.copy(session), pickle.loads(pickle.dumps(session))):
+        require_only_moved(session.surface.given, other.deformed)
+        assert other.mesh is other.surface.mesh
+    session.set_fixed([0, 1])
+    given = session.surface
+    session.undo()
+    assert session.surface is given
 
 
 def test_only_sessions_that_earlier_programs_can_read_have_version_1(tmp_path):

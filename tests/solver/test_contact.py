@@ -53,6 +53,22 @@ def test_what_crosses_without_it_does_not_with_it(fork, through):
     assert solution.steps < 60  # with the normals fixed in the Hessian, far more
 
 
+def test_a_pull_avoids_contact_as_well(fork):
+    mesh, x = fork[0].mesh, fork[0].mesh.vertices
+    tip = int(np.where(x[:, 0] > 0, x[:, 2], 0.0).argmax())
+    options = {"pins": fork[0].fixed, "n_regions": 1, "n_cage_vertices": 40, "refine": False}
+    free, avoiding = (
+        sd.pull(mesh, tip, x[tip] - [0.5, 0.0, 0.0], avoid_contact=on, **options)
+        for on in (False, True)
+    )
+    assert len(free.crossings()) > 30
+    assert not len(avoiding.crossings())
+    assert avoiding.handle_error < 1e-4
+    assert abs(avoiding.volume_change) < 1e-12
+    with pytest.raises(sd.errors.ArgumentError, match="avoid_contact"):
+        sd.pull(mesh, tip, x[tip], avoid_contact="yes")
+
+
 def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, monkeypatch):
     contact, p = fork[0]._constraints.contact, through[1]
     value, slope = contact.value_and_slope(p)

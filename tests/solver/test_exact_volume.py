@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere
@@ -21,10 +22,13 @@ from vtk_segdeform.solver.exact_volume import (
 )
 from vtk_segdeform.solver.volume_constraints import VolumeConstraint, total_volume
 from vtk_segdeform.subspace import Subspace
-from vtk_segdeform.subspace.gpu import GPUSurface
+from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
 SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
+
+
+VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
@@ -42,6 +46,15 @@ def test_scaling_restores_the_volume_and_keeps_the_centre(missing):
     assert_allclose(x, centre + scale * (before - centre), atol=1e-13)
 
 
+def test_a_surface_that_is_inside_out_stays_as_it_is():
+    points, faces = icosphere(2)
+    constraint = total_volume(Mesh(points, faces))
+    mirrored = points * [1.0, 1.0, -1.0]
+    x = mirrored.copy()
+    assert scale_to_volume(constraint, x, np.zeros(3)) == 1.0
+    assert_array_equal(x, mirrored)
+
+
 @pytest.mark.usefixtures("scaled")
 def test_a_gpu_and_the_processor_give_the_same_mesh(monkeypatch):
     here = SCENE.deformer().solve(TARGETS)
@@ -56,6 +69,22 @@ def test_a_gpu_and_the_processor_give_the_same_mesh(monkeypatch):
     assert used
     assert_allclose(there.vertices, here.vertices, rtol=0, atol=1e-12)
     assert abs(there.volume_change) < 1e-14
+
+
+@pytest.mark.usefixtures("scaled")
+@pytest.mark.parametrize("when", every(4, ["map", "__init__", "scale_to_volume", "host"]))
+def test_after_a_failure_of_the_gpu_the_processor_is_used(monkeypatch, when):
+    here = SCENE.deformer().solve(TARGETS)
+    monkeypatch.setattr(exact_volume, "gpu_arrays", lambda: np)
+
+    def failing(*_):
+        raise GPUError("out of memory")
+
+    monkeypatch.setattr(GPUSurface, when, failing)
+    deformer = SCENE.deformer()
+    there = deformer.solve(TARGETS)
+    assert_array_equal(there.vertices, here.vertices)
+    assert deformer._constraints.preserved.scaled._gpu is None
 
 
 SPHERES = [3.0, -2.0, 1.0], [-4.0, 0.0, 2.0], [0.0, 5.0, 0.0]

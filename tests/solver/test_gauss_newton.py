@@ -35,6 +35,11 @@ def test_volume_is_exact_and_the_merit_never_rises(options):
     assert merits[-1] < merits[0]
 
 
+def test_without_the_constraint_the_volume_does_change():
+    solution = SCENE.held(preserve_volume=False).solve(SCENE.turned(90))
+    assert abs(solution.volume_change) > 1e-3
+
+
 def test_every_region_volume_is_preserved():
     scene = sausage(3, is_coarse=True)
     solution = scene.held(preserve_region_volumes=True).solve(scene.turned(60))

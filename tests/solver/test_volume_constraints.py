@@ -225,6 +225,14 @@ def test_a_fin_on_a_ball_adds_no_volume():
     assert_allclose(sum(each.target for each in regions), whole.target, rtol=1e-12)
 
 
+def test_a_sheet_has_no_volume_and_no_change_of_it():
+    mesh = sheet(lambda u, v: (u, v, 0.1 * np.sin(9 * u)), 9, 9)
+    whole = total_volume(mesh)
+    assert not whole.has_volume
+    assert whole.relative(mesh.vertices * 2.0) == 0.0
+    assert region_volumes(mesh, thirds(mesh)) == ()
+
+
 def test_the_faces_of_a_lid_belong_to_the_regions_at_its_border():
     mesh = tube(6.0, 12, 6)
     thin = np.ptp(mesh.vertices, axis=0).argmin()  # an axis across the tube

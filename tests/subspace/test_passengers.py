@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scenes import sausage
 from solids import rotation
 
-from vtk_segdeform.errors import Cancelled
+from vtk_segdeform.errors import CageError, Cancelled
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import blend_at
 
@@ -56,6 +56,14 @@ def test_tetrahedra_inside_are_not_inverted(bent):
     assert np.abs(moved - tets).max() > 0.5  # and they have moved
     low, high = solution.vertices.min(axis=0), solution.vertices.max(axis=0)
     assert ((moved > low) & (moved < high)).all()
+
+
+def test_passengers_are_bound_once_for_many_poses(bent):
+    deformer, solution = bent
+    passengers = deformer.passengers(INSIDE)
+    assert_allclose(passengers.moved(solution.cage_vertices), deformer.carry(INSIDE), atol=1e-12)
+    with pytest.raises(CageError, match=r"must contain \[18, 18, 18\] points"):
+        passengers.moved(solution.cage_vertices[:2])
 
 
 def test_binding_can_be_cancelled_and_bad_arguments_are_named(bent):

@@ -28,6 +28,7 @@ from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import convert
 from vtk_segdeform.pictures import canvas
+from vtk_segdeform.session.finishing import Finish
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import plugin
 from vtk_segdeform.widgets.hosting import session_of
@@ -320,6 +321,17 @@ def test_ctrl_c_while_the_pose_is_completed_writes_what_there_is(
     assert_array_equal(written, session.vertices)
     assert abs(session.volume_change) < 1e-12
     assert "interrupted: the pose is not finished" in capfd.readouterr().err
+
+
+def test_a_pose_that_cannot_be_finished_is_written_all_the_same(closed_early, capfd, monkeypatch):
+    def fail(*_, **__):
+        raise MeshError("the matrix is singular")
+
+    monkeypatch.setattr(Finish, "__call__", fail)
+    session, _, written = closed_early()
+    assert session.solution.status is not Status.STEP_LIMIT
+    assert_array_equal(written, session.vertices)
+    assert "the pose is not finished: the matrix is singular" in capfd.readouterr().err
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a screen")

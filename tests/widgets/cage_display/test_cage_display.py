@@ -115,6 +115,16 @@ def test_one_cage_or_all_cages_can_be_hidden(cages):
     assert all(count(cages, of_region(region), image) > 500 for region in range(3))
 
 
+def test_opacity_makes_wireframes_fainter(cages):
+    solid = picture(cages.view).astype(int)
+    cages.opacity = 0.3
+    faint = picture(cages.view).astype(int)
+    assert (255 - faint).sum() < (255 - solid).sum()
+    for wrong in (0.0, 1.5, float("nan")):
+        with pytest.raises(ValueError, match="opacity must be"):
+            cages.opacity = wrong
+
+
 def test_the_mesh_hides_the_wireframe_behind_it(cages, surface):
     p = cages.session.cage_vertices[1]
     in_front = p[(p[:, 1] < -0.6) & (np.abs(p[:, 2]) < 0.5)]

@@ -20,6 +20,7 @@ from vtk_segdeform.errors import (
 )
 from vtk_segdeform.pictures.canvas import require_offscreen
 from vtk_segdeform.widgets.films.film import Film, film
+from vtk_segdeform.widgets.films.film_files import require_film
 from vtk_segdeform.widgets.scene.surface_display import SurfaceDisplay
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -80,6 +81,12 @@ def test_a_drag_becomes_a_picture_for_each_target_and_one_step(tmp_path, session
     assert session.undo() == "drag handle 1"
     assert np.array_equal(session.vertices, SCENE.mesh.vertices)
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_targets_may_be_named_or_come_one_by_one(tmp_path, session):
+    film(tmp_path / "a", session, [{"handle 1": t} for t in TURNS], size=SIZE)
+    film(tmp_path / "b", session, iter(TURNS), size=SIZE)
+    assert len(read(tmp_path / "a")) == len(read(tmp_path / "b")) == 3
 
 
 def test_a_folder_of_png_pictures_is_lossless(tmp_path, ball):
@@ -171,6 +178,14 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_first_frame(tmp_pat
     with pytest.raises(SessionError, match="fps must be"):
         film(tmp_path / "a.gif", ball, [lambda: done.append("work")], fps=0)
     assert done == []
+
+
+@pytest.mark.parametrize(("suffix", "module"), [("mp4", "imageio_ffmpeg"), ("gif", "PIL.Image")])
+def test_a_missing_library_is_reported_with_its_pip_command(tmp_path, monkeypatch, suffix, module):
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(MissingDependencyError, match="pip install") as error:
+        require_film(tmp_path / f"a.{suffix}")
+    assert {"mp4": "'imageio[ffmpeg]'", "gif": "pillow"}[suffix] in str(error.value)
 
 
 def test_a_video_is_written_picture_by_picture_and_closed(tmp_path, monkeypatch, ball):

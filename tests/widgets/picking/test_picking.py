@@ -9,7 +9,7 @@ import pytest
 from hands import plain_view
 from scenes import sausage
 from scipy.sparse import csgraph
-from solids import icosphere
+from solids import icosphere, two_components
 
 from vtk_segdeform import Mesh, Session, models
 from vtk_segdeform.widgets.picking.line_of_sight import intersections
@@ -143,6 +143,11 @@ def test_distances_lie_between_the_straight_line_and_the_path_along_edges():
     assert np.isfinite(distance[around]).all()  # the ring is interpolated there
 
 
+def test_without_points_all_distances_are_infinite():
+    _, _, _, picker = over(models.sphere(300))
+    assert np.isinf(picker.distances([], 1.0)).all()
+
+
 def test_hits_include_the_front_and_the_back():
     view, _, surface, picker = over(models.sphere(800))
     front, back = picker.hits(Pointer(Phase.HOVER, 205, 213))
@@ -152,6 +157,13 @@ def test_hits_include_the_front_and_the_back():
     near = np.linalg.norm(surface.points - front.point, axis=1)
     assert near[front.vertex] == pytest.approx(near.min())
     assert picker.hits(Pointer(Phase.HOVER, 2, 2)) == []
+
+
+def test_a_component_is_a_connected_part():
+    vertices, faces = two_components()
+    _, _, _, picker = over(Mesh(vertices, faces))
+    second = picker.component(len(vertices) - 1)
+    assert np.array_equal(np.flatnonzero(second), np.arange(len(vertices) // 2, len(vertices)))
 
 
 def test_visible_vertices_agree_with_ray_casting(rng):
@@ -180,6 +192,13 @@ def test_a_corner_of_a_cube_is_hidden_by_few_large_triangles():
     assert np.count_nonzero(~seen) == 1  # one corner of a cube is behind
     far = np.linalg.norm(cube - view.camera.GetPosition(), axis=1)
     assert not seen[far.argmax()]
+
+
+def test_vertices_behind_the_camera_are_not_visible():
+    display = np.array([[10.0, 10, 0.5], [20, 10, 0.5], [10, 20, 0.5], [np.nan] * 3])
+    seen = visible_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
+    assert seen.tolist() == [True, True, True, False]
+    assert not visible_vertices(np.full((3, 3), np.nan), np.array([[0, 1, 2]])).any()
 
 
 def test_the_depth_tolerance_separates_rounding_errors_from_hidden_vertices():
