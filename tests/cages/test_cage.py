@@ -118,20 +118,6 @@ def test_points_outside_are_reported_with_their_distance():
         cage.require_encloses(x, "points")
 
 
-@pytest.mark.parametrize("level", [0, 1, 2])
-def test_columns_through_corners_and_edges_of_a_cage_are_handled(level):
-    vertices, faces = icosphere(level)
-    middles = 0.5 * (vertices[faces] + vertices[np.roll(faces, 1, axis=1)]).reshape(-1, 3)
-    columns = np.concatenate([vertices, middles]) * [1.0, 1.0, 0.0]
-    points = np.concatenate([columns + [0.0, 0.0, z] for z in (-0.3, 0.1, 0.4)])
-    winding = winding_number(points, vertices, faces)
-    clear = np.abs(winding - np.round(winding)) < 1e-9
-    clear &= distance_to_surface(points, vertices, faces) > 1e-9
-    assert np.count_nonzero(clear) > 10
-    inside = Cage(vertices, faces).contains(points[clear])
-    assert_array_equal(inside, winding[clear] > 0.5)
-
-
 def test_a_region_is_tested_once_and_others_anew(monkeypatch):
     mesh = models.torus(400)
     half = mesh.vertices[:, 0] > 0.0

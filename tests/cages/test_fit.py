@@ -10,7 +10,6 @@ from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import icosphere, rotation, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.cages import fit
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.contour import contour_surface
@@ -215,20 +214,6 @@ def test_regions_that_are_parts_get_twice_as_many_cage_vertices_as_whole_bodies(
     assert suggested_size(Regions.single(balls)) == 155
 
 
-def test_cages_of_a_large_mesh_are_fitted_to_a_decimated_one_and_enclose_it(monkeypatch):
-    monkeypatch.setattr(sizes, "DECIMATED", 500)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 250)
-    mesh = Mesh(*icosphere(3))
-    regions = thirds(mesh)
-    cages = fit_cages(mesh, regions, 90)
-    assert sum(cage.n_vertices for cage in cages) == 90
-    for cage, members in zip(cages, regions.membership, strict=True):
-        assert cage.contains(mesh.vertices[members]).all()
-        assert distance_to_cage(cage, mesh, members).mean() < 0.5
-    corners = np.concatenate([cage.vertices for cage in cages])
-    assert np.mean(corners[:, 0] > 0.0) == pytest.approx(0.5, abs=0.1)
-
-
 def test_the_regions_of_another_pose_are_fitted_at_this_one():
     mesh = Mesh(*icosphere(2))
     away = mesh.with_vertices(mesh.vertices + [100.0, 0.0, 0.0])
@@ -241,21 +226,6 @@ def test_offsets_beyond_the_limits_are_refused(offset):
     mesh = Mesh(*icosphere(2))
     with pytest.raises(CageError, match="offset must be"):
         fit_cages(mesh, Regions.single(mesh), 40, offset=offset * mesh.diagonal)
-
-
-def test_numbers_of_vertices_grow_with_the_root_of_the_area_and_are_equal_for_equal_regions():
-    ball, faces = icosphere(2)
-    radii, n = [1.0, 1.0, 2.0, 4.0], len(ball)
-    at = np.cumsum([0.0, 4.0, 6.0, 12.0])
-    x = np.concatenate([r * ball + [shift, 0, 0] for r, shift in zip(radii, at, strict=True)])
-    mesh = Mesh(x, np.concatenate([faces + k * n for k in range(4)]))
-    regions = Regions(mesh, mesh.components == np.arange(4)[:, None])
-    patches = [Patch.of(Surface.of(mesh), members) for members in regions.membership]
-    numbers = fit._distributed(patches, 800)
-    assert numbers.sum() == 800
-    assert numbers[0] == numbers[1]
-    assert_allclose((numbers - 12) / (numbers[0] - 12), radii, rtol=0.01)
-    assert_array_equal(fit._distributed(patches, 8 * 4), [8] * 4)
 
 
 def test_the_quality_of_a_cage_is_one_where_it_is_round_and_away_from_the_surface():

@@ -131,17 +131,6 @@ def test_a_single_handle_vertex_translates_the_mesh():
     assert_allclose(solution.vertices, VERTICES + [0.4, 0.1, 0.0], atol=1e-5)
 
 
-def test_single_steps_give_the_same_poses_as_one_solve():
-    targets = SCENE.turned(4)  # near: no waypoints
-    at_once = SCENE.deformer().solve(targets)
-    deformer = SCENE.held()
-    way = [deformer.solve(targets, max_steps=1)]
-    while way[-1].status is Status.STEP_LIMIT and len(way) < 3 * at_once.steps:
-        way.append(deformer.solve(targets, max_steps=1))
-    assert way[-1].status is at_once.status
-    assert_allclose(way[-1].vertices, at_once.vertices, rtol=0, atol=2e-6)  # 3e-7 mesh sizes
-
-
 @pytest.mark.parametrize(
     ("targets", "says"),
     [
@@ -273,26 +262,6 @@ def test_cages_with_too_many_vertices_are_refused():
     big = tuple(Cage(ball * [9.0, 3.0, 3.0], faces) for _ in SCENE.cages)
     with pytest.raises(CageError, match="2052 vertices; the limit of the solver is 1600"):
         Deformer(SCENE.mesh, SCENE.regions, big)
-
-
-def test_a_mesh_may_have_many_bodies():
-    # At least as many rotation clusters as bodies, and a region for each if requested.
-    ball, faces = icosphere(1)
-    places = 3.0 * np.arange(3)
-    grid = np.stack(np.meshgrid(places[:2], places[:2], places), axis=-1).reshape(-1, 3)
-    vertices = np.concatenate([ball + place for place in grid])
-    mesh = Mesh(vertices, np.concatenate([faces + k * len(ball) for k in range(len(grid))]))
-    lift = [0.0, 0.0, 0.4]
-    for n_regions, n_cage_vertices in ((3, 60), (None, 8 * len(grid))):
-        regions = segment(mesh, n_regions)
-        assert regions.n_regions == (n_regions or len(grid))
-        cages = fit_cages(mesh, regions, n_cage_vertices)
-        top = np.flatnonzero(vertices[:, 2] > 5.5)
-        deformer = Deformer(mesh, regions, cages, fixed=vertices[:, 2] < 0.5, handle=top)
-        solution = deformer.solve(vertices[top] + lift)
-        assert abs(solution.volume_change) < 1e-12
-        assert solution.handle_error < 1e-3
-        assert len(np.unique(mesh.components[top])) == 4
 
 
 def test_the_mesh_moves_with_its_cages_by_affine_maps():
@@ -457,17 +426,6 @@ def test_a_pose_far_from_every_reasonable_one_is_replaced_by_the_last_one(monkey
     assert_allclose(deformer.solve(targets).vertices, before.vertices, atol=1e-5)
 
 
-def test_a_frame_of_a_drag_tells_what_remains_only_once_it_has_converged():
-    deformer, targets = SCENE.held(), SCENE.turned(5)
-    frame = deformer.solve(targets, max_steps=1)
-    assert (frame.status, frame.remaining) == (Status.STEP_LIMIT, np.inf)
-    for _ in range(20):
-        frame = deformer.solve(targets, max_steps=20)
-    assert (frame.status, frame.remaining) == (Status.CONVERGED, 0.0)
-    solution = deformer.solve(targets)
-    assert 0.0 < solution.remaining <= 1e-4
-
-
 def test_what_is_no_mesh_region_or_callback_is_refused_by_name():
     with pytest.raises(MeshError, match=r"^mesh must be"):
         Deformer(None, SCENE.regions, SCENE.cages)
@@ -490,14 +448,3 @@ def test_samples_of_a_body_are_held_where_half_of_their_vertices_are(monkeypatch
     shares = [np.isin(np.flatnonzero(cells == k), ids).mean() for k in range(len(is_held))]
     assert_array_equal(is_held, np.array(shares) >= 0.5)
     assert any(0.0 < share < 0.5 for share in shares)
-
-
-def test_a_deformer_without_options_is_the_one_with_their_defaults():
-    plain = SCENE.deformer()
-    same = SCENE.deformer(
-        preserve_volume=True, preserve_region_volumes=False, stretch=1.0, tolerance=1e-7,
-        max_steps=500, avoid_contact=False, rotation_groups=300, lids=None,
-    )  # fmt: skip
-    assert (plain._limits, plain._options) == (same._limits, same._options)
-    one, other = (each.solve(SCENE.turned(30)) for each in (plain, same))
-    assert_array_equal(one.vertices, other.vertices)

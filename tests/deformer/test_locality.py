@@ -262,26 +262,6 @@ def coarse():
     return Deformer(mesh, regions, fit_cages(mesh, regions, 150))
 
 
-@pytest.mark.parametrize(
-    ("vertex", "spread", "share"),  # an edge is 0.055
-    every(3, [(0, 0.075, 0.3), (0, 0.075, 0.05), (217, 0.02, 0.3), (217, 0.02, 0.05)]),
-)
-def test_on_a_coarse_mesh_a_pulled_vertex_stays_in_the_plane_of_its_neighbours(
-    vertex, spread, share
-):
-    mesh = coarse().mesh
-    x, d, ring = mesh.vertices, mesh.diagonal, ring_around(mesh, vertex)
-    local = coarse().hold(handle=[vertex]).local(vertex, 0.3 * d, spread * d)
-    to = x[vertex] + share * d * outward(x, vertex, ring)
-    solution = local.solve(to[None])
-    assert solution.status is Status.CONVERGED
-    for pose in (solution, local.finish(solution)):
-        assert pose.status is not Status.MISSED
-        assert abs(pose.volume_change) < 1e-12
-        assert np.linalg.norm(pose.vertices[vertex] - to) < 1e-4 * d
-        assert spike(mesh, pose.vertices, vertex) < 0.1
-
-
 def test_the_finish_of_a_pull_has_no_more_energy_than_its_start():
     d, x = coarse().mesh.diagonal, coarse().mesh.vertices
     local = coarse().hold(handle=[0]).local(0, 0.3 * d, 0.075 * d)

@@ -244,22 +244,6 @@ def test_waves_longer_than_the_length_stay_and_shorter_ones_relax():
     assert short < 0.1
 
 
-def test_a_finish_from_another_start_ends_at_the_same_pose():
-    finisher = SAUSAGE.finisher()
-    found = finisher.run(SAUSAGE.start, SAUSAGE.places)
-    assert found.remaining <= 1e-5 * SCENE.mesh.diagonal
-    again = finisher.run(SAUSAGE.start, SAUSAGE.places, start=found.vertices)
-    assert again.steps == 0
-    assert_array_equal(again.vertices, found.vertices)
-    wave = 0.05 * np.sin(3.0 * SAUSAGE.start[:, [1, 2, 0]])
-    other = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, wave)
-    there = finisher.run(SAUSAGE.start, SAUSAGE.places, start=other)
-    assert there.steps > 0
-    assert (
-        np.linalg.norm(there.vertices - found.vertices, axis=1).max() < 1e-3 * SCENE.mesh.diagonal
-    )
-
-
 def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for(monkeypatch):
     """Between its ends, a sheet above another one is an arch, which would relax through it."""
     one = sheet()
@@ -364,27 +348,6 @@ def test_with_and_without_compiled_kernels_energies_are_the_same(rounds, monkeyp
     assert_allclose(found[0][1], found[1][1], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("per_cage", "rounds", "share"), [(0, 0, 0), (40, 1, 0.4), (60, 2, 0.3), (9000, 12, 0.5)]
-)
-def test_a_walk_is_a_hundredth_of_the_vertices_per_cage_vertex(per_cage, rounds, share):
-    """In rounds of one half at most, of which there are not more than twelve."""
-    energy = CellEnergy.of(SCENE.mesh, float(per_cage))
-    assert (energy._rounds, energy._share) == (rounds, pytest.approx(share))
-
-
-def test_where_almost_everything_moves_or_nothing_the_energy_is_all_of_it():
-    whole = CellEnergy.of(SCENE.mesh, PER_CAGE)
-    none, every = np.zeros(SCENE.mesh.n_vertices, bool), np.ones(SCENE.mesh.n_vertices, bool)
-    expected = whole.value_and_slope(SAUSAGE.start)
-    for moving in (none, every):
-        near = whole.near(moving)
-        assert near is not whole  # it has rooms of its own
-        value, slope = near.value_and_slope(SAUSAGE.start)
-        assert value == expected[0]
-        assert_array_equal(slope, expected[1])
-
-
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("n", [0, 1, 40])
 def test_the_factored_matrix_solves_as_the_dense_one(n, compiled, monkeypatch):
@@ -432,10 +395,3 @@ def test_a_mirrored_pose_lands_again_where_it_misses_several_volumes(monkeypatch
     made = finisher.made(found, lambda x: x).vertices
     for x, rest in ((made[:count], mesh.vertices), (made[count:], pair.vertices[count:])):
         assert abs(exact_volume_change(rest, x, mesh.faces)) < 1e-13
-
-
-def test_the_finish_reports_when_it_has_ended():
-    told = []
-    SAUSAGE.finisher().run(SAUSAGE.start, SAUSAGE.places, lambda *given: told.append(given))
-    assert told[-1] == (1.0, "finished")
-    assert [share for share, _ in told] == sorted(share for share, _ in told)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.sparse import csgraph
 from solids import icosphere, rotation
 
 from vtk_segdeform.finish import CellEnergy, Finisher, untangling
-from vtk_segdeform.finish.untangling import around, contour, untangled
+from vtk_segdeform.finish.untangling import contour, untangled
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.mesh import Crossings, Mesh
 from vtk_segdeform.solver import Bodies, total_volume
@@ -147,19 +146,3 @@ def test_the_gradient_is_bounded_where_an_edge_is_almost_in_the_plane():
     length, slope = contour(points, np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]]))
     assert length > 0.1
     assert 1.0 < np.abs(slope).max() <= 2.0 * untangling._STEEPEST
-
-
-@pytest.mark.parametrize("rings", [0, 1, 3])
-def test_so_many_rings_around_faces_are_what_is_within_so_many_edges(rings):
-    corners = REST.faces[[5, 700]].ravel()
-    away = csgraph.dijkstra(REST.adjacency, unweighted=True, indices=corners, min_only=True)
-    assert_array_equal(around(REST, np.array([5, 700]), rings), away <= rings)
-
-
-def test_lengths_of_segments_with_two_ends_and_with_a_common_corner_add_up():
-    crossing = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1], [2, 1, 1], [1.5, 1, -1.0]])
-    sharing = np.array([[0.0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0, 1.2]]) + 20.0
-    faces = np.array([[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 9, 10]])
-    points, pairs = np.concatenate([crossing, sharing]), np.array([[0, 1], [2, 3]])
-    assert contour(points, faces, pairs)[0] == pytest.approx(0.5 + 1.0)
-    assert contour(points, faces, pairs[::-1])[0] == pytest.approx(0.5 + 1.0)

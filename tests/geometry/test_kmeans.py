@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, somewhere
 
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts, farthest_points
+from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
 
 
 def test_there_are_about_as_many_clusters_as_asked_for_and_none_is_empty():
@@ -34,16 +34,6 @@ def test_no_cluster_spans_two_parts():
     clusters = cluster_within_parts(positions, some[parts], 30, shares=shares)
     numbers = [len(np.unique(clusters[parts == part])) for part in range(4)]
     assert numbers == [10, 2, 1, 18]
-
-
-def test_each_of_the_farthest_points_is_the_farthest_from_all_before_it():
-    points = somewhere(200, seed=4) + 7.0
-    chosen = farthest_points(points, 12)
-    apart = np.linalg.norm(points[:, None] - points[chosen], axis=2)
-    first = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    assert chosen[0] == first.argmax()
-    for k in range(1, 12):
-        assert chosen[k] == apart[:, :k].min(axis=1).argmax()
 
 
 def test_centres_are_the_means_of_their_points_after_enough_rounds():

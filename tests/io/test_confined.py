@@ -346,16 +346,6 @@ def test_an_interrupt_ends_the_process_and_the_next_file_is_read(tmp_path, monke
     assert read_mesh(tmp_path / "a.vtp").n_vertices == 8
 
 
-def test_no_temporary_files_are_left_behind(tmp_path, monkeypatch, fresh):
-    write_mesh(tmp_path / "a.vtkhdf", Mesh(*CUBE))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    read_mesh(tmp_path / "a.vtkhdf")
-    (tmp_path / "a.vtkhdf").write_bytes((tmp_path / "a.vtkhdf").read_bytes()[:-200])
-    with pytest.raises(MeshError):
-        read_mesh(tmp_path / "a.vtkhdf")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.vtkhdf"]
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="a process that can be stopped")
 def test_a_reader_that_another_program_ends_is_not_blamed_on_the_file(tmp_path, fresh):
     write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))

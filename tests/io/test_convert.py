@@ -33,15 +33,6 @@ def shuffled(seed: int = 1) -> Mesh:
     return Mesh(moved, rng.permutation(number[faces]))
 
 
-@pytest.mark.parametrize("suffix", EXACT)
-def test_meshes_are_read_as_written_to_the_last_digit_in_the_same_order(tmp_path, suffix):
-    mesh = shuffled()
-    write_mesh(tmp_path / f"a{suffix}", mesh)
-    again = read_mesh(tmp_path / f"a{suffix}")
-    assert_array_equal(again.vertices, mesh.vertices)
-    assert_array_equal(again.faces, mesh.faces)
-
-
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_normals_follow_the_surface_and_the_original_is_unchanged(dtype):
     ball = to_polydata(Mesh(*icosphere(2)))

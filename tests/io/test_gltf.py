@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 import pyvista as pv
 from gltf_files import Gltf, glb, octahedron
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from solids import CUBE, OCTAHEDRON, icosphere
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.convert import read_polydata
-from vtk_segdeform.io.gltf.buffers import Document
 from vtk_segdeform.io.polygons import triangles_of
 from vtk_segdeform.io.surface import read_mesh
 
@@ -93,24 +92,6 @@ def test_nodes_morphs_and_skins_move_vertices_as_in_vtk(tmp_path, suffix):
 
     mine, other = corners_in_order(triangles), corners_in_order(theirs(path))
     assert_allclose(mine[np.lexsort(mine.T)], other[np.lexsort(other.T)], atol=2e-4)
-
-
-def test_attributes_become_arrays(tmp_path):
-    document, rng = Gltf(), np.random.default_rng(2)
-    texture, colour = rng.random((6, 2)), rng.integers(0, 256, (6, 3))
-    attributes = {
-        "NORMAL": document.array(OCTAHEDRON[0]),
-        "TEXCOORD_0": document.array(texture),
-        "COLOR_0": document.array(colour, "u1", normalized=True),
-        "_WARMTH": document.array(np.arange(6)),
-    }
-    document.add("nodes", mesh=document.mesh(*OCTAHEDRON, attributes=attributes), scale=[2, 1, 1])
-    surface = read_polydata(document.save(tmp_path / "a.glb"))
-    assert_array_equal(surface.active_texture_coordinates, texture.astype("f4"))
-    assert_array_equal(surface.point_data["RGB"], colour)
-    assert surface.point_data["_WARMTH"].tolist() == [0, 1, 2, 3, 4, 5]
-    assert surface.point_data.active_normals_name == "NORMAL"
-    assert_allclose(np.linalg.norm(surface.point_data["NORMAL"], axis=1), 1)
 
 
 def test_a_mirrored_mesh_is_oriented_outward_again(tmp_path):
@@ -306,25 +287,6 @@ def test_too_many_instances_of_primitives_are_an_error_at_once(tmp_path):
         primitive["mode"] = 1
     with pytest.raises(MeshError, match="more than 50000000 vertices"):
         read_polydata(document.save(tmp_path / "a.glb"))
-
-
-def test_a_mesh_shown_by_many_nodes_is_read_once(tmp_path, monkeypatch):
-    document, read = octahedron(*OCTAHEDRON), []
-    document.head["nodes"] = [{"mesh": 0, "translation": [3.0 * k, 0, 0]} for k in range(50)]
-    document.head["scenes"][0]["nodes"] = list(range(50))
-    viewed = Document._viewed
-
-    def count(self, index, *rest):
-        read.append(index)
-        return viewed(self, index, *rest)
-
-    monkeypatch.setattr(Document, "_viewed", count)
-    mesh = read_mesh(document.save(tmp_path / "a.glb"))
-    assert len(read) == len(set(read)) == 2
-    vertices, faces = (np.asarray(each) for each in OCTAHEDRON)
-    expected = vertices[None] + 3.0 * np.arange(50)[:, None, None] * [1, 0, 0]
-    assert_allclose(mesh.vertices, expected.reshape(-1, 3))
-    assert_array_equal(mesh.faces.reshape(50, -1, 3), faces + 6 * np.arange(50)[:, None, None])
 
 
 @pytest.mark.parametrize("levels", [10, 5_000])

@@ -124,20 +124,6 @@ def test_repeated_and_collinear_corners(polygon, n):
     assert (owner[:2] == 0).all()
 
 
-def test_strips_become_triangles_and_other_cells_none():
-    points = flat((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (9, 9))
-    polydata = pv.PolyData()
-    polydata.points = points
-    polydata.strips = np.array([6, 0, 1, 2, 3, 4, 5, 3, 0, 1, 6])
-    polydata.lines = np.array([2, 0, 6])
-    polydata.verts = np.array([1, 6])
-    triangles = triangles_of(polydata)
-    assert len(triangles) == 5
-    assert_allclose(area_vectors(points, triangles[:4])[:, 2], -0.5)  # all alike
-    polydata.faces = np.array([4, 0, 2, 3, 1])
-    assert len(triangles_of(polydata)) == 7
-
-
 def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
     polydata = pv.PolyData()
     polydata.points = flat((0, 0), (1, 0), (0, 1))

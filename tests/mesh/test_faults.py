@@ -289,22 +289,6 @@ def test_rows_are_equal_by_value_not_by_bits():
         ]
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
-    rng = np.random.default_rng(3)
-    low = np.concatenate([rng.integers(0, 9, (300, 3)).astype(float), 9 * rng.random((100, 3))])
-    low[:, axis] *= 20.0  # along this axis the boxes overlap least
-    high = low + rng.integers(1, 6, (400, 3))
-    order, starts, stops = shells._beginning_within(low, high)
-    for k in range(400):
-        within = ((low > low[k]) & (high < high[k])).all(axis=1)
-        assert set(np.flatnonzero(within)) <= set(order[starts[k] : stops[k]])
-    row = 0.5 * rng.random((1000, 3))
-    row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
-    _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
-    assert (stops <= starts).all()
-
-
 def test_the_connectivity_of_a_cage_has_the_faults_of_its_faces():
     vertices, faces = CUBE
     n = len(vertices)

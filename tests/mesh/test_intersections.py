@@ -95,41 +95,6 @@ def test_crossings_of_one_pose_after_another_are_those_of_each(seed):
     assert max(len(crossings.at(pose)) for pose in poses) > 10
 
 
-def test_faces_that_share_a_corner_may_touch_only_there():
-    fan = np.array([[0, 1, 2], [0, 3, 4]])
-    corner, wide = [0, 0, 0], [[2, -1, 0], [2, 1, 0]]
-
-    def meet(p, q):
-        return len(self_intersections(np.array([corner, *wide, p, q], float), fan)) == 1
-
-    assert meet([1, 0, -1], [1, 0, 1])  # pierced across
-    assert meet([4, 0, -1], [4, 0, 1])  # the other one is pierced
-    assert meet([1, 0, 0], [1, 3, 0])  # in one plane, overlapping
-    assert meet([1, 0.1, 0], [1, -0.1, 0])  # in one plane, inside
-    assert not meet([-1, 0, -1], [-1, 0, 1])
-    assert not meet([-2, 1, 0], [-2, -1, 0])
-    assert not meet([1, 0, 1], [1, 1, 1])
-    assert not meet([1, 0, 1e-6], [1, 1, 1e-6])
-    assert not meet([2, 1.5, 0], [2, 3, 0])  # in one plane, side by side
-
-
-def test_faces_that_share_nothing_may_not_even_touch():
-    pair = np.array([[0, 1, 2], [3, 4, 5]])
-    flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-
-    def meet(*other):
-        return len(self_intersections(np.array([*flat, *other], float), pair)) == 1
-
-    assert meet([0.2, 0.2, 0], [0.2, 0.2, 1], [0.3, 0.2, 1])  # a corner on the face
-    assert meet([0.5, 0.5, -1], [0.5, 0.5, 1], [1, 1, 0])  # an edge on the edge
-    assert meet([0, 0, 0], [0, 0, 1], [-1, 0, 1])  # a corner on the corner
-    assert meet([1, 0, 0], [2, 0, 0], [1, 1, 0])  # in one plane, corner on corner
-    assert meet([0.1, 0.1, 0], [0.2, 0.1, 0], [0.1, 0.2, 0])  # in one plane, inside
-    assert not meet([0.2, 0.2, 1e-9], [0.2, 0.2, 1], [0.3, 0.2, 1])
-    assert not meet([0.51, 0.51, 0], [1, 0.5, 0], [0.5, 1, 0])
-    assert not meet([0.6, 0.6, -1], [0.6, 0.6, 1], [1, 1, 0])
-
-
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("spread", [0.15, 0.5])
 def test_intersections_of_random_triangles_agree_with_vtk(spread):

@@ -119,15 +119,6 @@ def test_a_fin_has_a_border_and_its_body_has_none():
     assert sorted(loop.tolist()) == sorted([a, b, 8])
 
 
-def test_the_order_of_loops_is_that_of_their_first_edges():
-    for faces, n in soups():
-        boundary = HalfEdges(faces, n).net_boundary
-        if len(boundary) and np.bincount(boundary[:, 0]).max() == 1:
-            begin = [int(loop[0]) for loop in loops_of(boundary)]
-            places = [boundary[:, 0].tolist().index(v) for v in begin]
-            assert places == sorted(places)
-
-
 def test_edges_at_a_border_are_listed_whatever_their_direction():
     for face in ([0, 1, 2], [2, 1, 0]):
         mesh = Mesh(np.eye(3), [face])

@@ -88,17 +88,6 @@ def test_a_body_with_a_fin_faces_outward_and_the_fin_keeps_its_orientation(seed)
     assert_array_equal(mesh.faces[len(faces) :], fin)
 
 
-@pytest.mark.parametrize("open_sides", [[(2, 1)], [(2, 0), (2, 1)], [(0, 0)], []])
-def test_a_box_without_some_sides_faces_outward(open_sides):
-    vertices, faces = box(open_sides)
-    outward = mesh_of(vertices @ TURN, faces)
-    assert_array_equal(outward.mesh.faces, faces)
-    assert not any("flipped" in each.text for each in outward.workarounds)
-    inward = mesh_of(vertices @ TURN, faces[:, [0, 2, 1]])
-    assert_array_equal(inward.mesh.faces, faces)
-    assert inward.workarounds[0].text == f"flipped {len(faces)} faces"
-
-
 @pytest.mark.parametrize("open_hull", [False, True])
 @pytest.mark.parametrize("open_cavity", [False, True])
 def test_a_cavity_faces_inward_also_where_the_shells_have_holes(open_hull, open_cavity):

@@ -8,7 +8,6 @@ from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.mesh import Kind, find_faults, mesh_of
 
@@ -117,19 +116,6 @@ def test_a_gap_of_one_step_of_coarse_coordinates_remains():
     faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
     assert checked(both, faces).workarounds[-1].text == "2 holes"
     assert mesh_of(both, faces).mesh.n_vertices == 8
-
-
-def test_seams_elsewhere_do_not_weld_bodies_that_touch(monkeypatch):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    vertices, faces = CUBE
-    corner, loose = vertices + [1.0, 1.0, 1.0], soup(*SPHERE)
-    points = np.concatenate([vertices, corner, loose[0] + 5.0])
-    triangles = np.concatenate([faces, faces + 8, loose[1] + 16])
-    found = checked(points, triangles)
-    assert found.mesh.n_vertices == 16 + len(SPHERE[0])
-    sliver = [[16, 17, np.flatnonzero((points == points[16]).all(axis=1))[1]]]
-    again = checked(points, np.concatenate([triangles, sliver]))
-    assert_array_equal(again.mesh.faces, found.mesh.faces)
 
 
 def test_a_sheet_given_twice_becomes_one_sheet():

@@ -171,15 +171,6 @@ def test_smoothing_near_the_borders_equals_smoothing_everywhere(monkeypatch):
     assert (near != labels).any()
 
 
-def test_level_sets_have_their_length():
-    mesh = Mesh(*icosphere(5))
-    _, surface = coarsen(mesh, 10**6, np.random.default_rng(0))
-    angle = np.arccos(np.clip(mesh.vertices[:, 2], -1, 1))
-    levels = np.array([0.3, 0.8, 1.5, 2.9])
-    lengths = surface.level_lengths(surface.faces, angle, levels)
-    np.testing.assert_allclose(lengths, 2 * np.pi * np.sin(levels), rtol=0.01)
-
-
 def test_quotas_are_proportional_to_area_and_sum_to_the_count():
     many = np.array([99, 99, 99])
     np.testing.assert_array_equal(quotas(np.array([6.0, 3.0, 1.0]), many, 10), [6, 3, 1])
@@ -275,20 +266,6 @@ def test_pieces_of_a_part_join_the_part_of_the_nearest_vertex():
     stray[np.argmin(np.abs(mesh.vertices[:, 2] - 5.0))] = 0
     np.testing.assert_array_equal(borders.connected_parts(mesh, labels), labels)
     np.testing.assert_array_equal(borders.connected_parts(mesh, stray), labels)
-
-
-def test_smoothing_shortens_a_border_and_leaves_it_where_it_is():
-    mesh = limbed()
-    z = mesh.vertices[:, 2]
-    wavy = (z > 5.0 + np.random.default_rng(0).uniform(-0.4, 0.4, len(z))).astype(int)
-
-    def length(labels):
-        return np.count_nonzero(np.diff(labels[mesh.edges], axis=1))
-
-    smooth = borders.smooth_borders(mesh, wavy)
-    assert length(smooth) < 0.7 * length(wavy)
-    crossing = mesh.edges[np.diff(smooth[mesh.edges], axis=1)[:, 0] != 0]
-    np.testing.assert_allclose(z[crossing], 5.0, atol=0.3)
 
 
 def test_components_that_change_have_regions_of_their_own_and_leaders():

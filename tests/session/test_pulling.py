@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session.pulls import can_grab, grabbed, locality_of
+from vtk_segdeform.session.pulls import can_grab, grabbed
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
@@ -138,17 +138,6 @@ def test_the_grabbed_vertex_follows_and_the_volume_is_exact_in_every_frame(local
     assert session.undo() == "drag pull 1"
     assert not session.history.can_undo
     assert_array_equal(session.vertices, X)
-
-
-def test_another_vertex_radius_or_locality_begins_another_pull():
-    session = ready()
-    session.pull(HIGH, X[HIGH] + UP, max_steps=2)
-    session.pull(HIGH, X[HIGH] + 2.0 * UP, radius=0.2 * D, max_steps=2)
-    session.pull(TIP, X[TIP] + UP, max_steps=2)
-    session.commit()
-    labels = [session.undo() for _ in range(3)]
-    assert labels == ["drag pull 2", "drag pull 1", "drag pull 1"]
-    assert not session.history.can_undo
 
 
 def test_a_pulled_point_nearby_is_grabbed_again_and_farther_ones_are_carried_along():
@@ -269,16 +258,6 @@ def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
     assert session.refine().status in (Status.CONVERGED, Status.MISSED)
     assert session.solution.handle_error < 2e-3
     assert most_stretched() < 1.5  # it was 7.8
-
-
-@pytest.mark.parametrize("pins", [0, 2, 3])
-def test_the_default_locality_is_that_of_a_pull_in_one_call(pins):
-    session = ready()
-    for k in range(pins):
-        session.handles.pin(int(SCENE.fixed[k]))
-    assert locality_of(session.state) == {0: 0.2, 2: 0.05, 3: 0.0}[pins]
-    session.pull(HIGH, X[HIGH] + UP, max_steps=1)
-    assert session.state.locality.follows == 1.0 - locality_of(session.state)
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,6 @@ from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.session.timeline import Timeline
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -150,19 +149,6 @@ def test_the_volume_is_exact_at_every_move_and_after_undo_and_redo():
         assert volume_error(session) < 1e-13
 
 
-def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
-    session = ready()
-    solution = session.drag(SCENE.turned(50))
-    subspace = cage_subspace(SCENE.regions, SCENE.cages)
-    expected = subspace.map(np.concatenate(session.cage_vertices))
-    assert_allclose(session.vertices, expected, atol=1e-13)
-    assert solution.vertices is session.vertices
-    assert solution is session.solution
-    other = Session(SCENE.mesh, state=session.state)
-    assert_array_equal(other.vertices, session.vertices)
-    assert other.solution is None
-
-
 def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit(monkeypatch):
     monkeypatch.setattr(sizes, "SCALED_VOLUME", SCENE.mesh.n_vertices - 1)
     session, mapped = ready(), []
@@ -220,21 +206,6 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
             session.history.jump(wrong)
     with pytest.raises(SessionError, match="number of steps"):
         Timeline(State(), 0)
-
-
-def test_the_oldest_state_is_named_by_the_last_step_that_was_discarded():
-    session = Session(SCENE.mesh, history=2)
-    session.set_fixed([0])
-    session.handles.add([5], "first")
-    assert session.history.labels == ("opened", "set fixed vertices", "set first")
-    session.handles.add([6], "second")
-    assert session.history.labels == ("set fixed vertices", "set first", "set second")
-    session.handles.add([7], "third")
-    assert session.history.labels == ("set first", "set second", "set third")
-    session.undo()
-    session.undo()
-    assert session.history.labels[session.history.position] == "set first"
-    assert list(session.handles) == ["first"]
 
 
 def test_there_is_nothing_to_redo_during_a_drag_which_goes_on():
@@ -325,21 +296,6 @@ def test_another_action_commits_the_drag_in_hand_first(action):
         session.set_fixed(X < -2.5)
         assert [session.history.undo_label, session.undo()] == ["set fixed vertices"] * 2
     assert snapshot(session) == dragged
-
-
-def test_a_matrix_moves_a_handle_from_where_the_drag_began():
-    session = ready()
-    turn = np.eye(4)
-    turn[:3, :3] = rotation([1, 0, 0], 0.4)
-    for matrix in (up(0.5), up(0.2), turn):
-        session.move_handle("tip", matrix, max_steps=3)
-    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
-    session.commit()
-    session.move_handle("tip", up(0.2), max_steps=3)
-    expected = VERTICES[SCENE.handle] @ turn[:3, :3].T + [0, 0, 0.2]
-    assert_allclose(session.targets["tip"], expected)
-    session.move_handle("tip", np.eye(4), max_steps=3)
-    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
 
 
 def test_a_drag_stopped_early_is_refined_to_the_end():
@@ -606,21 +562,6 @@ def test_listeners_hear_after_the_change_in_their_order_until_they_stop():
         Change.HISTORY,
         Change.POSE | Change.HISTORY,
     ]
-
-
-def test_what_is_handed_in_can_be_written_to_afterwards():
-    session = ready()
-    ids, targets = SCENE.handle[:5].copy(), VERTICES[SCENE.handle[:5]] + [0, 0, 0.1]
-    session.handles.add(ids, "tip")
-    session.drag(targets)
-    before = snapshot(session)
-    ids[:], targets[:] = 0, 0.0
-    assert snapshot(session) == before
-    targets = VERTICES[SCENE.handle[:5]].copy()
-    session.drag({"tip": targets})
-    before = snapshot(session)
-    targets[:] = 0.0
-    assert snapshot(session) == before
 
 
 NEAR = VERTICES[SCENE.handle]

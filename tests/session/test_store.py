@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 from scenes import sausage
 from solids import OCTAHEDRON, TETRAHEDRON
 
@@ -139,14 +138,6 @@ def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_p
     assert loaded.region_names == ("region 1", "region 2")
     loaded.painting.rename(1, shared(posed).region_names[1])
     assert same(loaded, shared(posed))
-
-
-def test_numpy_alone_can_read_the_arrays(tmp_path):
-    saved(shared(posed), tmp_path)
-    with np.load(tmp_path / "saved.npz", allow_pickle=False) as arrays:
-        assert_array_equal(arrays["mesh_vertices"], SCENE.mesh.vertices)
-        assert arrays["membership"].dtype == bool
-        assert json.loads(arrays["header.json"])["version"] == 1
 
 
 def refuse(content: bytes, folder: Path) -> str:

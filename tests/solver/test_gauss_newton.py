@@ -161,32 +161,6 @@ def is_slow(lengths, *, max_steps=500, age=1, is_new=False):
     return state.is_slow(last)
 
 
-def test_h_is_out_of_date_where_the_next_12_steps_at_the_present_rate_do_not_converge():
-    assert is_slow([1.0, 0.50])  # 0.5^13 is 1.2e-4
-    assert not is_slow([1.0, 0.49])  # 0.9e-4
-    assert is_slow([9.0, 1.0, 0.50])
-    assert is_slow([1.0, 2.0])
-    assert not is_slow([1e-5, 9e-5])  # longer than the last one, but the last that is needed
-    assert not is_slow([1.0])  # the rate is unknown
-
-
-def test_an_h_of_the_same_call_serves_until_acceleration_has_its_steps():
-    for count in range(1, 7):
-        lengths = [0.9**k for k in range(count + 1)]
-        assert is_slow(lengths, age=0, is_new=True) == (count >= 5)
-
-
-def test_a_call_continues_the_last_one_only_from_its_end_and_for_its_targets():
-    p, targets, options = np.ones((2, 3)), np.zeros((1, 3)), SolverOptions()
-    for at, to, continues in ((p, targets.copy(), True), (p.copy(), targets, False),
-                              (p, targets + 1e-9, False)):  # fmt: skip
-        state = _State(None, length=0.3, end=(p, targets))
-        state.acceleration.extrapolate(p, p)
-        state.begin(at, to, options)
-        assert state.length == (0.3 if continues else np.inf)
-        assert (state.acceleration._last is not None) == continues
-
-
 def test_h_is_computed_where_a_pose_is_far_and_saves_steps_there(monkeypatch):
     of_h, computed = GaussNewton._factor_at, []
     monkeypatch.setattr(

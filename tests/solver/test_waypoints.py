@@ -110,11 +110,3 @@ def test_half_a_turn_is_about_the_axis_toward_the_farthest_point_of_the_handle(s
     way = waypoints(start, end, [np.arange(4)])
     turn = rotation([0.0, 0.0, side], np.pi / len(way))
     assert_allclose(way[0], start @ turn.T, atol=1e-6)
-
-
-def test_a_far_motion_of_few_points_of_a_large_handle_has_waypoints():
-    start = somewhere(n=1600, size=0.05)
-    end = start + 0.0
-    end[800:] += [0.0, 0.0, 0.5]
-    assert len(waypoints(start, end, [np.arange(1600)])) > 2
-    assert len(waypoints(start, start + 0.01, [np.arange(1600)])) == 1

@@ -275,19 +275,6 @@ def closed_early(tmp_path, session, monkeypatch):
     return run
 
 
-def test_a_window_closed_while_the_pose_settles_completes_it_first(closed_early, capfd):
-    session, shown, written = closed_early()
-    assert session.solution.status is not Status.STEP_LIMIT
-    assert not session.can_finish
-    assert session.solution.handle_error < 1e-12
-    assert abs(session.volume_change) < 1e-12
-    assert_array_equal(written, session.vertices)
-    assert np.abs(written - shown).max() > 1e-3
-    told = capfd.readouterr()
-    assert "finishing after the window was closed; Ctrl+C to stop" in told.out
-    assert told.err == ""
-
-
 def test_a_window_closed_during_the_drag_completes_its_pose_as_well(closed_early):
     session, _, written = closed_early(functools.partial(pull, shift=(30, -40), releases=False))
     assert not session.can_finish

@@ -84,14 +84,6 @@ def near(display, point, colour, image=None) -> bool:
     return bool((image @ hue > 0.995 * np.linalg.norm(image, axis=1)).any())
 
 
-def ball(display, point, colour, image) -> bool:
-    """Return whether all pixels around a world *point* have *colour* in the *image*."""
-    x, y = (round(float(p)) for p in display.view.to_display(np.array([point]))[0, :2])
-    image = image[::-1][y - 1 : y + 2, x - 1 : x + 2].reshape(-1, 3).astype(float)
-    hue = np.asarray(colour, float) / np.linalg.norm(colour)
-    return bool((image @ hue > 0.99 * np.linalg.norm(image, axis=1)).all())
-
-
 def test_each_cage_has_the_colour_of_its_region(cages):
     image = picture(cages.view)
     for region in range(3):
@@ -123,19 +115,6 @@ def test_opacity_makes_wireframes_fainter(cages):
     for wrong in (0.0, 1.5, float("nan")):
         with pytest.raises(ValueError, match="opacity must be"):
             cages.opacity = wrong
-
-
-def test_the_mesh_hides_the_wireframe_behind_it(cages, surface):
-    p = cages.session.cage_vertices[1]
-    in_front = p[(p[:, 1] < -0.6) & (np.abs(p[:, 2]) < 0.5)]
-    assert len(in_front)
-    image = picture(cages.view)
-    assert all(ball(cages, point, of_region(1), image) for point in in_front)
-    with_body = [count(cages, of_region(region), image) for region in range(3)]
-    surface.actor.VisibilityOff()
-    image = picture(cages.view)
-    without = [count(cages, of_region(region), image) for region in range(3)]
-    assert all(without[region] > 1.2 * with_body[region] for region in range(3))
 
 
 def test_cages_follow_the_pose(cages):

@@ -9,7 +9,6 @@ from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
-from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_outlines import RegionOutlines
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
 from vtk_segdeform.widgets.scene.view import View
@@ -132,20 +131,6 @@ def test_a_lasso_selects_the_vertices_inside(desk):
     assert len(places) > 5
     assert np.hypot(places[:, 0], places[:, 2] - 0.5).max() < 0.33
     assert (places[:, 1] < 0.0).all()
-
-
-def test_the_line_is_drawn_while_the_button_is_down(desk):
-    idle = picture(desk.view)
-    desk.selector.tool = Tool.RECTANGLE
-    desk.hand.press((20, 20))
-    desk.hand.move((380, 380))
-    changed = (picture(desk.view) != idle).any(axis=2)
-    assert changed[18:23, 30:370].any(axis=0).all()
-    assert changed[30:370, 378:383].any(axis=1).all()
-    assert not changed[30:60, 30:60].any()  # the inside is not filled
-    desk.hand.key("Escape")
-    desk.hand.release()
-    assert (picture(desk.view) == idle).all()
 
 
 def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
@@ -345,22 +330,6 @@ def test_grow_and_shrink_change_one_ring_of_neighbours(desk):
     assert np.array_equal(large, np.union1d(small, reached))
     desk.selector.shrink()
     assert np.array_equal(desk.session.handles["handle 1"], small)
-
-
-def test_fixed_vertices_are_grey_handles_red_and_overlaps_mixed(desk):
-    def colour(x, z):
-        px, py = desk.under(x, z)
-        pixel = picture(desk.view)[400 - round(py), round(px)].astype(float)
-        return pixel / pixel.max()
-
-    upper, lower, between = colour(0.0, 0.8), colour(0.0, -0.8), colour(0.0, 0.0)
-    assert np.abs(upper - lower).max() > 0.3
-    assert np.abs(between - (upper + lower) / 2 / ((upper + lower) / 2).max()).max() < 0.25
-    desk.session.set_fixed(desk.points[:, 2] < -0.7)
-    desk.session.handles.add(desk.points[:, 2] > 0.7)
-    for (x, z), name in (((0.0, -0.85), FIXED), ((0.0, 0.85), HANDLE)):
-        wanted = rgb(name) / rgb(name).max()
-        assert np.abs(colour(x, z) - wanted).max() < 0.12
 
 
 def test_remove_restores_the_view():
