@@ -225,6 +225,26 @@ def test_a_finished_pose_rotates_with_its_handles():
     assert rotated(session, rotation([0.0, 0.0, 1.0], 1.0)) < 1e-3
 
 
+def test_a_finish_fades_as_the_pose_is_bent_back_and_comes_again():
+    """It belongs to one way of bending, and would bend the surface the other way."""
+    session, plain = dragged(ready(), -0.9), dragged(ready(), -0.9)
+    session.finish()
+
+    def difference(angle: float) -> float:
+        for each in (session, plain):
+            each.drag({"tip": SCENE.mesh.vertices[SCENE.handle] @ turned(angle)[:3, :3].T})
+        assert_array_equal(session.cage_vertices[0], plain.cage_vertices[0])
+        assert abs(volume_of(session.mesh, session.vertices) / volume_of(session.mesh) - 1) < 1e-12
+        return float(np.linalg.norm(session.vertices - plain.vertices))
+
+    there, half, back, other, again = (difference(a) for a in (-0.9, -0.45, 0.0, 0.9, -0.9))
+    assert 0.3 * there < half < 0.7 * there
+    assert back < 0.05 * there
+    assert other < 0.05 * there  # the places of fixed vertices, which the cages miss by a little
+    assert abs(again - there) < 0.01 * there
+    assert difference(-1.1) > 0.9 * there
+
+
 @pytest.mark.parametrize(("growth", "left"), [(-0.3, 0.01), (-1.0, 0.01), (-1.5, 0.1)])
 def test_offsets_that_turn_with_their_pose_come_to_rest(growth, left):
     wanted, shift = np.zeros((1, 3)), np.ones((1, 3))
