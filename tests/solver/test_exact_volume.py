@@ -28,9 +28,6 @@ SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
 
 
-VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
-
-
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])
 def test_scaling_restores_the_volume_and_keeps_the_centre(missing):
     points, faces = icosphere(3)

@@ -21,7 +21,6 @@ from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import write_mesh
 
-pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
 posix = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and limits")
