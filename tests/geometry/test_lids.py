@@ -22,10 +22,10 @@ from open_meshes import (
     with_holes,
     with_walls,
 )
-from solids import rotation
+from solids import CUBE, rotation
 
 from vtk_segdeform import models
-from vtk_segdeform.geometry.lids import lids_of, mean_winding, volume_summary
+from vtk_segdeform.geometry.lids import _winding_of_few, lids_of, mean_winding, volume_summary
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 
@@ -217,6 +217,24 @@ def test_a_one_sided_surface_encloses_nothing(option):
 
 
 SPIKE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]])
+
+
+def test_the_winding_of_few_faces_is_summed_over_pairs_of_them():
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    several = [
+        Mesh(SPIKE, tetrahedron),
+        Mesh(SPIKE, tetrahedron[1:]),
+        Mesh(*CUBE),
+        Mesh(CUBE[0], CUBE[1][:8]),
+    ]
+    several.append(Mesh(SPIKE, tetrahedron[1:, ::-1]))
+    mesh = together(*several)
+    sizes = np.array([each.n_faces for each in several])
+    found = _winding_of_few(mesh, np.arange(mesh.n_faces), np.cumsum(sizes) - sizes, sizes)
+    assert_allclose(found[[0, 2]], 1.0, atol=1e-12)  # the whole inside, from any point
+    assert found[4] == -found[1]
+    for one, each in zip(found, several, strict=True):
+        assert abs(one - mean_winding(each.vertices, each.faces)) < 0.12
 
 
 def test_thousands_of_leaves_and_cups_are_told_apart_soon(rng):

@@ -19,6 +19,7 @@ from vtk_segdeform.io.polygons import (
     polygons_of,
     rows,
     triangles_of,
+    unstripped,
 )
 
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
@@ -177,6 +178,12 @@ def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
     assert_array_equal(again.faces, [3, 0, 1, 2, 4, 4, 5, 6, 7, 3, 0, 1, 2, 3, 2, 1, 3, 3, 7, 6, 5])
     with pytest.raises(MeshError, match="faces use vertices 0 to 8, but there are 8"):
         polydata_of(points, np.array([3]), np.array([0, 1, 8]))
+
+
+def test_strips_are_cut_into_triangles_of_the_same_orientation():
+    found = unstripped(np.array([5, 3, 6]), np.array([0, 1, 2, 3, 4, 7, 8, 9, 0, 1, 2, 2, 3, 4]))
+    expected = [[0, 1, 2], [2, 1, 3], [2, 3, 4], [7, 8, 9], [0, 1, 2], [3, 2, 4]]
+    assert_array_equal(found, expected)
 
 
 def test_values_of_corners_are_padded_and_read_back():
