@@ -64,6 +64,15 @@ def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):
     assert_allclose(moved, np.tile([0.2, 0.0, 0.0], (n + 1, 1)), atol=5e-3)
 
 
+def test_a_sel_file_has_one_number_per_given_point(tmp_path):
+    path, sel, out = file_of("tube", tmp_path), tmp_path / "pose.sel", tmp_path / "out.vtp"
+    z = tube().points[:, 2]
+    np.savetxt(sel, np.where(z < 0.3, 0, np.where(z > 2.7, 2, 1)), fmt="%d")
+    words = ["--fixed", str(sel), "--handle", str(sel), "--translate", "0.2,0,0", *QUICK, *ROUGH]
+    assert main(["deform", str(path), "-o", str(out), *words]) == 0
+    assert_allclose(read_polydata(out).points[z < 0.3], tube().points[z < 0.3], atol=5e-3)
+
+
 def test_regions_are_written_at_the_given_points_and_read_again(tmp_path, capsys):
     path, out = file_of("holed", tmp_path), tmp_path / "regions.vtp"
     assert main(["regions", str(path), "-o", str(out), "--regions", "2"]) == 0
@@ -146,6 +155,14 @@ def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys)
     assert f"at this distance from the origin in steps of {steps} (median edge " in printed
     assert "move the model to the origin before you export it" in printed
     assert (found[0]["count"] > 0) == ("collapsed" in printed) == (away == 4e6)
+
+
+def test_check_counts_self_intersections_and_does_not_refuse_them(tmp_path, capsys):
+    two = pv.merge([pv.Sphere(radius=1.0), pv.Sphere(radius=1.0, center=(1, 0, 0))])
+    write_mesh(tmp_path / "two.vtp", two.extract_surface(algorithm=None))
+    assert checked(tmp_path / "two.vtp", capsys)["self_intersections"] > 10
+    assert main(["check", str(tmp_path / "two.vtp")]) == 0
+    assert "pairs of faces intersect" in capsys.readouterr().out
 
 
 def test_check_names_what_cannot_be_deformed(tmp_path, capsys):

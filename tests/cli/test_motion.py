@@ -61,6 +61,13 @@ def test_a_vector_that_is_none_is_refused_by_name(text):
         motion.parse_vector(text, "translate")
 
 
+def test_a_matrix_file_is_read_back(tmp_path):
+    matrix = motion.rotation([1, 2, 3], 0.8, [4, 5, 6])
+    path = tmp_path / "pose.def"
+    np.savetxt(path, matrix, header="the pose", fmt="%.17g")
+    assert_allclose(motion.read_matrix(path), matrix, atol=0)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [

@@ -123,3 +123,11 @@ def test_the_turn_of_a_handle_is_measured_along_the_surface():
     )
     other = handle + BAR.n_vertices
     assert turns_off(apart, apart.vertices, axis, 9.0, fixed=fixed, handle=other) == 0
+
+
+def test_where_all_vertices_are_held_this_is_what_is_told(turned, capsys):
+    code, _ = turned("--rotate", "x,40", fixed="z<50%", handle="z>=50%")
+    assert code == 1
+    message = capsys.readouterr().err
+    assert "all vertices are fixed or in handles, so nothing is free to move" in message
+    assert "add cage vertices" not in message

@@ -16,6 +16,7 @@ from solids import exact_volume_change, icosphere, rotation
 from vtk_segdeform import sizes
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cages
+from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import (
     ArgumentError,
@@ -262,6 +263,13 @@ def test_cages_with_too_many_vertices_are_refused():
     big = tuple(Cage(ball * [9.0, 3.0, 3.0], faces) for _ in SCENE.cages)
     with pytest.raises(CageError, match="2052 vertices; the limit of the solver is 1600"):
         Deformer(SCENE.mesh, SCENE.regions, big)
+
+
+@pytest.mark.parametrize("number", [[60], "60", np.full(3, 60), 3, 60.5, np.nan])
+def test_the_number_of_cage_vertices_is_named_if_it_is_none(number):
+    mesh = SCENE.mesh
+    with pytest.raises(ArgumentError, match="n_cage_vertices must be a whole number, 4 or more"):
+        deform(mesh, [0], [9], mesh.vertices[[9]], n_cage_vertices=number)
 
 
 def test_the_mesh_moves_with_its_cages_by_affine_maps():

@@ -453,39 +453,6 @@ def test_values_of_samples_are_smoothed_between_cells(monkeypatch):
     assert smooth.std() > 0.02
 
 
-def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    deformer = SCENE.deformer()
-    samples, rest = deformer._problem.samples, deformer._problem.rest
-    assert len(samples.points) < 100
-    for cell in range(0, len(samples.points), 7):
-        own = np.flatnonzero(samples.cells == cell)
-        areas = rest.vertex_areas[own]
-        assert_allclose(samples.points[cell], np.average(rest.vertices[own], axis=0, weights=areas))
-        assert samples.areas[cell] == pytest.approx(areas.sum() / rest.vertex_areas.sum())
-    assert_allclose(samples.rows @ deformer._problem.rest_cages, samples.points, atol=1e-6)
-    near = samples.edges.tocoo()
-    expected = np.linalg.norm(samples.points[near.row] - samples.points[near.col], axis=1)
-    assert_allclose(near.data, expected)
-    a, b = samples.cells[SCENE.mesh.edges].T
-    joined = samples.edges.toarray() > 0.0
-    assert joined[a, b][a != b].all()
-
-
-def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    samples = SCENE.deformer()._problem.samples
-    surface, x = samples.contact_surface, SCENE.deformer()._problem.rest.vertices
-    normals = surface.normals(samples.points)
-    for cell, normal in enumerate(normals):
-        over = (x[samples.cells == cell] - samples.points[cell]) @ normal
-        height = max(0.0, over.max())
-        expected = min(0.2 * surface.radii[cell] + height, surface.gaps[cell])
-        assert surface.margins[cell] == pytest.approx(expected)
-
-
 def test_a_ring_needs_three_neighbours_away_from_its_point():
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])

@@ -121,6 +121,13 @@ def test_a_patch_of_a_sphere_slides_along_it():
     assert abs(pose.volume_change) < 1e-12
 
 
+def test_at_rest_nothing_moves():
+    for kind in ("plane", "line", "surface"):
+        deformer = block().hold(handle=TOP, slides=[sd.Slide(BASE, kind)])
+        pose = deformer.finish(deformer.solve(BLOCK.vertices[TOP]))
+        assert np.abs(pose.vertices - BLOCK.vertices).max() < 1e-7
+
+
 def test_a_rigid_part_that_slides_is_rigid_and_flat():
     stiffness = np.where(HEIGHT < 0.35, np.inf, 1.0)
     deformer = block().stiffened(stiffness).hold(handle=TOP, slides=[sd.Slide(BASE)])

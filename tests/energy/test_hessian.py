@@ -118,3 +118,11 @@ def test_a_hessian_that_is_not_convex_has_no_factor():
     assert quadratic_factor(-np.eye(4)) is None
     energy = energy_of(40)
     assert full_factor(-energy.quadratic, rotation_term(energy, REST)) is None
+
+
+def test_a_mirrored_pose_still_has_a_factor():
+    energy = energy_of(40)
+    mirrored = REST * [1.0, 1.0, -1.0]
+    held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
+    factor = full_factor(held, rotation_term(energy, mirrored))
+    assert factor is None or np.isfinite(factor.solve(mirrored)).all()

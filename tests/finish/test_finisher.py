@@ -127,6 +127,13 @@ def test_components_without_places_stay_where_they_are(monkeypatch):
     assert_allclose(found.vertices[:n], one.finish().vertices, atol=1e-6)
 
 
+def test_all_vertices_held_are_put_in_their_places():
+    mesh = SCENE.mesh
+    places = mesh.vertices + 1.0
+    found = Problem(mesh, np.ones(mesh.n_vertices, bool), places, mesh.vertices).finish()
+    assert_array_equal(found.vertices, places)
+
+
 @pytest.mark.parametrize("rounds", [0, 1, 3])
 def test_the_energy_and_its_gradient_are_those_of_the_formula(rounds):
     """E is summed here over cells and triangles."""

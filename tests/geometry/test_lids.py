@@ -185,6 +185,13 @@ def test_the_border_of_a_wall_is_no_hole_and_its_lid_adds_no_volume():
     assert volume == pytest.approx(3.0)
 
 
+def test_a_closed_mesh_has_no_lids_and_its_own_faces():
+    lids = lids_of(BALL)
+    assert lids.encloses.all()
+    assert not len(lids.faces)
+    assert lids.closed(BALL) is BALL.faces
+
+
 def test_the_option_decides_for_open_components():
     cap = SHEETS["shallow cap"]()
     mesh = together(open_box(), cap.with_vertices(cap.vertices + 5))

@@ -99,6 +99,11 @@ def test_the_step_reaches_the_target_volume(mesh, seed):
     assert signed_volume(vertices + t * d, faces) == pytest.approx(target, rel=1e-14 * 4)
 
 
+def test_the_step_is_zero_if_the_target_is_met():
+    assert step_to_volume(np.array([3.0, 1.0, 1.0, 1.0]), 3.0) == 0.0
+    assert step_to_volume(np.array([3.0, 0.0, 0.0, 1.0]), 3.0) == pytest.approx(0.0, abs=1e-15)
+
+
 def test_the_step_is_zero_if_the_volume_is_constant():
     assert step_to_volume(np.zeros(4), 0.0) == 0.0
     assert step_to_volume(np.array([5.0, 0.0, 0.0, 0.0]), 6.0) == 0.0

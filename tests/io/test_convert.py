@@ -96,6 +96,15 @@ def test_nan_is_read_and_reported_as_a_fault(tmp_path):
         read_mesh(path)
 
 
+def test_a_truncated_file_is_an_error_in_every_format(tmp_path):
+    for suffix in (".off", ".ply", ".vtp"):  # of an OBJ the last faces cannot be missed
+        path = tmp_path / f"a{suffix}"
+        write_mesh(path, Mesh(*icosphere(2)))
+        path.write_bytes(path.read_bytes()[:-200])
+        with pytest.raises(MeshError, match="a\\" + suffix):
+            read_mesh(path)
+
+
 def test_errors_say_what_is_wrong_with_the_file(tmp_path):
     with pytest.raises(MeshError, match=r"nowhere\.obj: there is no such file"):
         read_mesh(tmp_path / "nowhere.obj")

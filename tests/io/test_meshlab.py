@@ -225,3 +225,10 @@ def test_simplifying_preserves_the_genus_and_nearly_the_volume(solid):
     assert signed_volume(small.vertices, small.faces) == pytest.approx(
         signed_volume(mesh.vertices, mesh.faces), rel=0.05
     )
+
+
+@pytest.mark.usefixtures("with_pymeshlab")
+def test_an_unreadable_file_is_an_error_that_names_it(tmp_path):
+    (tmp_path / "a.dae").write_text("rubbish")
+    with pytest.raises(MeshError, match=r"a\.dae"):
+        read_mesh(tmp_path / "a.dae")

@@ -33,6 +33,13 @@ def text(vertices, rows, rest):
     return head + "\n".join(lines) + "\n"
 
 
+def test_a_face_of_300_corners_is_preserved(tmp_path):
+    surface = prism(300)
+    warnings = Warnings(tmp_path / "a.ply", surface)
+    assert_array_equal(read_polydata(tmp_path / "a.ply").faces, surface.faces)
+    assert warnings.texts == ["PLY faces of over 255 corners cannot be read by some programs"]
+
+
 def test_64_bit_integers_are_exact_or_left_out(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface.point_data["i"] = np.array([0, 1, -5, 2**31 - 1])

@@ -156,6 +156,12 @@ def test_a_polygon_given_again_is_cut_like_the_first_whatever_corner_it_begins_a
         assert (side * np.cross(b - a, c - a)[:, 2] > 0.0).all()
 
 
+def test_the_same_corners_in_another_order_are_another_polygon():
+    square = flat((0, 0), (1, 0), (1, 1), (0, 1))
+    triangles, owner = cut(square, [0, 1, 3, 2], [0, 1, 2, 3])  # the first one crosses itself
+    assert_allclose(area_vectors(square, triangles[owner == 1])[:, 2], 0.5)
+
+
 def test_polygons_and_strips_have_the_corners_and_cells_that_were_given():
     points = np.arange(24.0).reshape(8, 3) ** 2
     given = pv.PolyData()

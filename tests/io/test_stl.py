@@ -43,6 +43,13 @@ def test_a_wrong_count_of_triangles_is_an_error(tmp_path, count, title):
         read_polydata(path)
 
 
+def test_a_file_that_ends_in_its_header_says_so(tmp_path):
+    path, data = octahedron(tmp_path)
+    path.write_bytes(data[:80])
+    with pytest.raises(MeshError, match=r"a\.stl: ends after 80 bytes, in its header: it was cut"):
+        read_polydata(path)
+
+
 TITLES = [b"", b"solid", b"solid x", b"SOLID facet vertex 1 2 3 endsolid", b"  solid x"]
 REST = [b"", b"\n", b"\r\n\r\n", b"\0", b"x", 700 * b"\n", 512 * b"\0", b"\x1a", b"endsolid"]
 

@@ -145,6 +145,13 @@ def test_an_array_of_the_wrong_type_is_left_out_with_a_warning(tmp_path, what):
     assert not list(again.point_data) + list(again.cell_data)
 
 
+@pytest.mark.parametrize("corner", ["0", "-5", "1/0", "1/-9"])
+def test_indices_before_the_first_are_errors(tmp_path, corner):
+    (tmp_path / "a.obj").write_text(f"vt 0 0\n{BLENDER}f {corner} 2 3\n", encoding="utf-8")
+    with pytest.raises(MeshError, match=r"a\.obj: a face refers to (0|-5|-9)"):
+        read_polydata(tmp_path / "a.obj")
+
+
 @pytest.mark.parametrize("reader", ["vtk", "pymeshlab"])
 def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp_path, reader):
     surface = prism(5)
@@ -233,6 +240,13 @@ def test_a_word_of_several_numbers_is_no_index(tmp_path, word):
     (tmp_path / "a.obj").write_text(re.sub(r"f (\d) (\d) (\d)", r"f \1/1 \2/1 \3/1", text))
     with pytest.raises(MeshError, match=r"a face refers to '[12]"):
         read_polydata(tmp_path / "a.obj")
+
+
+def test_corners_of_one_face_may_be_of_different_forms(tmp_path):
+    (tmp_path / "a.obj").write_text(f"vt 5 6\nvn 0 0 1\n{TETRA[: TETRA.index('f')]}f 1/1 2 3/1/1")
+    surface = read_polydata(tmp_path / "a.obj")
+    assert_array_equal(surface.regular_faces[-1], [0, 1, 2])
+    assert_array_equal(surface.cell_data["TextureCorners"][-1], [5, 6, np.nan, np.nan, 5, 6])
 
 
 def test_a_plane_is_no_surface_in_space(tmp_path):

@@ -168,6 +168,15 @@ def test_arrays_of_the_wrong_shape_or_type_are_an_error(vertices, faces, message
         find_faults(vertices, faces)
 
 
+def test_the_text_of_a_report_has_the_size_the_faults_and_advice():
+    vertices, faces = SPHERE
+    text = str(find_faults(np.append(vertices, [[9, 9, 9]], axis=0), faces[1:]))
+    assert text.splitlines()[0] == "67 vertices, 127 faces, 1 component: has faults"
+    assert "fault: 1 unreferenced vertex (vertex 66); `repair` removes" in text
+    assert "note: 3 open edges (" in text
+    assert str(find_faults(*CUBE)).endswith(": a closed, outward oriented two-manifold")
+
+
 def test_faults_of_random_triangles_agree_with_plain_counting():
     rng = np.random.default_rng(11)
     for _ in range(50):

@@ -11,6 +11,7 @@ from solids import CUBE, SOLIDS, icosphere, torus, two_components
 
 import vtk_segdeform as sd
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.mesh.faults import find_faults
 from vtk_segdeform.mesh.mesh import Mesh
 
 
@@ -82,6 +83,11 @@ def test_a_pose_shares_the_triangles_and_their_cached_values():
     assert posed.diagonal == pytest.approx(2.0 * mesh.diagonal)
     assert posed.face_areas.sum() == pytest.approx(4.0 * mesh.face_areas.sum())
     assert not posed.vertices.flags.writeable
+
+
+def test_a_pose_may_be_inside_out():
+    mesh = Mesh(*CUBE)
+    assert not find_faults(mesh.with_vertices(-mesh.vertices).vertices, mesh.faces).ok
 
 
 def test_a_pose_must_be_finite_and_have_the_same_number_of_vertices():

@@ -98,17 +98,6 @@ def test_faces_are_on_the_left_of_a_border():
     assert 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() == pytest.approx(1.0)
 
 
-def test_two_holes_that_touch_are_two_loops():
-    vertices, faces = icosphere(2)
-    at = np.flatnonzero((faces == 2).any(axis=1))
-    other = next(f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1)
-    mesh = Mesh(vertices, np.delete(faces, [at[0], other], axis=0))
-    assert sorted(map(len, mesh.borders)) == [3, 3]
-    assert {tuple(sorted(loop.tolist())) for loop in mesh.borders} == {
-        tuple(sorted(faces[f].tolist())) for f in (at[0], other)
-    }
-
-
 def test_a_fin_has_a_border_and_its_body_has_none():
     vertices, faces = CUBE
     a, b, _ = faces[0]

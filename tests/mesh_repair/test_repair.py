@@ -74,6 +74,15 @@ def test_a_triangle_soup_is_welded(mesh):
     assert_array_equal(result.vertices[result.faces], vertices[faces])
 
 
+def test_a_triangle_soup_with_holes_becomes_the_closed_mesh():
+    vertices, faces = icosphere(3)
+    keep = np.random.default_rng(5).random(len(faces)) > 0.1
+    result = repaired(*soup(vertices, faces[keep]))
+    assert any(step.endswith("where holes touch") for step in result.steps)
+    assert len(result.vertices) == len(vertices)
+    assert len(result.faces) == len(faces)
+
+
 def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
     vertices, faces = soup(*SPHERE)
     shaken = vertices + np.random.default_rng(2).uniform(-1e-7, 1e-7, vertices.shape)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from vtk_segdeform import models
 from vtk_segdeform.errors import ArgumentError
@@ -71,6 +72,14 @@ def test_the_triangles_of_a_body_are_well_shaped(body):
     edges = mesh.vertices[mesh.edges]
     length = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1)
     assert length.max() < 4.0 * length.min() ** 0.5 * np.median(length) ** 0.5
+
+
+def test_models_are_deterministic():
+    make, n = BODIES[0]  # not the one that the other tests share
+    one, two = made(make, n), make(n)
+    assert one is not two
+    assert_array_equal(one.vertices, two.vertices)
+    assert_array_equal(one.faces, two.faces)
 
 
 @pytest.mark.parametrize("n", [4, 5, 50, 2562])

@@ -33,6 +33,13 @@ def test_a_change_caused_by_a_listener_is_notified_after_the_present_one():
     assert heard == [Change.POSE, Change.HISTORY]
 
 
+def test_no_change_is_not_notified():
+    listeners, heard = Listeners(), []
+    listeners.add(heard.append)
+    listeners.notify(Change(0))
+    assert heard == []
+
+
 def test_after_an_exception_the_others_have_heard_and_the_next_change_is_notified():
     listeners, heard = Listeners(), []
 

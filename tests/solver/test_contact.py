@@ -69,6 +69,16 @@ def test_a_pull_avoids_contact_as_well(fork):
         sd.pull(mesh, tip, x[tip], avoid_contact="yes")
 
 
+def test_crossings_at_rest_do_not_count(through, fork):
+    mesh = fork[0].mesh
+    crossed = mesh.with_vertices(through[0].vertices)
+    regions = sd.segment(crossed, 1)
+    deformer = sd.Deformer(crossed, regions, sd.fit_cages(crossed, regions, 30), avoid_contact=True)
+    contact = deformer._constraints.contact
+    assert contact.value_and_slope(deformer._problem.rest_cages)[0] == 0.0
+    assert not len(deformer.hold(handle=[0]).solve(crossed.vertices[[0]]).crossings())
+
+
 def test_its_gradient_is_that_of_its_value_and_it_moves_along(fork, through, monkeypatch):
     contact, p = fork[0]._constraints.contact, through[1]
     value, slope = contact.value_and_slope(p)

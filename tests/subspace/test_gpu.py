@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, torus
 
@@ -89,6 +89,15 @@ def test_scaling_restores_the_volume_of_the_rest_shape(arrays):
     assert scale == pytest.approx(expected, rel=1e-14)
     assert_allclose(surface.host(x), there, rtol=0, atol=1e-14)
     assert abs(constraint.relative(surface.host(x))) < 1e-14
+
+
+def test_a_surface_that_is_inside_out_stays_as_it_is(arrays):
+    points, faces = BEAD
+    mirrored = points * [1.0, 1.0, -1.0]
+    x = arrays.asarray(mirrored)
+    surface = still(points, faces, arrays)
+    assert surface.scale_to_volume(x, signed_volume(points, faces), np.ones(3)) == 1.0
+    assert_array_equal(surface.host(x), mirrored)
 
 
 def test_no_call_takes_more_memory_than_documented(monkeypatch):

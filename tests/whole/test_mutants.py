@@ -6,17 +6,6 @@ import mutants
 import pytest
 
 
-def test_the_tests_of_a_module_are_those_of_its_folder_and_its_own_come_first():
-    path = mutants.ROOT / "vtk_segdeform" / "mesh" / "topology.py"
-    tests = mutants.chosen_tests(path)
-    assert mutants.folder_of(path) == "mesh"
-    assert tests[0] == "tests/mesh/test_topology.py"
-    assert "tests/mesh/test_soup.py" in tests
-    path = mutants.ROOT / "vtk_segdeform" / "mesh" / "mesh.py"
-    assert mutants.chosen_tests(path)[1].endswith("[vtk_segdeform.mesh.mesh]")
-    assert mutants.folder_of(mutants.ROOT / "widgets" / "scene" / "view.py") == "widgets/scene"
-
-
 def test_lines_listed_as_equivalent_are_lines_of_the_code():
     for row in mutants.EQUIVALENT.read_text("utf-8").splitlines():
         if not row.startswith("#"):

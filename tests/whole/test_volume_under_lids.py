@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 from campaign import every
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import bottle, open_box, revolved, sheet, tube, with_holes
 from solids import rotation
 
@@ -137,24 +137,6 @@ def test_a_sheet_has_nothing_to_preserve():
     assert solution.region_volume_change.shape == (0,)
 
 
-def test_the_option_turns_lids_off_and_on():
-    deformer = bound("bottle", 1)
-    off = held(deformer, lids=False)
-    assert not off.has_volume
-    assert off.solve(bent(deformer)).volume_change == 0.0
-    assert not held(off, preserve_volume=True).has_volume  # as before
-    on = held(off, lids=None)
-    assert abs(on.solve(bent(deformer)).volume_change) < EXACT
-    assert_array_equal(
-        on.solve(bent(deformer)).vertices, held(deformer).solve(bent(deformer)).vertices
-    )
-    cap = revolved([1.0, 0.02], [0.0, 0.2], 24, 10)
-    assert not bind(cap, 1).has_volume
-    forced = bind(cap, 1, lids=True)
-    assert forced.has_volume
-    assert abs(forced.solve(bent(forced, 10.0)).volume_change) < EXACT
-
-
 def session_of(mesh):
     session = sd.Session(mesh)
     z = mesh.vertices[:, 2]
@@ -194,3 +176,14 @@ def test_a_session_keeps_the_volume_under_lids_and_its_option(tmp_path):
 
     session.change_options(preserve_volume=False)
     assert session.volume_summary == "2 holes: volume measured under lids"
+
+
+def test_moving_a_cage_keeps_the_volume_under_lids():
+    session = session_of(BODIES["bottle"]())
+    (cage,) = session.cage_vertices
+    session.move_cage(0, cage * [1.0, 1.2, 1.0])
+    assert abs(session.volume_change) < EXACT
+    session.change_options(lids=False)
+    session.move_cage(0, cage * [1.3, 1.2, 1.0])
+    assert session.volume_change == 0.0
+    assert_allclose(session.cage_vertices[0], cage * [1.3, 1.2, 1.0])

@@ -253,6 +253,15 @@ def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
     assert not ((sides > -0.6) & (sides < 0.6)).any()
 
 
+def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
+    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
+    label = desk.session.history.undo_label
+    desk.hand.drag([(2, 2), (30, 30)])
+    desk.hand.drag([(2, 2), (30, 30)], control=True)
+    desk.hand.drag([desk.under(-0.2, -0.2), desk.under(0.2, 0.2)], control=True)
+    assert desk.session.history.undo_label == label
+
+
 def test_control_erases_from_the_selected_handle_and_removes_it_when_empty(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.hand.drag([(2, 200), (398, 398)])
