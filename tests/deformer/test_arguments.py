@@ -122,9 +122,6 @@ def test_the_locality_decides_the_reach_and_what_follows():
     for wrong in (-0.1, 1.1, np.nan, "1"):
         refused("locality must be a number from 0 to 1", arguments.checked_locality, wrong)
     assert [arguments.automatic_locality(n) for n in (0, 1, 2, 3, 9)] == [0.2, 0.05, 0.05, 0, 0]
-    assert arguments.reach_and_follows(3.0, 0.25) == (6.0, 0.75)
-    assert arguments.reach_and_follows(3.0, 1.0) == (3.0, 0.0)
-    assert arguments.reach_and_follows(3.0, 0.0) == (np.inf, 1.0)
 
 
 def test_a_point_and_targets_are_finite_and_as_many_as_vertices():

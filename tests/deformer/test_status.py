@@ -14,6 +14,7 @@ from solids import rotation, torus
 
 from vtk_segdeform import models
 from vtk_segdeform.cages import fit_cages
+from vtk_segdeform.deformer.deform import deform
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.finish import finisher
 from vtk_segdeform.geometry import turned_over
@@ -217,3 +218,19 @@ def test_a_part_that_no_handle_moves_is_named():
     many = replace(solution, unmoved=np.arange(6))
     assert many.unmoved_summary(mesh).startswith("parts 1, 2, 3 and 3 more (")
     assert many.unmoved_summary(mesh).endswith("they stay where they are")
+
+
+def test_ends_that_are_put_into_each_other_cross_and_are_told_if_contact_is_avoided():
+    mesh = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 7))
+    x = mesh.vertices
+    fixed, handle = np.flatnonzero(x[:, 2] < 0.05), np.flatnonzero(x[:, 2] > 0.95)
+    for shift, avoids, status in [
+        (-0.05, True, Status.CONVERGED),
+        (-0.9, True, Status.CROSSED),
+        (-0.9, False, Status.CONVERGED),
+    ]:
+        to = x[handle] + [0.0, 0.0, shift]
+        few = {"n_regions": 1, "n_cage_vertices": 20, "avoid_contact": avoids}
+        pose = deform(mesh, fixed, handle, to, **few)
+        assert pose.status is status
+        assert (len(pose.crossings()) > 0) is (shift == -0.9)

@@ -39,7 +39,6 @@ from .arguments import (
     checked_vertex,
     fault_of_grab,
     place_text,
-    reach_and_follows,
 )
 from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
@@ -84,6 +83,5 @@ __all__ = [
     "on_volumes",
     "place_text",
     "pull",
-    "reach_and_follows",
     "solved_along",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -211,11 +210,6 @@ def automatic_locality(n_fixed: int) -> float:
     if n_fixed >= _ENOUGH:
         return 0.0
     return _PINNED_LOCALITY if n_fixed else LOCALITY
-
-
-def reach_and_follows(radius: float, locality: float) -> tuple[float, float]:
-    """Return the arguments of `Deformer.local` for a pull, by its *locality* from 0 to 1."""
-    return (radius / math.sqrt(locality) if locality else math.inf), 1.0 - locality
 
 
 def checked_point(to: ArrayLike, name: str = "to") -> FloatArray:

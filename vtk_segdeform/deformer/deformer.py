@@ -25,6 +25,7 @@ Long because every option of the method is explained in the docstring of `Deform
 from __future__ import annotations
 
 import itertools
+import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
@@ -48,6 +49,8 @@ from ..regions import Regions, require_regions
 from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
 from ..subspace import Passengers, Subspace, bind_passengers
 from .arguments import (
+    LOCALITY,
+    SPREAD,
     as_lids,
     check_distance,
     check_options,
@@ -340,6 +343,23 @@ class Deformer:
         other = self._shared()
         other._path = Path.begin(near, path.p, path.targets)
         return other
+
+    def reach_of_pull(
+        self, point: SurfacePoint, radius: float, locality: float
+    ) -> tuple[float, float]:
+        """Return *reach* and *follows* of `local` for a pull, by its *locality* from 0 to 1.
+
+        The reach is ``radius / sqrt(locality)``.  From the default locality on it ends with the
+        limb of the *point* if that is shorter; limbs within the spread do not count.
+        """
+        if not locality:
+            return math.inf, 1.0
+        reach = radius / math.sqrt(locality)
+        if locality >= LOCALITY:
+            size = self._problem.frame.size
+            limb = self._problem.samples.limb(point, SPREAD * radius / size, reach / size)
+            reach = size * limb
+        return reach, 1.0 - locality
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""
@@ -680,12 +700,15 @@ class Deformer:
         return (self._missed(solution) if status is Status.CONVERGED else None) or status
 
     def _missed(self, solution: Solution) -> Status | None:
-        """Return the status of a *solution* whose handles or volumes are off, or None."""
+        """Return the status of a *solution* with a handle, a volume or a contact that is off."""
         if max(solution.handle_error, solution.fixed_error) > _MET:
             is_free = len(self.handle) + len(self.fixed) < self.mesh.n_vertices
             return Status.MISSED if is_free else Status.ALL_HELD
         is_off = self._constraints.has_goals and solution.volume_error > VOLUME_MET
-        return Status.VOLUME_MISSED if is_off else None
+        if is_off:
+            return Status.VOLUME_MISSED
+        has_contact = self._constraints.contact is not None
+        return Status.CROSSED if has_contact and len(solution.crossings()) else None
 
 
 def _counting(progress: Progress | None) -> Progress | None:

@@ -34,10 +34,11 @@ def finish_of(
 ) -> Finish:
     """Return the *pose* (n, 3) of the cages on *path*, finished from *start* (n, 3).
 
-    Its vertices are those of *start* if exact handles and exact volumes exclude each other.
+    Its vertices are those of *start*, mirrored if there is a mirror, if exact handles and exact
+    volumes exclude each other.
     """
     constraints, problem = path.constraints, path.constraints.problem
-    mirror, given = constraints.mirror, start
+    mirror = constraints.mirror
     if mirror is not None:
         is_start, pose = start is pose, _symmetric(path, mirror, pose)
         start = pose if is_start else start
@@ -89,7 +90,7 @@ def finish_of(
             break
         active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    return replace(found, vertices=given) if max(off, default=0.0) > VOLUME_MET else found
+    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
 
 
 def _mean_with_image(path: Path, mirror: Mirror, x: FloatArray) -> FloatArray:

@@ -43,8 +43,11 @@ def near_point(
     mirror, points = constraints.mirror, [point]
     if mirror is not None:
         points.append(mirror.mate_of(problem.mesh, point))
-    near = points, reach / problem.frame.size or np.inf, follows
-    energy, samples = problem.energy, problem.samples
+    size, energy, samples = problem.frame.size, problem.energy, problem.samples
+    # The finish has some room around the points, also if they are in a small limb.
+    near, finished = (
+        (points, far / size or np.inf, follows) for far in (reach, reach and max(reach, 2 * spread))
+    )
     ids = np.concatenate([constraints.handle, constraints.fixed])
     quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
     quadratic += problem.anchors_of_loose_parts(ids)
@@ -67,7 +70,7 @@ def near_point(
     )
     rows = before.positions.rows.copy()
     rows[pulled.places] = own_rows
-    local = replace(constraints, pulled=pulled, keeps=samples.weights(*near))
+    local = replace(constraints, pulled=pulled, keeps=samples.weights(*finished))
     solver = replace(before, energy=energy, positions=before.positions.local(rows, anchors))
     solver = replace(solver, energy=_with_rings(local, own_rows, solver))
     load = solver.unbalanced(p, local.places(path.targets))

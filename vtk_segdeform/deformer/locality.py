@@ -10,6 +10,11 @@ Where this is compensated depends on the ratios of the weights.  With equal weig
 reach, a thousand times the weight moves the far surface as much; weights that grow with the
 distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
+The reach of a pull ends where the limb does that is grabbed: who turns a head does not mean the
+shoulders.  The points at a distance d from the grabbed one lie on a front.  Its length is constant
+along a limb and at most proportional to d on a flat or rounded surface around the point.  Where a
+limb ends in a body it grows faster: it doubles until 1.5 d, or more.
+
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
 
@@ -57,6 +62,9 @@ from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
+_RATIO, _WIDTH, _AHEAD = 1.06, 5, 7  # of distances; steps across a front, and to the next one
+_END = 4  # steps from the inner edge of a front to the end of a limb, if the next is the longest
+_WIDENS = 2.0  # growth from one to the other where a limb ends; 1.5 on a disc
 _FEWEST = 4  # points of a ring, its own included
 _SHORTEST = 1e-12  # reach; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
@@ -175,9 +183,13 @@ class SurfaceSamples:
         return surface.with_heights(heights)
 
     @cached_property
+    def _component(self) -> IntArray:
+        return csgraph.connected_components(self.edges, directed=False)[1].astype(np.int64)
+
+    @cached_property
     def _joined(self) -> sparse.csr_array:
         """The edges, and lines between samples that move together without an edge."""
-        component = csgraph.connected_components(self.edges, directed=False)[1].astype(np.int64)
+        component = self._component
         pairs = [self._across_walls(component)]
         if self.parts is not None:
             pairs.append(np.stack(joints(self.points, self.areas, component, self.parts)))
@@ -231,6 +243,29 @@ class SurfaceSamples:
             x = self.rest.vertices
             found += np.linalg.norm(x[corners] - point.at(x), axis=1)[:, None]
         return np.asarray(found.min(axis=0), dtype=np.float64)
+
+    def limb(self, point: SurfacePoint, least: float, most: float) -> float:
+        """Return how far the limb of *point* extends; *most* if it is longer, or there is none.
+
+        Limbs shorter than *least* do not count, nor do other components.
+        """
+        count = math.ceil(math.log(most / least, _RATIO)) + _WIDTH + _AHEAD
+        radii = least * _RATIO ** (np.arange(count) - _END)
+        of_face = self._component[self.faces[:, 0]]
+        faces = self.faces[of_face == self._component[self.cells[point.vertex]]]
+        nearest, _, farthest = np.sort(self.distances(point)[faces], axis=1).T
+        a, b, c = self.points[faces.T]
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        widths = np.maximum(farthest - nearest, _SHORTEST)
+        within = np.array([np.clip((d - nearest) / widths, 0.0, 1.0) @ areas for d in radii])
+        fronts = (within[_WIDTH:] - within[:-_WIDTH]) / (radii[_WIDTH:] - radii[:-_WIDTH])
+        growth = fronts[_AHEAD:] / np.maximum(fronts[:-_AHEAD], _SHORTEST)
+        fast = np.append(growth > _WIDENS, False)
+        if not fast.any():
+            return most
+        first = int(fast.argmax())
+        last = first + int((~fast[first:]).argmax())
+        return min(float(radii[first + growth[first:last].argmax() + _END]), most)
 
     def weights(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
         """Return w_s / a_s for kappa = 1, (s,), around several *points*.

@@ -24,7 +24,6 @@ from .arguments import (
     checked_point,
     checked_radius,
     fault_of_grab,
-    reach_and_follows,
 )
 from .deform import checked_refine, finished, is_finished, stages_of
 from .deformer import Deformer
@@ -75,8 +74,9 @@ def pull(
         Vertices that stay in place.  With three or more the surface between them is free.
     locality : float, optional
         1 keeps the surface in place; beyond four radii, of 10 % of the diagonal or more, it hardly
-        moves.  With less, more of it follows, above all the ends of limbs; with 0 all is free.
-        By default 0.2 without pins, 0.05 with one or two, and 0 with more.
+        moves.  With less, more of it follows, above all the ends of limbs; with less than 0.2 also
+        the body that the pulled limb is on; with 0 all is free.  By default 0.2 without pins, 0.05
+        with one or two, and 0 with more.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
@@ -153,7 +153,7 @@ def pull(
         stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
         progress=next(stages),
     )  # fmt: skip
-    reach, follows = reach_and_follows(radius, locality)
+    reach, follows = deformer.reach_of_pull(point, radius, locality)
     deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)
     solution = deformer.solve(target, progress=next(stages))
     return finished(deformer, solution, refine, progress=next(stages))

@@ -34,7 +34,6 @@ from ..deformer import (
     checked_radius,
     checked_vertex,
     fault_of_grab,
-    reach_and_follows,
 )
 from ..errors import ConstraintError
 from ..geometry import rigid_fit
@@ -138,12 +137,12 @@ def can_grab(
     return not fault_of_grab(mesh, checked_place(mesh, vertex), checked_radius(mesh, radius))
 
 
-def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
-    """Grab the pose *vertices* (n, 3) of *state*.
+def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
+    """Grab the pose *vertices* (n, 3) of *state*, whose cages are *bound*.
 
     ConstraintError if the point is fixed, or no vertex is near it.
     """
-    point, radius, locality, turns = grip
+    mesh, (point, radius, locality, turns) = bound.mesh, grip
     if np.isin(point.vertex, state.fixed):
         raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
     if fault := fault_of_grab(mesh, point, radius):
@@ -178,7 +177,7 @@ def grasp(mesh: Mesh, state: State, vertices: FloatArray, grip: Grip) -> Grasp:
         kept = np.isin(finished.held, state.fixed)
         finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
     pose = Pose(places, targets_at(handles, vertices), finished)
-    reach, follows = reach_and_follows(radius, locality)
+    reach, follows = bound.reach_of_pull(point, radius, locality)
     if len(handles[name]) > 1:  # which moves as a whole
         point = SurfacePoint.at_vertex(point.vertex)
     local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices)

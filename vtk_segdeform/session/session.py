@@ -566,9 +566,10 @@ class Session(Described):
             Of the pulled surface, in the mesh's unit; by default 15 % of the mesh's diagonal.
         locality : float, optional
             1 keeps the surface in place; beyond four radii, of 15 % of the diagonal or more, it
-            hardly moves.  With less, more of it follows, above all the ends of limbs; with 0 all is
-            free.  By default 0.2; 0 if fixed vertices, pins and handles that were not made by pulls
-            are three points or more, and 0.05 if they are fewer.
+            hardly moves.  With less, more of it follows, above all the ends of limbs; with less
+            than 0.2 also the body that the pulled limb is on; with 0 all is free.  By default 0.2;
+            0 if fixed vertices, pins and handles that were not made by pulls are three points or
+            more, and 0.05 if they are fewer.
         max_steps : int, optional
             As in `drag`.
 
@@ -597,7 +598,7 @@ class Session(Described):
         grasp = before
         if grasp is None or (turns and not grasp.grip.turns):
             grip = pulls.Grip(point, radius, locality, turns)
-            grasp = pulls.grasp(self.mesh, start, self.poses.vertices(start), grip)
+            grasp = pulls.grasp(self.poses.bind(start), start, self.poses.vertices(start), grip)
             if before is not None:  # the handle becomes a patch, of the shape that it has now
                 grasp = pulls.as_it_is(grasp, self.turned(), self.vertices)
         targets = grasp.targets(motion)

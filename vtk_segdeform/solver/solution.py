@@ -34,7 +34,8 @@ class Status(enum.Enum):
 
     A pose is `CONVERGED` if solving again, or finishing again if it `is_finished`, would move no
     vertex by more than about 1e-3 of the diagonal of the mesh.  The status tells nothing about
-    crossings and folds: see `Solution.crossings` and `Solution.folds`.
+    folds, and about crossings only if contact is avoided: see `Solution.crossings` and
+    `Solution.folds`.
     """
 
     CONVERGED = "converged"
@@ -47,6 +48,10 @@ class Status(enum.Enum):
     VOLUME_MISSED = (
         "a volume cannot be reached: change it less, set another one free, or leave more room "
         "between handle and fixed vertices"
+    )
+    CROSSED = (
+        "parts of the surface cross although contact is avoided: go there in smaller moves, or "
+        "leave more room between them"
     )
     ALL_HELD = (
         "all vertices are fixed or in handles, so nothing is free to move: subdivide the mesh, or "
