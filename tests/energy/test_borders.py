@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.linalg import cho_factor, cho_solve
-from scipy.spatial import cKDTree
-from sheets import bent, cup, fin, joined, plate, tube, welded
+from sheets import bent, cup, fin, plate, tube
 from solids import icosphere, rotation
 
 from vtk_segdeform.cages.fit import fit_cages
@@ -144,47 +142,6 @@ def test_a_plate_stays_flat_under_handles_in_its_plane(stretch):
     ).solve(targets)
     assert solution.handle_error < 1e-3
     assert np.abs(solution.vertices[:, 2]).max() < 1e-5  # steps of 1e-7
-
-
-def full_pose(mesh, stretch, held, places):
-    """Return the pose of least energy with the vertices *held* in their *places*: no cages."""
-    energy, x, free = energy_of(mesh, stretch), mesh.vertices.copy(), ~held
-    x[held] = places
-    factor = cho_factor(energy.quadratic[np.ix_(free, free)])
-    known = energy.quadratic[np.ix_(free, held)] @ places
-    for _ in range(300):
-        load = energy.quadratic @ x - energy.value_and_slope(x)[1]
-        x[free] = cho_solve(factor, load[free] - known)
-    return x
-
-
-@STRETCHES
-def test_half_of_a_symmetric_body_poses_as_its_half_does(stretch):
-    """With its cut and two rings held, so that the same rows of the free part are left.
-
-    Only the strength of the stretch differs: it is relative to the trace of the detail, and the
-    vertices on the cut have none.  They are a thirtieth of the body.
-    """
-    upper, faces = cup(12, 14, radius=0.3)
-    upper = upper * [1.0, 1.0, -1.0] + [0.0, 0.0, 1.0]
-    half, mirror = Mesh(upper, faces[:, ::-1]), np.array([1.0, 1.0, -1.0])
-    whole = Mesh(*welded(*joined((upper, half.faces), (upper * mirror, faces))))
-    assert whole.is_two_manifold
-    turn = rotation([0, 1, 0], 0.5)
-
-    def posed(mesh):
-        z = mesh.vertices[:, 2:]
-        sign = np.where(z > 0.0, 1.0, -1.0) ** [0, 0, 1]
-        places = np.where(abs(z) > 0.9, sign * ((sign * mesh.vertices) @ turn.T), mesh.vertices)
-        held = (abs(z[:, 0]) > 0.9) | (abs(z[:, 0]) < 0.2)
-        return full_pose(mesh, stretch, held, places[held])
-
-    one, both = posed(half), posed(whole)
-    motion = np.abs(one - half.vertices).max()
-    assert motion > 0.2
-    for side in (1.0, mirror):
-        _, match = cKDTree(whole.vertices * side).query(half.vertices)
-        assert np.abs(both[match] * side - one).max() < 0.003 * motion
 
 
 def test_a_strip_with_one_inner_vertex_can_be_pulled():

@@ -64,30 +64,6 @@ def test_reversing_the_faces_reverses_the_boundary():
         assert sorted(map(tuple, forth.tolist())) == sorted(map(tuple, back[:, ::-1].tolist()))
 
 
-def cyclic(loops):
-    """Return loops, each begun at its least vertex, in order."""
-    return sorted(tuple(np.roll(loop, -np.argmin(loop)).tolist()) for loop in loops)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_loops_that_share_no_vertex_do_not_depend_on_numbers_or_order(seed):
-    rng = np.random.default_rng(seed)
-    vertices, faces = icosphere(3)
-    centres = rng.choice(len(vertices), 12, replace=False)
-    faces = faces[~np.isin(faces, centres).any(axis=1)]
-    boundary = HalfEdges(faces, len(vertices)).net_boundary
-    if np.bincount(boundary[:, 0]).max() > 1:
-        crossed = boundary[np.bincount(boundary[:, 0])[boundary[:, 0]] > 1, 0]
-        faces = faces[~np.isin(faces, crossed).any(axis=1)]
-        boundary = HalfEdges(faces, len(vertices)).net_boundary
-    assert np.bincount(boundary[:, 0]).max() == 1
-    number = rng.permutation(len(vertices))
-    other = number[rng.permutation(faces)]
-    found = loops_of(HalfEdges(other, len(vertices)).net_boundary)
-    assert cyclic(found) == cyclic([number[loop] for loop in loops_of(boundary)])
-    assert 2 <= len(found) <= 12
-
-
 def test_faces_are_on_the_left_of_a_border():
     vertices, faces = CUBE
     top = (vertices[faces][:, :, 2] == 1.0).all(axis=1)

@@ -182,18 +182,6 @@ def test_visible_vertices_agree_with_ray_casting(rng):
     assert np.array_equal(seen[sample], exact[sample])
 
 
-def test_a_corner_of_a_cube_is_hidden_by_few_large_triangles():
-    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
-    square = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
-    mesh = Mesh(cube, np.array(square))
-    view, *_ = over(mesh)
-    seen = visible_vertices(view.to_display(cube), mesh.faces)
-    assert np.count_nonzero(~seen) == 1  # one corner of a cube is behind
-    far = np.linalg.norm(cube - view.camera.GetPosition(), axis=1)
-    assert not seen[far.argmax()]
-
-
 def test_vertices_behind_the_camera_are_not_visible():
     display = np.array([[10.0, 10, 0.5], [20, 10, 0.5], [10, 20, 0.5], [np.nan] * 3])
     seen = visible_vertices(display, np.array([[0, 1, 2], [1, 3, 2]]))
