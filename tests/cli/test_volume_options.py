@@ -13,6 +13,7 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io import Surface, write_mesh
 from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.solver import area_of
 
 QUICK = ["--regions", "1", "--cage-vertices", "50"]
 
@@ -62,6 +63,18 @@ def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
     before = volumes(hollow, hollow.vertices)
     assert_allclose(np.divide(after, before), [1.0, 1.03], rtol=1e-12)
     assert "wall: " in capsys.readouterr().out
+
+
+def test_areas_and_centroids_are_printed_as_such(hollow, given, tmp_path, capsys):
+    out = tmp_path / "out.vtp"
+    words = ["pull", given, "-o", str(out), "--at", "0,0,1", "--to", "0.1,0,1.1", *QUICK]
+    assert main([*words, "--volume", "centroid x=0.01", "--volume", "area=+2%"]) == 0
+    x, faces = Surface.read(out).mesh.vertices, hollow.faces
+    printed = capsys.readouterr().out
+    area = area_of(x, faces).target
+    assert area == pytest.approx(1.02 * area_of(hollow.vertices, faces).target, rel=1e-9)
+    assert f"area            {area:.6g}, +2 % of the original" in printed
+    assert "centroid x      0.01, moved by " in printed
 
 
 def test_a_goal_that_cannot_be_met_is_an_error_although_the_mesh_is_written(

@@ -189,6 +189,69 @@ def test_volumes_are_those_of_their_goals(goals):
         assert_allclose([finished.volume_changes[name]], [volume / at_rest[name] - 1], atol=EXACT)
 
 
+@pytest.mark.parametrize("goal", ["+5%", "50%", "1e999", "high", "at most -5%", None, np.nan])
+def test_a_centroid_has_coordinates_as_goals(goal):
+    with pytest.raises(ConstraintError, match="'centroid x of cavity' must be keep"):
+        checked_goals({"centroid x of cavity": goal})
+    assert checked_goals({"centroid x": "-1.5"})["centroid x"] == VolumeGoal(None, -1.5)
+    with pytest.raises(ConstraintError, match="must be positive"):
+        checked_goals({"area": "-1.5"})
+    with pytest.raises(ConstraintError, match="there is no volume 'centroid w'"):
+        held(hollow(), volumes={"centroid w": "keep"})
+
+
+def area_and_centroid(x: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return the area, and the centroid of what is enclosed."""
+    a, b, c = x[faces.T]
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+    return np.append(area, volume @ (a + b + c) / volume.sum() / 4.0)
+
+
+@pytest.mark.parametrize(
+    "goals",
+    [
+        {"area": "keep", "whole": "keep"},
+        {"area of component 0": "+4%", "cavity": "-10%"},
+        {"centroid y": "keep", "centroid z": "keep", "whole": "keep"},
+        {"centroid y": 0.1, "whole": "+5%"},
+        {"centroid y": "at most 0.05", "wall": "keep"},
+        {"centroid y of body 0": "at least -3"},
+    ],
+)
+@pytest.mark.parametrize("offset", [0.0, 2000.0])
+def test_areas_and_centroids_are_those_of_their_goals(goals, offset):
+    near = hollow().mesh
+    mesh = near.with_vertices(near.vertices + [0.0, offset, 0.0])
+    goals = {
+        name: goal + offset if isinstance(goal, float) else goal.replace("0.05", f"{0.05 + offset}")
+        for name, goal in goals.items()
+    }
+    deformer = bound(mesh).hold(fixed=hollow().fixed, handle=hollow().handle, volumes=goals)
+    targets = pulled(hollow()) + [0.0, offset, 0.0]
+    outer = mesh.faces[mesh.components[mesh.faces[:, 0]] == 0]
+    inner = mesh.faces[mesh.components[mesh.faces[:, 0]] == 1]
+    parts = {"whole": mesh.faces, "component 0": outer, "cavity": inner, "body 0": mesh.faces}
+    solution = deformer.solve(targets)
+    for pose in (solution, deformer.finish(solution)):
+        assert pose.volume_error < (EXACT if not offset else 1e-10)
+        assert str(pose.status) == "converged"
+        for name, goal in checked_goals(goals).items():
+            if not name.startswith(("area", "centroid")):
+                continue
+            faces = parts[name.partition(" of ")[2] or "whole"]
+            rest, now = (
+                area_and_centroid(x - [0.0, offset, 0.0], faces)
+                for x in (mesh.vertices, pose.vertices)
+            )
+            at = 0 if name.startswith("area") else 1 + "xyz".index(name[9])
+            shift = offset if at == 2 else 0.0
+            assert pose.volumes[name] == pytest.approx(now[at] + shift, rel=1e-10, abs=1e-9)
+            target = goal.target(rest[at] + shift) - shift
+            assert goal.bound or now[at] == pytest.approx(target, rel=1e-10, abs=1e-9)
+            assert goal.bound * (target - now[at]) < 1e-9
+
+
 def test_a_bound_holds_exactly_if_it_is_active_and_changes_nothing_if_not():
     free = held(hollow(), volumes={"whole": "free"})
     targets = pulled(free)

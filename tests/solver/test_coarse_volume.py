@@ -81,7 +81,8 @@ def test_coarse_volumes_change_like_those_of_the_mesh(constraints):
 
 def hessian_product(volumes, p, multipliers, dp):
     """Return G, as the solver adds it, times *dp* (m, 3)."""
-    g, m = volumes.hessian(p, np.array(multipliers)), len(p)
+    (g, rest), m = volumes.hessian(p, np.array(multipliers)), len(p)
+    assert rest is None
     whole = np.zeros((3, m, 3, m))
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         whole[a, :, b], whole[b, :, a] = g[c], -g[c]

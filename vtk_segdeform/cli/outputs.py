@@ -19,6 +19,7 @@ import pyvista as pv
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
+from ..deformer import OTHER_MEASURE, is_centroid
 from ..errors import MeshError
 from ..io import Surface, polydata_of, stored_vertices, to_polydata, volume_change
 from ..mesh import Kind, Mesh
@@ -68,18 +69,22 @@ def report_solution(
 
 
 def report_goals(solution: Solution, surface: Surface, path: Path, say: Say) -> None:
-    """Print the volumes with goals, and their changes, by name and label.
+    """Print the volumes, areas and centroids with goals, and their changes, by name and label.
 
     Of the formats of *path*, glTF alone tells its unit, the metre.
     """
     labels = {volume: k for k, volumes in surface.labels().items() for volume in volumes}
     is_in_metres = path.suffix.lower() in (".glb", ".gltf")
     for name, change in solution.volume_changes.items():
-        volume = solution.volumes[name]
-        unit = f" m^3 ({1e6 * volume:.6g} ml)" if is_in_metres else ""
+        value = solution.volumes[name]
+        if is_centroid(name):
+            say(f"{name:15} {value:.6g}, moved by {100 * change:+.4g} % of model size")
+            continue
+        is_area = OTHER_MEASURE.fullmatch(name) is not None
+        unit = f" m^3 ({1e6 * value:.6g} ml)" if is_in_metres and not is_area else ""
         label = f"label {labels[name]}, " if name in labels else ""
-        text = f"{label}{name}: {volume:.6g}{unit}"
-        say(f"volume          {text}, {100 * change:+.4g} % of the original")
+        text = name if is_area else f"volume          {label}{name}:"
+        say(f"{text:15} {value:.6g}{unit}, {100 * change:+.4g} % of the original")
 
 
 def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:

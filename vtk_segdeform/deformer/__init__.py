@@ -51,11 +51,12 @@ from .pull import pull
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
 from .symmetry import Mirror
-from .volume_goals import Goals, checked_goals
+from .volume_goals import OTHER_MEASURE, Goals, checked_goals, is_centroid
 
 __all__ = [
     "FARTHEST_APART",
     "LOCALITY",
+    "OTHER_MEASURE",
     "SPREAD",
     "Deformer",
     "Goals",
@@ -80,6 +81,7 @@ __all__ = [
     "deform",
     "fault_of_grab",
     "finished",
+    "is_centroid",
     "on_volumes",
     "place_text",
     "pull",

@@ -248,8 +248,7 @@ class Constraints:
         x = self.problem.frame.about_origin(x)
         volumes = self.preserved.constraints
         now = {each.name: each.target + each.violation(x) for each in volumes if each.name}
-        shares = {each.name: each.share * (1.0 + each.relative(x)) for each in volumes if each.name}
-        changes = {name: share - 1.0 for name, share in shares.items()}
+        changes = {each.name: each.change(x) for each in volumes if each.name}
         return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
 
     @property

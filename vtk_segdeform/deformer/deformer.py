@@ -70,7 +70,7 @@ from .problem import Problem
 from .slides import Slide, checked_slides
 from .stiffness import Stiffness
 from .symmetry import Mirror, Symmetry
-from .volume_goals import Goals, checked_goals
+from .volume_goals import OTHER_MEASURE, Goals, checked_goals
 
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
@@ -436,13 +436,15 @@ class Deformer:
     def volume(self, name: str, vertices: ArrayLike | None = None) -> tuple[float, float]:
         """Return one of `volumes`, and (V - V0) / V0, at *vertices* (n, 3) or at rest.
 
+        Or an area, or a coordinate of a centroid and its motion in diagonals of the mesh.
+
         Raises
         ------
         ConstraintError
             If there is no volume called *name*.
         """
         rest, known = self.mesh.vertices, self.volume_names
-        if as_text(name, "name") not in known:
+        if as_text(name, "name") not in known and not OTHER_MEASURE.fullmatch(name):
             raise ConstraintError(f"name must be one of {', '.join(known)}; got {shown(name)}")
         x = rest if vertices is None else as_points(vertices, "vertices", len(rest))
         x = self._problem.frame.about_origin(x)

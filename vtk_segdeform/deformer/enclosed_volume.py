@@ -22,6 +22,8 @@ from ..solver import (
     ScaledSurface,
     VolumeConstraint,
     Volumes,
+    area_of,
+    centroid_of,
     total_volume,
     volumes_by_label,
     with_same_points,
@@ -29,7 +31,7 @@ from ..solver import (
 from .growth import grown_cages
 from .problem import Problem
 from .symmetry import Mirror
-from .volume_goals import VolumeGoal, consistent, with_goal
+from .volume_goals import OTHER_MEASURE, VolumeGoal, consistent, with_goal
 
 _NONE = np.zeros(0, dtype=np.int64)
 _OVERLAP = 0.5  # share of a part that is its own mirror image, from which it is one part
@@ -104,7 +106,7 @@ class EnclosedVolume:
         if goals:
             preserved = self._with_goals(preserved, goals, parts)
         coarse, scaled = problem.binding.coarse_volume, None
-        volumes = coarse.volumes(preserved, problem.rest.vertices)
+        volumes = coarse.volumes(preserved, problem.rest.vertices, problem.frame.size)
         is_large = problem.mesh.n_vertices > sizes.SCALED_VOLUME and coarse.cells is not None
         of_component = self.bodies.of_component if whole and is_large else _NONE
         if len(of_component) and of_component.min() >= 0 and not goals:
@@ -131,7 +133,7 @@ class EnclosedVolume:
         given = [self.named(name, parts) for name in goals]
         every = with_same_points([*given, *kept])
         around, kept = every[: len(given)], every[len(given) :]
-        keys = [_keys_of(each.faces) for each in around]
+        keys = [_keys_of(each.faces) for each in around if each.is_cubic]
         kept = tuple(
             each
             for each, own in zip(kept, (_keys_of(each.faces) for each in kept), strict=True)
@@ -175,6 +177,8 @@ class EnclosedVolume:
         ConstraintError
             If there is none.
         """
+        if name not in parts and (other := OTHER_MEASURE.fullmatch(name)):
+            return replace(self._other(other[1], other[2] or "whole", parts), name=name)
         kind, number = _split(name)
         found: VolumeConstraint | None = None
         if name in parts:
@@ -200,6 +204,18 @@ class EnclosedVolume:
         if found.target < 0.0:
             found = replace(found, faces=found.faces[:, [0, 2, 1]], target=-found.target)
         return replace(found, name=name)
+
+    def _other(self, kind: str, of: str, parts: Mapping[str, BoolArray]) -> VolumeConstraint:
+        """Return the area, or a coordinate of the centroid, of what encloses a volume."""
+        rest = self.problem.rest_pose
+        if kind == "area" and of == "whole":
+            return area_of(rest.vertices, rest.faces)
+        body = self.named(of, parts)
+        if kind == "area":  # without lids
+            return area_of(rest.vertices, body.faces[(body.faces < rest.n_vertices).all(axis=1)])
+        axis, origin = "xyz".index(kind[-1]), self.problem.frame.origin
+        diagonal = self.problem.mesh.diagonal
+        return centroid_of(body, rest.vertices, axis, diagonal=diagonal, origin=float(origin[axis]))
 
     def _wall(self, cavity: int) -> VolumeConstraint:
         """Return the volume of the body around a *cavity*."""
@@ -243,7 +259,7 @@ class EnclosedVolume:
     ) -> tuple[float, float]:
         """Return a volume at the vertices *x* (n, 3), and (V - V0) / V0."""
         found = self._named.get(name)
-        if found is None or name in parts:
+        if found is None or name in parts or OTHER_MEASURE.fullmatch(name):
             found = self._named[name] = self.named(name, parts)
         return found.target + found.violation(x), found.relative(x)
 

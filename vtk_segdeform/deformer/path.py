@@ -161,16 +161,16 @@ class Path:
         missed = {k for k, each in enumerate(preserved) if each.missed(x) > _MISSED}
         self.active = tuple(sorted({*self.active, *missed}))
         begin = volumes.among(self.active).preserved_at(self.p)
-        ratios = [1.0 / (1.0 + preserved[k].relative(x)) for k in self.active]
-        farthest = max(abs(math.log(ratio)) if ratio > 0.0 else 1.0 for ratio in ratios)
+        off = [preserved[k].relative(x) for k in self.active]
+        farthest = max(abs(math.log1p(each)) if each > -1.0 else 1.0 for each in off)
         legs, steps = math.ceil(farthest / VOLUME_LEG), 0
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
         for leg in range(1, legs + 1):
             share = leg / legs
-            ends = zip(begin.constraints, ratios, strict=True)
+            ends = zip(begin.constraints, off, strict=True)
             self._set_volumes(
-                replace(each, target=each.target * (1.0 + share * (ratio - 1.0)))
-                for each, ratio in ends
+                replace(each, target=each.target + share * (each.nearer(by) - each.target))
+                for each, by in ends
             )
             if leg < legs:
                 steps += self._minimise(self.targets, options).steps
@@ -209,7 +209,7 @@ class Path:
         self.active = tuple(sorted({*self.active, *missed} - slack))
         now = self.constraints.preserved.volumes.among(self.active).preserved_at(self.end)
         self._set_volumes(
-            last.get(k, replace(each, target=each.target / (1.0 + preserved[k].relative(x))))
+            last.get(k, replace(each, target=each.nearer(preserved[k].relative(x))))
             for k, each in zip(self.active, now.constraints, strict=True)
         )
         return True

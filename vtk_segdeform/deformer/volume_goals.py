@@ -6,6 +6,8 @@
     40%, +10%, -40%        of the volume at rest; more, or less, than it
     at least 2.5, >= 2.5   a bound, with any of the above after it; at most 110%, <= 110%
 
+Areas have such goals, too, and coordinates of centroids all but percentages.
+
 What is given takes precedence over what is preserved by default: a body is not preserved if all its
 faces are around a volume that is given, and no body and no region if the whole is.  Volumes may
 depend on each other, as the whole on its bodies: then they must agree.
@@ -22,7 +24,7 @@ import numpy as np
 from ..arrays import FloatArray, is_number
 from ..checks import shown
 from ..errors import ConstraintError
-from ..solver import VolumeConstraint, gradients
+from ..solver import CentroidConstraint, VolumeConstraint, gradients
 
 _GOAL = re.compile(
     r"(?P<bound>at least|at most|>=|<=)?\s*"
@@ -31,6 +33,9 @@ _GOAL = re.compile(
 _DIRECTIONS = 8  # more random directions than volumes, along which their derivatives are compared
 _DEPENDENT = 1e-9  # relative residual of a volume that is a sum of others
 _AGREE = 1e-9  # relative
+
+OTHER_MEASURE = re.compile(r"(area|centroid [xyz])(?: of (.+))?")
+"""Names of goals for other measures of a volume; the groups are the measure and the volume."""
 
 Goals = Mapping[str, str | float]
 
@@ -102,9 +107,21 @@ def _parsed(name: str, goal: object) -> VolumeGoal | None:
         found = VolumeGoal((1.0 if match["sign"] else 0.0) + number / 100.0, bound=bound)
     else:
         found = VolumeGoal(None, number, bound)
+    if is_centroid(name):
+        if found.share not in (None, 1.0) or not np.isfinite(found.value):
+            raise ConstraintError(
+                f"the goal of {name!r} must be keep or a coordinate; got {shown(goal)}"
+            )
+        return found
     if not 0.0 < found.target(1.0) < np.inf:
         raise ConstraintError(f"the volume of {name!r} must be positive; got {shown(goal)}")
     return found
+
+
+def is_centroid(name: str) -> bool:
+    """Return whether a goal called *name* is one for a coordinate of a centroid."""
+    match = OTHER_MEASURE.fullmatch(name)
+    return match is not None and match[1] != "area"
 
 
 def _not_a_goal(name: str, goal: object) -> ConstraintError:
@@ -223,4 +240,7 @@ def _contradiction(
 def with_goal(constraint: VolumeConstraint, name: str, goal: VolumeGoal) -> VolumeConstraint:
     """Return the *constraint*, whose target is its volume at rest, with a *goal* instead."""
     rest, target = constraint.target, goal.target(constraint.target)
+    if isinstance(constraint, CentroidConstraint):
+        shift = (target - rest) / constraint.size
+        return replace(constraint, name=name, target=target, shift=shift, bound=goal.bound)
     return replace(constraint, name=name, target=target, share=target / rest, bound=goal.bound)

@@ -94,13 +94,15 @@ def full_factor(
     rotations: FloatArray | None,
     *,
     volumes: FloatArray | None = None,
+    centroids: FloatArray | None = None,
     added: FloatArray | None = None,
 ) -> Factor | None:
     """Return the factor of *hessian* (m, m) minus the term of the *rotations*, `rotation_term`.
 
     The Hessian of the preserved *volumes*, G (3, m, m) of `volume_constraints.Volumes`, is added,
-    and so is *added* (3m, 3m), which is positive semi-definite.  None if no share of the rotations'
-    term leaves the sum convex; with *added*, or without *rotations*, no share at all is tried, too.
+    so is that of *centroids* (3m, 3m), and so is *added* (3m, 3m), which is positive
+    semi-definite.  None if no share of the rotations' term leaves the sum convex; with *added*, or
+    without *rotations*, no share at all is tried, too.
     """
     m = len(hessian)
     term = np.zeros((3 * m, 3 * m)) if rotations is None else rotations
@@ -116,6 +118,8 @@ def full_factor(
             full[m : 2 * m, :m] -= volumes[2]
             full[2 * m :, :m] += volumes[1]
             full[2 * m :, m : 2 * m] -= volumes[0]
+        if centroids is not None and share:
+            full += centroids
         if added is not None:
             full += added
         try:

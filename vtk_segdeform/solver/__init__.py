@@ -5,6 +5,7 @@ The files, in reading order:
     newton                  the iteration of both levels, eqs. (11) to (14) and (21)
     gauss_newton            its objective over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
+    other_measures          areas and centroids
     bodies                  the volume of each body
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
     terms                   further terms of the objective
@@ -33,6 +34,7 @@ from .exact_volume import (
 from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .mirror_term import MirrorTerm
 from .newton import Step, constrained_step, minimise
+from .other_measures import CentroidConstraint, area_of, centroid_of
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
@@ -55,6 +57,7 @@ __all__ = [
     "Anchors",
     "Anderson",
     "Bodies",
+    "CentroidConstraint",
     "CoarseVolume",
     "Contact",
     "ContactSurface",
@@ -73,6 +76,8 @@ __all__ = [
     "VolumeConstraint",
     "Volumes",
     "are_met",
+    "area_of",
+    "centroid_of",
     "connected_sets",
     "constrained_step",
     "errors_at",

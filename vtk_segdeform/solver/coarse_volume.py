@@ -27,6 +27,7 @@ from ..geometry import cluster_positions, decimated, faces_between, voronoi_cell
 from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
+from .other_measures import AreaConstraint, CentroidConstraint
 from .volume_constraints import VolumeConstraint, Volumes
 
 _SIDES = 0.1  # of the mesh's size: distance added between surfaces that face opposite ways
@@ -83,22 +84,21 @@ class CoarseVolume:
         shares = areas / np.bincount(cells, areas)[cells]
         return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
 
-    def volumes(self, constraints: Sequence[VolumeConstraint], rest: FloatArray) -> Volumes:
+    def volumes(
+        self, constraints: Sequence[VolumeConstraint], rest: FloatArray, unit: float = 1.0
+    ) -> Volumes:
         """Return *constraints* on the mesh as constraints on the cages.
 
-        Their targets are shares of the coarse volumes of *rest* (n, 3), which may be scaled and
-        moved.
+        Their targets are shares of the coarse volumes of *rest* (n, 3), which may be moved, and
+        smaller by *unit*.
         """
         points = rest
         if self.cells is not None and self.shares is not None:
             constraints = _over_cells(constraints, self.cells)
             points = _matrix(self.cells, self.shares) @ rest
-        free = [replace(each, target=0.0) for each in constraints]
-        preserved = tuple(
-            replace(each, target=each.share * each.violation(points)) for each in free
-        )
-        hessian = _VolumeHessian(self.surface, preserved, points) if preserved else None
-        return Volumes(self.surface, preserved, hessian)
+        preserved = tuple(each.at_points(points, unit) for each in constraints)
+        of_few = _VolumeHessian(self.surface, preserved, points)
+        return Volumes(self.surface, preserved, of_few if of_few.curved else None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,14 +109,34 @@ class _VolumeHessian:
     constraints: tuple[VolumeConstraint, ...]
     points: FloatArray  # (n, 3), the surface at rest
 
-    def __call__(self, p: FloatArray, multipliers: FloatArray) -> FloatArray:
-        """Return G (3, m, m) at *p* (m, 3)."""
+    def __call__(
+        self, p: FloatArray, multipliers: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Return G (3, m, m) at *p* (m, 3), and the rest of the Hessian, (3m, 3m)."""
         weights, whole, constraint_of = self._over_few_points
         x = weights @ p
-        halves = whole.hessian_halves(x, multipliers[constraint_of])
+        of_face, rest = multipliers[self.curved][constraint_of], None
+        for k, number in enumerate(self.curved):
+            constraint = self.constraints[number]
+            if isinstance(constraint, CentroidConstraint) and multipliers[number]:
+                own = constraint_of == k
+                extended = weights if whole.extension is None else whole.extension @ weights
+                rows: FloatArray = np.asarray(extended, dtype=np.float64)
+                body = replace(constraint, faces=whole.faces[own])
+                shares, more = body.second_derivatives(whole.extended(x), rows)
+                of_face[own] *= shares
+                rest = multipliers[number] * more + (0.0 if rest is None else rest)
+        halves = whole.hessian_halves(x, of_face)
         half = (halves.astype(np.float32) @ weights).reshape(3, len(x), -1)
         reduced = weights.T @ half
-        return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64)
+        return np.asarray(reduced - np.swapaxes(reduced, 1, 2), dtype=np.float64), rest
+
+    @cached_property
+    def curved(self) -> list[int]:
+        """The numbers of the volumes and centroids; H has no second derivatives of areas."""
+        return [
+            k for k, each in enumerate(self.constraints) if not isinstance(each, AreaConstraint)
+        ]
 
     @cached_property
     def _over_few_points(self) -> tuple[NDArray[np.float32], VolumeConstraint, IntArray]:
@@ -129,17 +149,18 @@ class _VolumeHessian:
         """
         n = len(self.points)
         cells, shares = np.arange(n), np.ones(n)
-        if n > sizes.VOLUME_HESSIAN_POINTS and len(self.constraints) == 1:
-            outward = np.sum([each.gradient(self.points) for each in self.constraints], axis=0)
+        volumes = [self.constraints[k] for k in self.curved]
+        if n > sizes.VOLUME_HESSIAN_POINTS and len(volumes) == 1 and volumes[0].is_cubic:
+            outward = volumes[0].gradient(self.points)
             areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
             places = np.hstack([self.points, _SIDES * outward / areas[:, None]])
             cells = cluster_positions(places, sizes.VOLUME_HESSIAN_POINTS, rounds=3, seeded=False)
             shares = areas / np.bincount(cells, areas)[cells]
         weights = self.surface.premultiplied(_matrix(cells, shares)).astype(np.float32)
-        few = _over_cells(self.constraints, cells)
+        few = _over_cells(volumes, cells)
         number = np.repeat(np.arange(len(few)), [len(each.faces) for each in few])
-        whole = replace(few[0], faces=np.concatenate([each.faces for each in few]))
-        return weights, whole, number
+        faces = np.concatenate([each.faces for each in few])
+        return weights, VolumeConstraint(faces, 0.0, few[0].extension), number
 
 
 def _over_cells(
@@ -149,7 +170,7 @@ def _over_cells(
     n, count, extension = len(cells), int(cells.max()) + 1, None
     if not constraints:
         return ()
-    assert all(each.shares_points(constraints[0]) for each in constraints)
+    assert all(each.extension is constraints[0].extension for each in constraints)
     if (given := constraints[0].extension) is not None:
         member = sparse.csr_array((np.ones(n), cells, np.arange(n + 1)), (n, count))
         extension = sparse.csr_array(sparse.vstack([sparse.eye_array(count), given[n:] @ member]))

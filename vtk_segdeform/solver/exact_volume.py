@@ -38,17 +38,17 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     *paths* (n, 3 + 3 c) has the vertices and their c directions side by side.  One constraint:
     the exact root of its cubic.  Several: Newton's method on t.
     """
-    if len(constraints) == 1:
+    if len(constraints) == 1 and constraints[0].is_cubic:
         return np.array([constraints[0].exact_step(paths)])
     t = np.zeros(len(constraints))
-    unit = sum(abs(c.target) for c in constraints)
+    units = _units(constraints)
     here, before, inverse = np.ascontiguousarray(paths[:, :3]), np.inf, None
     for _ in range(_NEWTON_STEPS):
         g = violations(constraints, here)
-        error = float(np.abs(g).max())
-        if error <= _EXACT * unit or (error <= _SMALL * unit and error > 0.5 * before):
+        error = float(np.abs(g / units).max())
+        if error <= _EXACT or (error <= _SMALL and error > 0.5 * before):
             break
-        if inverse is None or error > _SMALL * unit:
+        if inverse is None or error > _SMALL:
             jacobian = slopes_along(constraints, here, paths)
             # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
             # One with a few coarse points may not respond at all but for rounding, and does not
@@ -64,8 +64,13 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
 
 def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
     """Return whether the vertices *x* (n, 3) meet all constraints, up to a few roundings."""
-    unit = sum(abs(constraint.target) for constraint in constraints)
-    return bool((np.abs(violations(constraints, x)) <= _MET * unit).all())
+    return bool((np.abs(violations(constraints, x)) <= _MET * _units(constraints)).all())
+
+
+def _units(constraints: Sequence[VolumeConstraint]) -> FloatArray:
+    """Return what the error of each is relative to, (c,): of volumes the sum of all."""
+    every = sum(abs(each.target) for each in constraints if each.is_cubic)
+    return np.array([every if each.is_cubic else abs(each.size) for each in constraints])
 
 
 def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:

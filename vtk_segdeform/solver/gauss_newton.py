@@ -419,14 +419,16 @@ class GaussNewton:
     def _factor_at(self, here: _Iterate) -> Factor:
         """Return the factor of the exact Hessian; of the paper's if it is not convex."""
         of_terms = hessian_of(self.terms, here.at, here.x) if here.is_active else None
-        of_volumes = None
+        of_volumes = of_centroids = None
         if self.volumes.hessian:
             g = violations(self.volumes.constraints, here.x)
             solve = self._factor.solve_all
             _, multipliers, _ = constrained_step(solve, here.slope, here.rows, g)
-            of_volumes = self.volumes.hessian(here.at, multipliers)
+            of_volumes, of_centroids = self.volumes.hessian(here.at, multipliers)
         rotations = rotation_term(self.energy, here.at)
-        exact = full_factor(self._hessian, rotations, volumes=of_volumes, added=of_terms)
+        exact = full_factor(
+            self._hessian, rotations, volumes=of_volumes, centroids=of_centroids, added=of_terms
+        )
         return exact or self._factor
 
     def _surface(self, p: FloatArray) -> FloatArray:

@@ -34,6 +34,8 @@ from ..geometry import (
 from ..mesh import Mesh, edge_keys
 from ..subspace import Subspace
 
+Hessian = tuple[FloatArray, FloatArray | None]
+
 
 @dataclass(frozen=True, eq=False)
 class VolumeConstraint:
@@ -50,13 +52,51 @@ class VolumeConstraint:
     share: float = 1.0
     bound: int = 0
 
+    # What other measures have of their own; see `other_measures`.
+
+    @property
+    def is_cubic(self) -> bool:
+        """Whether it is a cubic along every direction."""
+        return True
+
+    @property
+    def has_origin(self) -> bool:
+        """Whether it changes if all points are moved alike."""
+        return False
+
+    @property
+    def size(self) -> float:
+        """What errors are relative to: the target."""
+        return self.target
+
+    def value(self, points: FloatArray) -> float:
+        """Return V over all points, those of `extended`."""
+        return float(signed_volumes(points, [self.faces])[0])
+
+    def slope(self, points: FloatArray) -> FloatArray:
+        """Return dV/dx of all points, (n, 3)."""
+        return volume_gradients(points, [self.faces])[0]
+
+    def change(self, x: FloatArray) -> float:
+        """Return by how much it differs from that at rest, as a share of it."""
+        return self.share * (1.0 + self.relative(x)) - 1.0
+
+    def nearer(self, off: float) -> float:
+        """Return the target with which one that is *off*, relative to its size, would be met."""
+        return self.target / (1.0 + off) if off > -1.0 else self.target
+
+    def at_points(self, points: FloatArray, _: float, /) -> VolumeConstraint:
+        """Return the same for other *points* at rest, whose unit may be longer."""
+        free = replace(self, target=0.0)
+        return replace(self, target=self.share * free.violation(points))
+
     def violation(self, x: FloatArray) -> float:
         """Return g(x), in units of volume."""
         return float(violations((self,), x)[0])
 
     def relative(self, x: FloatArray) -> float:
-        """Return g(x) / target; 0 if nothing is enclosed."""
-        return self.violation(x) / self.target if self.target else 0.0
+        """Return g(x) / size; 0 if nothing is enclosed."""
+        return self.violation(x) / self.size if self.size else 0.0
 
     def missed(self, x: FloatArray) -> float:
         """Return by how much x is off, as a share of *target*; 0 within the bound."""
@@ -96,12 +136,12 @@ class VolumeConstraint:
         """Return all points, relative to a vertex if points were added, to limit cancellation."""
         if self.extension is None:
             return x
-        x = x - x[0]
+        x = x if self.has_origin else x - x[0]
         return np.concatenate([x, self._means @ x])
 
     def shares_points(self, other: VolumeConstraint) -> bool:
         """Return whether `extended` is the same for both."""
-        return self.extension is other.extension
+        return self.extension is other.extension and self.has_origin is other.has_origin
 
     @cached_property
     def _means(self) -> sparse.csr_array:
@@ -135,7 +175,10 @@ def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatA
     """Return g(x) of all *constraints*, (c,), in units of volume."""
     found = np.empty(len(constraints))
     for some, points in _with_points(constraints, x):
-        found[some] = signed_volumes(points, [constraints[k].faces for k in some])
+        cubic = [k for k in some if constraints[k].is_cubic]
+        found[cubic] = signed_volumes(points, [constraints[k].faces for k in cubic])
+        for k in set(some) - set(cubic):
+            found[k] = constraints[k].value(points)
     return found - [each.target for each in constraints]
 
 
@@ -143,9 +186,11 @@ def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[Fl
     """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
     found = [x] * len(constraints)
     for some, points in _with_points(constraints, x):
-        slopes = volume_gradients(points, [constraints[k].faces for k in some])
+        cubic = [k for k in some if constraints[k].is_cubic]
+        slopes = volume_gradients(points, [constraints[k].faces for k in cubic])
+        slopes += [constraints[k].slope(points) for k in some if k not in cubic]
         extension = constraints[some[0]].extension
-        for k, slope in zip(some, slopes, strict=True):
+        for k, slope in zip(sorted(some, key=lambda k: k not in cubic), slopes, strict=True):
             found[k] = slope if extension is None else extension.T @ slope
     return found
 
@@ -167,12 +212,13 @@ class Volumes:
     """Constraints as functions of the cage vertices p, on the surface ``surface.map(p)``.
 
     *hessian*, if given, is a function of p and the multipliers lambda.  It returns G (3, m, m) with
-    sum_k lambda_k d^2 g_k / dp_ia dp_jb = sum_c eps_abc G_cij.
+    sum_k lambda_k d^2 g_k / dp_ia dp_jb = sum_c eps_abc G_cij for volumes, and for centroids the
+    rest (3m, 3m), axis by axis, or None.
     """
 
     surface: Subspace
     constraints: tuple[VolumeConstraint, ...]
-    hessian: Callable[[FloatArray, FloatArray], FloatArray] | None = None
+    hessian: Callable[[FloatArray, FloatArray], Hessian] | None = None
 
     def among(self, which: Sequence[int]) -> Volumes:
         """Return those constraints only whose numbers are *which*, in ascending order."""
@@ -181,7 +227,7 @@ class Volumes:
         chosen = tuple(self.constraints[k] for k in which)
         whole, count = self.hessian, len(self.constraints)
 
-        def hessian(p: FloatArray, multipliers: FloatArray) -> FloatArray:
+        def hessian(p: FloatArray, multipliers: FloatArray) -> Hessian:
             assert whole is not None
             every = np.zeros(count)
             every[list(which)] = multipliers
