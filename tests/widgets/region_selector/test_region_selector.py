@@ -239,6 +239,20 @@ def test_the_radius_of_the_brush_is_limited(desk):
             desk.selector.radius = radius
 
 
+def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
+    desk.selector.paints, desk.selector.radius = Paint.FIXED, 0.5
+    desk.hand.click(desk.under(0.9, 0.0))  # near the silhouette
+    assert (desk.points[desk.session.fixed, 1] < -0.05).all()
+    assert (desk.points[desk.session.fixed, 1] > -0.3).any()
+    desk.session.undo()
+    desk.selector.through = True
+    desk.hand.click(desk.under(0.3, 0.0))
+    sides = desk.points[desk.session.fixed, 1]
+    assert (sides < -0.8).any()
+    assert (sides > +0.8).any()
+    assert not ((sides > -0.6) & (sides < 0.6)).any()
+
+
 def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
     label = desk.session.history.undo_label
