@@ -14,7 +14,6 @@ from vtk_segdeform.benchmarks import (
     drags,
     felt,
     mechanisms,
-    opening,
     paper,
     peers,
     report,
@@ -137,31 +136,6 @@ def test_the_measures_of_a_pose_find_its_faults(body):
 
 
 @pytest.mark.campaign
-def test_the_report_of_drags_has_all_numbers_and_names_arap_when_it_is_absent():
-    section = felt.run(TINY)
-    set_up, frames = section.tables
-    assert set_up.column("vertices") == [600, 600]
-    assert min(set_up.column("total")) > 0.0
-    assert frames.column("drag") == 2 * ["handle", "pull"]
-    for name in ("first, ms", "median", "longest", "away", "jump"):
-        assert all(math.isfinite(each) and each >= 0.0 for each in frames.column(name))
-    assert all(math.isnan(each) for each in frames.column("median / ARAP"))
-    assert max(frames.column("volume change")) < 1e-12
-    assert len(section.skipped) == 2
-
-
-@pytest.mark.campaign
-def test_drags_with_constraints_are_compared_with_the_same_without():
-    (table,) = constrained.run(TINY).tables
-    names = table.column("constraint")
-    assert len(set(names)) == len(names) == 10
-    for name in ("median / none", "95 % / none", "finish / none"):
-        assert table.column(name)[0] == 1.0
-        assert min(table.column(name)) > 0.0
-    assert max(table.column("volume change")) < 1e-12
-
-
-@pytest.mark.campaign
 def test_each_constraint_of_the_comparison_is_at_work():
     sessions = constrained.begun(300, 40)
     poses, volumes = {}, {}
@@ -178,18 +152,6 @@ def test_each_constraint_of_the_comparison_is_at_work():
         assert volumes[name]["body 1"] == pytest.approx(rest["body 1"], rel=1e-12)
 
 
-@pytest.mark.campaign
-def test_a_mesh_that_is_opened_follows_the_pointer():
-    try:
-        size, drawn, press, followed, processor, bound = opening.opened(800)
-    except MissingDependencyError as missing:
-        pytest.skip(str(missing))
-    assert size == 800
-    assert 0.0 < drawn <= followed <= bound
-    assert 0.0 < press < 1e3 * bound
-    assert processor > 0.0
-
-
 def test_what_a_mechanism_improves_is_told_from_noise():
     equal = dict.fromkeys(mechanisms.QUANTITIES, (1.0, 1.0))
     assert not mechanisms.improves(equal)
@@ -197,24 +159,6 @@ def test_what_a_mechanism_improves_is_told_from_noise():
     for better in ({"time": (1.0, 1.06)}, {"folds": (0.0, 1.0)}, {"away": (1e-5, 2e-4)}):
         assert mechanisms.improves({**equal, **better})
     assert not mechanisms.improves({**equal, "steps": (1.0, 9.0)})
-
-
-@pytest.mark.campaign
-def test_the_tables_of_the_paper_have_its_numbers_beside_ours():
-    section = paper.run(replace(TINY, regions=(1, 3)))
-    first, second, units = section.tables
-    assert first.columns[1:] == (
-        "one cage", "three regions", "paper: one cage", "paper: three regions",
-    )  # fmt: skip
-    rows = {row[0]: row[1:] for row in first.rows}
-    assert rows["cage vertices"] == (60, 60, 155, 155)
-    assert rows["step, s"][2:] == (0.55, 0.2)
-    assert rows["non-zeros of W"][:2] == tuple(second.column("non-zeros of W"))
-    assert rows["steps of the bend"][:2] == tuple(second.column("steps of the bend"))
-    assert rows["non-zeros of W"][0] > rows["non-zeros of W"][1]
-    assert units.column("diagonal, units") == [1.0, 10.0, 100.0, 1000.0]
-    errors = units.column("handle error, diagonals")
-    assert errors[0] > 100 * errors[2]  # rows (5) outweigh (7) in small units
 
 
 def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
@@ -227,17 +171,6 @@ def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
     assert (still.steps, still.early) == (1, still.volume_change)
     assert still.handle_error < 1e-9
     assert still.distortion < 1e-6
-
-
-@pytest.mark.campaign
-def test_libigl_is_named_with_a_reason_where_it_is_absent():
-    section = peers.run(TINY)
-    (table,) = section.tables
-    assert table.column("method") == ["vtk_segdeform, three regions", "vtk_segdeform, one cage"]
-    assert all(abs(change) < 1e-10 for change in table.column("volume change"))
-    told = "\n".join(section.skipped)
-    assert "libigl ARAP" in told
-    assert "SEGDEFORM_DATA" in told
 
 
 def test_iterations_end_near_their_limit_and_not_where_they_are_slow():

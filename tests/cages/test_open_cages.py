@@ -8,12 +8,11 @@ import logging
 import numpy as np
 import pytest
 from campaign import every
-from sheets import SHEETS, bent, bowl, cup, mesh_of, plate
-from solids import icosphere, rotation, torus
+from sheets import SHEETS, bent, cup, mesh_of, plate
+from solids import icosphere, rotation
 
 from vtk_segdeform.cages.cage import cage_faults
 from vtk_segdeform.cages.fit import fit_cage, fit_cages
-from vtk_segdeform.cages.region_solid import Surface
 from vtk_segdeform.deformer import Deformer
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
@@ -79,22 +78,6 @@ def test_the_cage_of_a_pan_is_filled_as_under_a_lid(seed):
     order = np.random.default_rng(seed).permutation(len(vertices))  # decides the signs of axes
     cage = single_cage(Mesh(vertices[order], np.argsort(order)[faces]))
     assert cage.contains([[0.0, 0.0, 0.3], [0.5, 0.0, 0.4], [0.0, 0.0, 0.55]]).all()
-
-
-def test_the_walls_of_a_closed_mesh_are_its_own_faces():
-    surface = Surface.of(Mesh(*torus()))
-    points, faces = surface.walls
-    assert points is surface.points
-    assert faces is surface.faces
-
-
-@pytest.mark.parametrize("share", [0.0, 0.6])
-def test_cages_turn_with_an_open_mesh(share):
-    vertices, faces = bowl(share)
-    turn = rotation([1, 2, 3], 1.0)
-    one = single_cage(Mesh(vertices, faces), 60)
-    other = single_cage(Mesh(vertices @ turn.T, faces), 60)
-    np.testing.assert_allclose(other.vertices, one.vertices @ turn.T, atol=1e-6)
 
 
 LINE, POINT = [[2.0, 0, -1], [2, 0, 0], [2, 0, 2]], [[2.0, 0, 0]] * 3

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.spatial import cKDTree
-from solids import CUBE, icosphere, rotation
+from solids import icosphere, rotation
 
 from vtk_segdeform.cages.region_solid import Patch, Surface, _samples, solid_field
 from vtk_segdeform.mesh import Mesh
@@ -43,17 +43,6 @@ def test_the_distance_to_a_ball_is_known_at_every_node(scale):
     assert_allclose(field.members, field.grid.to_nodes(mesh.vertices), atol=1e-9)
 
 
-def test_the_distance_to_a_part_of_a_ball_is_that_to_its_own_half():
-    upper = BALL.vertices[:, 2] > -1e-9
-    field = field_of(BALL, upper)
-    nodes = np.indices(field.distance.shape).reshape(3, -1).T
-    points = field.grid.to_points(nodes)
-    below = (points[:, 2] < -0.15) & (np.linalg.norm(points[:, :2], axis=1) < 0.9)
-    assert_allclose(0.1 * field.distance.ravel()[below], -points[below, 2], atol=0.12)
-    above = (points[:, 2] > 0.1) & (np.linalg.norm(points, axis=1) < 0.9)
-    assert (field.distance.ravel()[above] <= 0.0).all()
-
-
 def test_the_step_follows_the_number_of_nodes_and_the_offset():
     fine = field_of(BALL, step=0.05, most_nodes=1e6)
     assert fine.grid.step == pytest.approx(0.05)
@@ -87,17 +76,3 @@ def test_no_point_of_a_triangle_is_far_from_its_samples(scale):
             rcond=None,
         )[0]
         assert_allclose(triangle.T @ back, samples.T, atol=1e-9 * scale)
-
-
-def test_a_patch_has_the_area_the_spread_and_the_box_of_the_faces_that_touch_it():
-    box = Mesh(CUBE[0] * [6.0, 2.0, 1.0] @ TURN, CUBE[1])
-    patch = Patch.of(Surface.of(box), np.ones(8, dtype=bool))
-    assert patch.area == pytest.approx(2.0 * (12.0 + 6.0 + 2.0))
-    assert_allclose(patch.axes @ patch.axes.T, np.eye(3), atol=1e-12)
-    low, high = patch.box
-    assert (high - low)[0] == pytest.approx(6.0, abs=1.0)
-    assert patch.spread[0] > patch.spread[1] > patch.spread[2] > 0.0
-    one = Patch.of(Surface.of(box), np.arange(8) == 0)
-    touching = (CUBE[1] == 0).any(axis=1)
-    assert one.area == pytest.approx(box.face_areas[touching].sum())
-    assert_array_equal(np.flatnonzero(one.weights), np.unique(CUBE[1][touching]))

@@ -47,14 +47,6 @@ def test_simplifying_stops_where_every_component_is_a_tetrahedron():
 
 
 @pytest.mark.usefixtures("either")
-def test_a_simplified_ball_keeps_its_size():
-    vertices, faces = simplify(*icosphere(4), 60)
-    radius = np.linalg.norm(vertices[faces].mean(axis=1), axis=1)
-    assert radius.min() > 0.9
-    assert radius.max() < 1.05
-
-
-@pytest.mark.usefixtures("either")
 def test_simplifying_a_rough_surface_inverts_no_face():
     ball, faces = icosphere(4)
     rough = ball * np.random.default_rng(0).uniform(0.5, 1.5, (len(ball), 1))
@@ -74,15 +66,6 @@ def test_a_simplified_cube_is_nearly_the_same_cube():
     assert np.abs(depth).max() < 0.05
     corners = np.linalg.norm(back[:, None] - CUBE[0], axis=2).min(axis=0)
     assert corners.max() < 0.05
-
-
-@pytest.mark.usefixtures("either")
-def test_a_surface_with_few_vertices_is_returned():
-    ball, faces = icosphere(3)
-    for n in (len(ball), len(ball) + 5):
-        vertices, same = simplify(ball, faces, n)
-        assert_array_equal(vertices, ball)
-        assert_array_equal(same, faces)
 
 
 @pytest.mark.usefixtures("either")

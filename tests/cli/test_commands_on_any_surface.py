@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 import pyvista as pv
 from campaign import every
-from given_surfaces import GIVEN, holed, parts, require_only_moved, tube
+from given_surfaces import GIVEN, holed, require_only_moved, tube
 from numpy.testing import assert_allclose, assert_array_equal
 from organs import surface_of
 
 from vtk_segdeform.cli.main import main
-from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import Surface, read_polydata, triangles_of, write_mesh
 from vtk_segdeform.mesh import Mesh
@@ -51,19 +50,6 @@ def test_deform_writes_what_was_given_only_moved(name, tmp_path, capsys):
     for workaround in surface.workarounds:
         assert str(workaround) in printed or "hole" in str(workaround)
     assert ("volume kept under lids" in printed) == (not surface.mesh.is_closed)
-
-
-@pytest.mark.parametrize(("lids", "words"), [("on", "4 holes: volume kept"), ("off", "lids off")])
-def test_lids_are_chosen(lids, words, tmp_path, capsys):
-    path, out = file_of("holed", tmp_path), tmp_path / "out.vtp"
-    assert main(["deform", str(path), "-o", str(out), "--lids", lids, *BEND]) == 0
-    assert words in capsys.readouterr().out
-    mesh, bent = (Surface(read_polydata(each)).mesh for each in (path, out))
-    closed = lids_of(mesh, True).closed(mesh)
-    volumes = [
-        signed_volume(lids_of(mesh).extension @ each.vertices, closed) for each in (mesh, bent)
-    ]
-    assert (abs(volumes[1] / volumes[0] - 1) < 1e-12) == (lids == "on")
 
 
 def test_both_sides_of_a_seam_follow_a_selection_of_one_of_them(tmp_path):
@@ -153,16 +139,6 @@ def test_check_tells_a_script_of_files_that_cannot_be_read(tmp_path, capsys):
         assert reason in found["reason"]
 
 
-def test_check_says_each_thing_once(tmp_path, capsys):
-    path = file_of("holed", tmp_path)
-    assert main(["check", str(path)]) == 0
-    assert capsys.readouterr().out.splitlines()[1:] == [
-        "It can be deformed as it is. 4 holes: volume kept under lids.",
-        "  welded 50 seam points",
-        "  4 borders of 16, 16, 8, 4 edges",
-    ]
-
-
 @pytest.mark.parametrize("away", [0.0, 1e4, 4e6])
 def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys):
     ball, path = sphere(2000), tmp_path / "ball.ply"
@@ -201,18 +177,6 @@ def test_check_names_what_cannot_be_deformed(tmp_path, capsys):
         assert word in found["reason"]
         assert main(["check", str(path)]) == 1
         assert "cannot be deformed" in capsys.readouterr().out
-
-
-def test_a_surface_of_several_parts_has_its_stray_points_unselected(tmp_path):
-    path, out = file_of("parts", tmp_path), tmp_path / "out.vtp"
-    words = ["--fixed", "z<15%", "--handle", "x>50%&z>85%", "--translate", "0.2,0,0", *OF_PARTS]
-    words += ROUGH
-    assert main(["deform", str(path), "-o", str(out), *words]) == 0
-    moved = read_polydata(out).points - parts().points
-    right = (parts().points[:, 0] > 1) & (parts().points[:, 0] < 5) & (parts().points[:, 2] > 2.6)
-    assert_allclose(moved[right][:, 0], 0.2, atol=5e-3)  # the stray at x = 9 does not count
-    stray = parts().n_points - 1
-    assert_array_equal(Surface(parts()).vertices_at([stray]), [])
 
 
 @pytest.fixture(scope="module")

@@ -113,14 +113,6 @@ def test_a_slide_along_a_line_or_the_surface_follows_a_colon(given, tmp_path):
         assert np.abs(u[feet]).max() > 1e-4
 
 
-def test_an_array_may_have_the_name_of_a_kind_of_slide(given, tmp_path):
-    poses = []
-    for text in ("plane", "z<-1.3"):
-        assert main(command(given, tmp_path / "posed.vtp", "pull", "--slide", text)) == 0
-        poses.append(Surface(read_polydata(tmp_path / "posed.vtp")).mesh.vertices)
-    assert_allclose(poses[0], poses[1], atol=0.0)
-
-
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -142,11 +134,6 @@ def test_errors_name_what_is_wrong(name, words, text, given, tmp_path, capsys):
     assert main(command(given, out, name, *words)) == 2
     assert text in capsys.readouterr().err
     assert not out.exists()
-
-
-def test_there_is_no_other_symmetry(given, tmp_path, capsys):
-    assert main(command(given, tmp_path / "posed.vtp", "pull", "--symmetry", "w")) == 2
-    assert "invalid choice: 'w'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("more", [["--rigid", "z>1.2"], ["--slide", "z<-1.3"], ["--symmetry", "x"]])

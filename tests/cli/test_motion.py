@@ -26,12 +26,6 @@ def test_a_turn_keeps_its_pivot_and_its_axis_and_all_distances(axis, angle):
     assert_allclose(moved, pivot + (x - pivot) @ turn(axis, angle).T, atol=1e-12)
 
 
-def test_turning_back_undoes_a_turn():
-    there = motion.rotation([1, 2, 3], 0.8, [4, 5, 6])
-    back = motion.rotation([1, 2, 3], -0.8, [4, 5, 6])
-    assert_allclose(there @ back, np.eye(4), atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("text", "axis", "degrees"),
     [

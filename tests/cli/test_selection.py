@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from real_meshes import botsch_sorkine, path_of
 from solids import icosphere, rotation
 
 from vtk_segdeform.cli.selection import parse_selection
@@ -44,26 +43,10 @@ def test_per_cent_runs_from_one_side_of_the_bounding_box_to_the_other(ball, axis
     assert len(parse_selection(f"{'xyz'[axis]}<=100%", ball.vertices)) == ball.n_vertices
 
 
-def test_strict_and_loose_comparisons_differ_exactly_on_the_limit(ball):
-    top = repr(float(ball.vertices[:, 2].max()))
-    assert len(parse_selection(f"z>={top}", ball.vertices)) == 1
-    with pytest.raises(ConstraintError, match="none"):
-        parse_selection(f"z>{top}", ball.vertices)
-
-
 def test_the_extent_of_a_mesh_far_from_the_origin_has_all_its_digits(ball):
     far = ball.vertices + [1e6, 0.0, 0.0]
     with pytest.raises(ConstraintError, match=r"the mesh spans x 1000\d{3}\.\d{4,}\.\.1000"):
         parse_selection("x<0", far)
-
-
-def test_and_means_both(ball):
-    both = parse_selection("z>50% & x<30%", ball.vertices)
-    expected = np.intersect1d(
-        parse_selection("z>50%", ball.vertices), parse_selection("x<30%", ball.vertices)
-    )
-    assert_array_equal(both, expected)
-    assert len(both)
 
 
 def test_a_file_of_numbers_may_use_lines_blanks_commas_and_comments(ball, tmp_path):
@@ -155,15 +138,3 @@ def test_a_sel_file_of_another_mesh_is_refused(ball, tmp_path):
 def test_an_array_of_vectors_selects_nothing_sensible_and_is_refused(ball):
     with pytest.raises(ConstraintError, match="one number per point"):
         parse_selection("normals", ball.vertices, point_arrays={"normals": ball.vertices})
-
-
-def test_the_benchmark_selections_are_read_as_their_authors_meant_them():
-    vertices, faces, status, _ = botsch_sorkine("cactus")
-    mesh = Mesh(vertices, faces)
-    path = str(path_of("botsch-sorkine/cactus.sel"))
-    assert_array_equal(
-        parse_selection(path, mesh.vertices, role="fixed"), np.flatnonzero(status == 0)
-    )
-    assert_array_equal(
-        parse_selection(path, mesh.vertices, role="handle"), np.flatnonzero(status == 2)
-    )

@@ -55,16 +55,6 @@ def test_deform_sets_volumes_without_a_handle(hollow, given, tmp_path, capsys):
     assert abs(float(wall.split(",")[1].split("%")[0])) < 1e-10
 
 
-def test_deform_sets_the_volume_of_a_part_while_a_handle_moves(hollow, given, tmp_path):
-    out = tmp_path / "out.vtp"
-    words = ["deform", given, "-o", str(out), "--fixed", "z<5%", "--handle", "z>95%"]
-    words += ["--rotate", "y,20", "--part", "tip=z>55%", "--volume", "tip=at least 10%"]
-    assert main([*words, "--volume", "whole=+5%", *QUICK]) == 0
-    x = Surface.read(out).mesh.vertices
-    assert_allclose(volumes(hollow, x)[1], 1.05 * volumes(hollow, hollow.vertices)[1], rtol=1e-12)
-    assert np.abs(x - hollow.vertices).max() > 0.05
-
-
 def test_pull_sets_volumes(hollow, given, tmp_path, capsys):
     out = tmp_path / "out.vtp"
     words = ["pull", given, "-o", str(out), "--at", "0,0,1", "--to", "0.1,0,1.1"]

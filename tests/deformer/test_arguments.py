@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_array_equal
 from solids import icosphere
 
-from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import arguments
-from vtk_segdeform.errors import ArgumentError, CageError, ConstraintError
+from vtk_segdeform.errors import ArgumentError, ConstraintError
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 
 MESH = Mesh(*icosphere(2))
@@ -50,14 +49,6 @@ def test_places_are_at_most_20_diagonals_apart(axis):
                 says = "20.1 diagonals of the mesh apart; at most 20 are"
                 refused(says, arguments.require_together, MESH, *places)
     arguments.require_together(MESH, np.empty((0, 3)))
-
-
-def test_cages_in_a_pose_are_stacked():
-    cages = [Cage(*icosphere(0)), Cage(*icosphere(1))]
-    poses = [cage.vertices + k for k, cage in enumerate(cages)]
-    assert_array_equal(arguments.stacked_cages(cages, poses), np.concatenate(poses))
-    says = r"must contain \[6, 18\] points, cage by cage; got \[18, 6\]"
-    refused(says, arguments.stacked_cages, cages, poses[::-1], error=CageError)
 
 
 def test_vertices_are_fixed_or_in_a_handle():

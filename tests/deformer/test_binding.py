@@ -13,7 +13,7 @@ from numpy.testing import assert_array_equal
 from scenes import sausage
 from solids import icosphere, together
 
-from vtk_segdeform import Deformer, Mesh, Regions, Session, sizes
+from vtk_segdeform import Deformer, Mesh, Regions, sizes
 from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.cages.fit import fit_cage
 from vtk_segdeform.deformer import binding, binding_cache
@@ -116,12 +116,6 @@ def test_a_damaged_file_is_ignored(tmp_path, counted, damage):
     assert_array_equal(again.vertices, sound.vertices)
 
 
-def test_without_a_folder_nothing_is_cached(tmp_path):
-    (tmp_path / "file").write_text("in the way")
-    solution = SCENE.deformer(cache=tmp_path / "file" / "folder").solve(TARGETS)
-    assert abs(solution.volume_change) < 1e-12
-
-
 def test_a_cancelled_binding_leaves_no_file(tmp_path):
     def stop(fraction, message):
         if fraction > 0.3:
@@ -142,17 +136,6 @@ def test_the_binding_unused_for_longest_is_deleted_first(tmp_path, monkeypatch):
     monkeypatch.setattr(binding_cache, "_MOST", int(3.5 * kept[1.0].stat().st_size))
     SCENE.deformer(cache=tmp_path, stretch=4.0)
     assert [path.exists() for path in kept.values()] == [True, False, True]
-
-
-def test_a_session_caches_the_binding_of_a_large_mesh(tmp_path, counted, monkeypatch):
-    monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path))
-    monkeypatch.setattr(sizes, "CACHED_BINDING", 100)
-    for _ in range(2):
-        session = Session(SCENE.mesh)
-        session.set_regions(SCENE.regions)
-        session.set_cages(SCENE.cages)
-        session.bind()
-    assert len(counted) == 1
 
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and owners of files")

@@ -94,10 +94,6 @@ def test_a_handle_may_deviate_from_an_affine_map_by_a_ten_thousandth(off, is_rig
     assert clamp(targets=targets)[1][HANDLE].all() == is_rigid
 
 
-def test_twelve_cage_vertices_for_each_region_are_enough():
-    assert clamp(n_cage_vertices=36)[0].n_regions == 3
-
-
 def test_a_margin_is_a_tenth_of_the_size_of_the_free_surface_around_fixed_parts():
     """And half of that around handles, along the surface, or two rings if these are more."""
     fine = Mesh(*icosphere(4))

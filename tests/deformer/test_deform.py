@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -106,25 +105,6 @@ def test_a_pose_that_cannot_be_finished_is_an_error_only_if_it_was_asked_for(cap
     same = finished(failing(None), solution, False, progress=lambda *given: told.append(given))
     assert same is solution
     assert told == [(1.0, "solved")]
-
-
-@dataclass
-class Pose:
-    """Something like a solution."""
-
-    steps: int
-
-
-def test_every_target_of_a_way_has_an_equal_part_of_the_progress():
-    def solve(targets, progress):
-        progress(0.0, "begin")
-        progress(1.0, "end")
-        return Pose(len(targets))
-
-    told, way = [], [X[:2], X[:3], X[:4], X[:5]]
-    solver = SimpleNamespace(solve=solve)
-    assert solved_along(solver, way, progress=lambda share, _: told.append(share)) == Pose(14)
-    assert told == pytest.approx([0.0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1.0])
 
 
 @pytest.mark.parametrize("option", ["lids", "avoid_contact", "refine", "preserve_volume", "mesh"])

@@ -93,16 +93,6 @@ def test_the_reach_is_free_and_parts_beyond_it_follow_if_they_are_small(follows,
     assert weights[:6] == pytest.approx((np.arange(8, 2, -1) ** 2 / 4.0 - 1.0) ** 2)
 
 
-def test_another_body_stays():
-    samples = chain()
-    edges = samples.edges.tolil()
-    edges[3, 4] = edges[4, 3] = 0.0
-    apart = replace(samples, edges=edges.tocsr())
-    weights = np.diag(apart.quadratic([SurfacePoint.at_vertex(8)], 3.0, 1.0)) * 12
-    assert (weights[:4] > 1e3).all()
-    assert not np.diag(apart.quadratic([SurfacePoint.at_vertex(8)], np.inf, 0.0)).any()
-
-
 def test_what_shares_a_region_with_the_pulled_part_comes_along_and_other_bodies_stay():
     """A button on the pulled end, one on the other end, and a body of its own."""
     low, high = X[X[:, 0].argmin()], X[X[:, 0].argmax()]
@@ -265,40 +255,12 @@ def test_a_pull_reaches_its_target_without_a_spike_and_far_away_nothing_moves(na
     assert far.max(initial=0.0) < 2e-3 * mesh.diagonal
 
 
-def test_a_vertex_of_a_sharp_edge_makes_no_spike():
-    mesh = real("botsch-sorkine/bar.off")
-    vertex = 971  # without resistance of its ring: 0.29
-    to = mesh.vertices[vertex] - [0.0, 0.0, 0.2 * mesh.diagonal]
-    solution = pull(mesh, vertex, to, 0.15 * mesh.diagonal, locality=0.2)
-    assert spike(mesh, solution.vertices, vertex) < 0.1
-
-
 @functools.cache
 def coarse():
     """Return a ball whose cage is about as dense as itself, without handles."""
     mesh = models.sphere(400)
     regions = Regions.single(mesh)
     return Deformer(mesh, regions, fit_cages(mesh, regions, 150))
-
-
-@pytest.mark.parametrize(
-    ("vertex", "spread", "share"),  # an edge is 0.055
-    every(3, [(0, 0.075, 0.3), (0, 0.075, 0.05), (217, 0.02, 0.3), (217, 0.02, 0.05)]),
-)
-def test_on_a_coarse_mesh_a_pulled_vertex_stays_in_the_plane_of_its_neighbours(
-    vertex, spread, share
-):
-    mesh = coarse().mesh
-    x, d, ring = mesh.vertices, mesh.diagonal, ring_around(mesh, vertex)
-    local = coarse().hold(handle=[vertex]).local(vertex, 0.3 * d, spread * d)
-    to = x[vertex] + share * d * outward(x, vertex, ring)
-    solution = local.solve(to[None])
-    assert solution.status is Status.CONVERGED
-    for pose in (solution, local.finish(solution)):
-        assert pose.status is not Status.MISSED
-        assert abs(pose.volume_change) < 1e-12
-        assert np.linalg.norm(pose.vertices[vertex] - to) < 1e-4 * d
-        assert spike(mesh, pose.vertices, vertex) < 0.1
 
 
 def test_the_finish_of_a_pull_has_no_more_energy_than_its_start():
@@ -352,25 +314,6 @@ def test_a_ring_has_its_vertex_as_an_affine_mean_of_the_neighbours():
     assert ring.weights[0] > ring.weights[1:].sum()
 
 
-@pytest.mark.parametrize("size", every(2, [1e-7, 1.0]))
-def test_the_finish_leaves_the_neighbours_of_a_pulled_vertex_in_place(size, monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)  # samples are coarser than the vertices
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 200)
-    ball = models.sphere(600)
-    mesh = ball.with_vertices(size * ball.vertices * [0.4, 0.4, 1.0])
-    x, d, regions = mesh.vertices, mesh.diagonal, Regions.single(mesh)
-    cages = fit_cages(mesh, regions, 30)
-    near = np.setdiff1d(mesh.adjacency[[0]].indices, [0])
-    spread = 4.0 * np.linalg.norm(x[near] - x[0], axis=1).max()
-    local = Deformer(mesh, regions, cages, handle=[0]).local(0, 0.3 * d, spread)
-    solution = local.solve(x[[0]] + [0.1 * d, 0.0, 0.1 * d])
-    finished = local.finish(solution)
-    moved = np.linalg.norm(finished.vertices - solution.vertices, axis=1) / d
-    assert moved.max() > 1e-3
-    assert moved[near].max() < 2e-4
-    assert abs(finished.volume_change) < 1e-12
-
-
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
@@ -389,16 +332,8 @@ def test_arguments_of_a_local_deformer_are_checked(changes, says):
         held().local(**{"vertex": HIGH, "reach": 1.0, "spread": 0.5, **changes})
 
 
-def test_a_pull_of_a_tetrahedron_has_converged():
-    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    solution = pull(tetrahedron, 3, [0.0, 0.0, 1.3])
-    assert solution.status is Status.CONVERGED
-    assert solution.handle_error < 1e-3  # its four vertices resist as much as they are held
-
-
 def test_the_finish_of_a_pull_makes_no_bump_around_the_pulled_point():
-    mesh = models.cactus(3000)
+    mesh = models.cactus(1800)
     x = mesh.vertices
     tip = int(np.argmin(np.linalg.norm(x - [-0.32, -0.05, 0.62], axis=1)))
     session = Session(mesh)
@@ -597,39 +532,6 @@ def test_values_of_samples_are_smoothed_between_cells(monkeypatch):
     assert smooth.std() > 0.02
 
 
-def test_samples_of_a_large_mesh_are_the_means_of_their_cells(monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    deformer = SCENE.deformer()
-    samples, rest = deformer._problem.samples, deformer._problem.rest
-    assert len(samples.points) < 100
-    for cell in range(0, len(samples.points), 7):
-        own = np.flatnonzero(samples.cells == cell)
-        areas = rest.vertex_areas[own]
-        assert_allclose(samples.points[cell], np.average(rest.vertices[own], axis=0, weights=areas))
-        assert samples.areas[cell] == pytest.approx(areas.sum() / rest.vertex_areas.sum())
-    assert_allclose(samples.rows @ deformer._problem.rest_cages, samples.points, atol=1e-6)
-    near = samples.edges.tocoo()
-    expected = np.linalg.norm(samples.points[near.row] - samples.points[near.col], axis=1)
-    assert_allclose(near.data, expected)
-    a, b = samples.cells[SCENE.mesh.edges].T
-    joined = samples.edges.toarray() > 0.0
-    assert joined[a, b][a != b].all()
-
-
-def test_margins_of_contact_have_the_height_of_the_surface_over_its_samples(monkeypatch):
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 100)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 60)
-    samples = SCENE.deformer()._problem.samples
-    surface, x = samples.contact_surface, SCENE.deformer()._problem.rest.vertices
-    normals = surface.normals(samples.points)
-    for cell, normal in enumerate(normals):
-        over = (x[samples.cells == cell] - samples.points[cell]) @ normal
-        height = max(0.0, over.max())
-        expected = min(0.2 * surface.radii[cell] + height, surface.gaps[cell])
-        assert surface.margins[cell] == pytest.approx(expected)
-
-
 def test_a_ring_needs_three_neighbours_away_from_its_point():
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     tetrahedron = Mesh(x, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -655,18 +557,6 @@ def test_parts_beyond_the_reach_follow_by_their_area():
     weights = large.weights([point], 1.0, 0.9)
     assert not weights[:7].any()
     assert weights[10:].all()
-
-
-def test_a_body_that_nothing_holds_follows_its_pulled_point():
-    """All of it is within the reach, and back at rest it has not turned."""
-    x, d = coarse().mesh.vertices, coarse().mesh.diagonal
-    top, low = int(x[:, 2].argmax()), int(x[:, 2].argmin())
-    local = coarse().hold(handle=[top]).local(top, 10.0 * d, 0.1 * d)
-    solution = local.solve(x[[top]] + [0.0, 0.0, 0.3 * d])
-    assert solution.vertices[low, 2] - x[low, 2] > 0.95 * 0.3 * d
-    assert_allclose(solution.vertices.mean(axis=0)[:2], x.mean(axis=0)[:2], atol=0.02 * d)
-    local.solve(x[[top]] + [0.2 * d, 0.3 * d, -0.1 * d])
-    assert_allclose(local.solve(x[[top]]).vertices, x, rtol=0, atol=1e-6 * d)
 
 
 @pytest.mark.parametrize("corners", [1, 2, 3])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from threading import Event
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from scenes import sausage
 
 from vtk_segdeform import sizes
 from vtk_segdeform.deformer import deform, pull
-from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import ArgumentError, Cancelled, ConstraintError, MeshError
 from vtk_segdeform.geometry.distortion import distortion
 
@@ -46,11 +44,6 @@ def test_small_meshes_are_finished_and_large_ones_on_request(make, monkeypatch):
     monkeypatch.setattr(sizes, "FINISHED", SCENE.mesh.n_vertices - 1)
     assert_array_equal(make().vertices, plain.vertices)
     assert_array_equal(make(True).vertices, finished.vertices)
-
-
-def test_a_pull_is_finished_on_request():
-    assert_array_equal(pulled().vertices, pulled(False).vertices)
-    assert distortion(SCENE.mesh, pulled(True).vertices) < distortion(SCENE.mesh, pulled().vertices)
 
 
 @pytest.mark.parametrize("make", [bent, pulled])
@@ -90,30 +83,6 @@ def test_a_pose_without_a_handle_is_an_error(handle):
         match=r"at least one vertex in handle, or goals for volumes; got none",
     ):
         deform(SCENE.mesh, SCENE.fixed, handle, [], **OPTIONS)
-
-
-def test_a_finish_is_cancelled_even_while_its_matrix_is_factored(monkeypatch):
-    began, released = Event(), Event()
-
-    def factor(*_, **__):
-        began.set()
-        released.wait(20.0)
-
-    def cancel(_, text):
-        if began.is_set():
-            raise Cancelled(text)
-
-    monkeypatch.setattr("vtk_segdeform.finish.factor.splu", factor)
-    deformer = Deformer(
-        SCENE.mesh, SCENE.regions, SCENE.cages, fixed=SCENE.fixed, handle=SCENE.handle
-    )
-    solution = deformer.solve(TARGETS, max_steps=2)
-    try:
-        with pytest.raises(Cancelled):
-            deformer.finish(solution, progress=cancel)
-        assert not released.is_set()
-    finally:
-        released.set()
 
 
 def test_the_finish_of_a_pull_moves_its_reach_only():

@@ -141,20 +141,6 @@ def test_a_rigid_part_that_slides_is_rigid_and_flat():
     assert abs(pose.volume_change) < 1e-12
 
 
-def test_a_rigid_part_slides_along_a_line():
-    """A sleeve that a shaft keeps on its axis: it is placed in rounds until both hold."""
-    axis = TURN @ [0.2, 0.1, 1.0] / np.linalg.norm([0.2, 0.1, 1.0])
-    middle = np.abs(HEIGHT - HEIGHT.max() / 2)
-    ring = np.flatnonzero(middle < 0.2)[:9]
-    stiffness = np.where(middle < 0.3, np.inf, 1.0)
-    slides = [sd.Slide(ring, "line", axis)]
-    deformer = block().stiffened(stiffness).hold(handle=TOP, slides=slides)
-    pose = deformer.finish(deformer.solve(BLOCK.vertices[TOP] + TURN @ [0.3, 0.1, 0.2]))
-    u = (pose.vertices - BLOCK.vertices)[ring]
-    assert np.linalg.norm(u - np.outer(u @ axis, axis), axis=1).max() < 1e-8
-    assert (u @ axis).max() > 0.05
-
-
 def test_slides_of_one_side_of_a_symmetric_body_are_mirrored():
     mesh = torso()
     x = mesh.vertices
@@ -206,8 +192,3 @@ def test_many_sliding_vertices_need_little_memory():
 def test_what_is_no_slide_is_named(slides, text):
     with pytest.raises((ConstraintError, sd.errors.ArgumentError), match=text):
         block().hold(slides=slides)
-
-
-def test_slides_of_no_vertices_are_none():
-    deformer = block().hold(handle=TOP, slides=[sd.Slide([]), sd.Slide(HEIGHT < -1.0)])
-    assert deformer._constraints.guides == ()

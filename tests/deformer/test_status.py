@@ -87,7 +87,7 @@ def finished(bent):
     return deformer, solutions
 
 
-@pytest.mark.parametrize("bent", BENT)
+@pytest.mark.parametrize("bent", every(2, BENT))
 def test_one_finish_converges_and_finishing_again_hardly_moves_the_pose(bent, monkeypatch):
     deformer, solutions = finished(bent)
     last = again = solutions[-1]
@@ -101,18 +101,6 @@ def test_one_finish_converges_and_finishing_again_hardly_moves_the_pose(bent, mo
     assert moved(again, last) < NEAR
 
 
-def test_a_finish_that_is_stopped_early_has_not_converged_and_can_be_continued(monkeypatch):
-    deformer, (solution, last) = finished(bent_snake)
-    monkeypatch.setattr(finisher, "_STEPS", 1)
-    first = deformer.finish(solution)
-    assert first.status is Status.STEP_LIMIT
-    assert "finish again" in str(first.status)
-    assert moved(first, last) > CONVERGED
-    assert first.remaining == pytest.approx(moved(first, last), rel=0.9)  # within ten times it
-    monkeypatch.undo()
-    assert moved(deformer.finish(first), last) < NEAR
-
-
 @pytest.mark.parametrize("bent", every(1, BENT))
 def test_a_converged_pose_of_the_cages_hardly_moves_if_another_deformer_solves_from_it(bent):
     deformer, targets = made(bent)
@@ -123,13 +111,6 @@ def test_a_converged_pose_of_the_cages_hardly_moves_if_another_deformer_solves_f
     other = deformer.copy()
     other.resume(solution.cage_vertices, targets)
     assert moved(other.solve(targets), solution) < NEAR
-
-
-def test_a_loose_tolerance_does_not_make_a_pose_converged():
-    deformer = SCENE.deformer(tolerance=0.1)
-    solution = deformer.solve(SCENE.turned(50))
-    assert solution.remaining > CONVERGED
-    assert solution.status is Status.STEP_LIMIT
 
 
 def test_missed_handles_are_told_before_all_else(monkeypatch):
@@ -146,16 +127,6 @@ def test_a_finish_that_cannot_move_the_pose_stalls(monkeypatch):
     again = deformer.finish(first)
     assert_array_equal(again.vertices, first.vertices)
     assert again.status is Status.STALLED
-
-
-def test_a_drag_does_not_measure(monkeypatch):
-    def fail(*_):
-        raise AssertionError("measured in a drag")
-
-    deformer = SCENE.held()
-    monkeypatch.setattr(Deformer, "_with_remaining", fail)
-    deformer.solve(SCENE.turned(5), max_steps=3)
-    deformer.solve(SCENE.turned(10), max_steps=3)
 
 
 # Folds
@@ -214,18 +185,6 @@ def test_needles_and_flat_triangles_are_no_folds():
     assert not len(turned_over(flat, x, faces))
 
 
-def test_a_solution_counts_folds_and_crossings_of_its_own_vertices():
-    deformer, targets = made(bent_sausage)
-    solution = deformer.copy().solve(targets)
-    assert not len(solution.folds())
-    assert not len(solution.crossings())
-    far = replace(solution, vertices=pulled_across(SCENE.mesh, 20))
-    expected = turned_over(far.vertices, SCENE.mesh.vertices, SCENE.mesh.faces)
-    assert_array_equal(far.folds(), expected)
-    assert len(expected)
-    assert far.folds() is far.folds()
-
-
 # Parts that nothing moves
 
 
@@ -259,17 +218,6 @@ def test_a_part_that_no_handle_moves_is_named():
     many = replace(solution, unmoved=np.arange(6))
     assert many.unmoved_summary(mesh).startswith("parts 1, 2, 3 and 3 more (")
     assert many.unmoved_summary(mesh).endswith("they stay where they are")
-
-
-def test_a_part_that_follows_or_is_held_is_not_named():
-    deformer = arm_and_ring(links=True)
-    solution = deformer.solve(deformer.mesh.vertices[deformer.handle] + [0.3, 0.0, -0.1])
-    assert not len(solution.unmoved)
-    assert solution.unmoved_summary(deformer.mesh) == ""
-    ring = np.flatnonzero(deformer.mesh.components == 1)
-    apart = arm_and_ring(links=False)
-    held = apart.hold(fixed=np.union1d(apart.fixed, ring[:3]), handle=apart.handle)
-    assert not len(held.solve(apart.mesh.vertices[held.handle]).unmoved)
 
 
 def test_ends_that_are_put_into_each_other_cross_and_are_told_if_contact_is_avoided():

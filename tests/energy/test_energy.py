@@ -41,15 +41,6 @@ def test_loose_cages_stay_near_the_mesh(n_regions):
         assert np.linalg.norm(vertices - middle, axis=1).max() < 3.0 * reach
 
 
-def test_cages_that_share_no_vertex_do_not_couple():
-    scene = sausage(3)
-    subspace = cage_subspace(scene.regions, scene.cages)
-    energy = shape_energy(scene.mesh, subspace, 10.0, np.arange(scene.mesh.n_vertices))
-    first, last = subspace.columns[0], subspace.columns[2]
-    assert (energy.quadratic[first, last] == 0.0).all()
-    assert np.abs(energy.quadratic[first, subspace.columns[1]]).max() > 0.0
-
-
 def shape(stretch, n_clusters):
     n = SCENE.mesh.n_vertices
     clusters = np.arange(n) % (n_clusters or n)

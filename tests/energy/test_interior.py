@@ -68,20 +68,6 @@ def test_the_points_are_inside_and_have_the_volume_of_the_body_in_proportion():
         assert (interior.volumes > 0.0).all()
 
 
-def test_what_encloses_nothing_has_no_points():
-    flat = Mesh(*_grid())
-    assert not len(Interior.of(flat, np.ones((1, 25)), BODY).points)
-    assert not len(Interior.of(MESH, SCENE.regions.weights, ~BODY).points)
-
-
-def _grid():
-    x, y = np.meshgrid(np.arange(5.0), np.arange(5.0))
-    k = np.arange(25).reshape(5, 5)
-    a, b, c, d = (k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1])
-    faces = np.stack([a, b, c, a, c, d], axis=-1).reshape(-1, 3)
-    return np.stack([x.ravel(), y.ravel(), np.zeros(25)], axis=1), faces
-
-
 def test_points_of_a_body_do_not_see_the_regions_of_another():
     ball = models.sphere(66)
     both = Mesh(

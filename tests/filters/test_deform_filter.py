@@ -310,29 +310,6 @@ def test_points_at_a_seam_move_together_and_their_normals_agree():
     assert np.abs(cosines).min() > 0.98
 
 
-def test_cell_normals_turn_with_their_cells():
-    surface = tube()
-    del surface.point_data["Normals"]
-    surface = surface.compute_normals(point_normals=False, cell_normals=True)
-    out, _ = bent(surface)
-    fresh = out.copy()
-    del fresh.cell_data["Normals"]
-    fresh = fresh.compute_normals(point_normals=False, consistent_normals=False)
-    cosines = (fresh.cell_data["Normals"] * out.cell_data["Normals"]).sum(axis=1)
-    assert np.abs(cosines).min() > 0.99
-    assert np.abs(out.cell_data["Normals"] - surface.cell_data["Normals"]).max() > 0.03
-
-
-def test_a_sheet_has_no_volume():
-    plane = pv.Plane(i_resolution=12, j_resolution=12).rotate_y(90.0).translate((0, 0, 1.5))
-    plane.points[:, 2] = 3 * (plane.points[:, 2] - 1.0)
-    del plane.point_data["Normals"]
-    out, own = bent(plane)
-    require_only_moved(plane, out)
-    assert own["HasVolume"] == [0]
-    assert own["VolumeChange"] == [0.0]
-
-
 @pytest.mark.parametrize(("lids", "count"), [(True, 4), (None, 4), (False, 0)])
 def test_lids_are_chosen(lids, count):
     _, own = bent(GIVEN["holed"](), Lids=lids)

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import threading
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +12,9 @@ from scenes import sausage
 from scipy import optimize, sparse
 from solids import exact_volume_change, icosphere, rotation
 
-from vtk_segdeform import deform, sizes
+from vtk_segdeform import sizes
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.finish import CellEnergy, Finish, Finisher, cell_energy
+from vtk_segdeform.finish import CellEnergy, Finish, Finisher
 from vtk_segdeform.finish import finisher as finishing
 from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry import closest_rotations, lids_of, triangle_distortion
@@ -115,15 +111,6 @@ def test_a_motion_or_another_unit_moves_the_finish_alike(monkeypatch, scale, shi
     plain = SAUSAGE.finish()
     error = (moved.vertices - shift) / scale - plain.vertices @ turn.T
     assert np.abs(error).max() < 1e-4 * SCENE.mesh.diagonal
-
-
-def test_at_rest_the_mesh_stays_bit_for_bit():
-    mesh = SCENE.mesh
-    rest = Problem(mesh, SAUSAGE.held, mesh.vertices[SAUSAGE.held], mesh.vertices)
-    found = rest.finish()
-    assert found.vertices is mesh.vertices
-    assert found.steps == 0
-    assert found.remaining < 1e-12 * mesh.diagonal
 
 
 def test_components_without_places_stay_where_they_are(monkeypatch):
@@ -264,45 +251,6 @@ def test_waves_longer_than_the_length_stay_and_shorter_ones_relax():
     assert short < 0.1
 
 
-def test_a_finish_from_another_start_ends_at_the_same_pose():
-    finisher = SAUSAGE.finisher()
-    found = finisher.run(SAUSAGE.start, SAUSAGE.places)
-    assert found.remaining <= 1e-5 * SCENE.mesh.diagonal
-    again = finisher.run(SAUSAGE.start, SAUSAGE.places, start=found.vertices)
-    assert again.steps == 0
-    assert_array_equal(again.vertices, found.vertices)
-    wave = 0.05 * np.sin(3.0 * SAUSAGE.start[:, [1, 2, 0]])
-    other = SAUSAGE.start + np.where(SAUSAGE.held[:, None], 0.0, wave)
-    there = finisher.run(SAUSAGE.start, SAUSAGE.places, start=other)
-    assert there.steps > 0
-    assert (
-        np.linalg.norm(there.vertices - found.vertices, axis=1).max() < 1e-3 * SCENE.mesh.diagonal
-    )
-
-
-def test_a_denser_mesh_with_the_same_cages_is_finished_alike():
-    """Levels of an icosphere share their first vertices."""
-    poses, counts = [], []
-    for level in (2, 3, 4):
-        ball, faces = icosphere(level)
-        problem = bent(Mesh(ball * [2.0, 0.7, 0.6], faces), 40.0)
-        start = problem.start.copy()
-        start[~problem.held] -= 0.01 * np.sin(
-            7.0 * problem.mesh.vertices[~problem.held][:, [1, 2, 0]]
-        )
-        mesh, weights = problem.mesh, problem.mesh.vertex_areas / (0.1 * problem.mesh.diagonal) ** 2
-        energy = CellEnergy.of(mesh, mesh.n_vertices / 10.0)
-        finisher = Finisher(mesh, energy, problem.held, [total_volume(mesh)], weights)
-        poses.append(finisher.run(start, start[problem.held]).vertices)
-        counts.append(len(ball))
-    some = slice(0, counts[0])
-    one, two = (
-        np.linalg.norm((a[some] - b[some]), axis=1).max() for a, b in itertools.pairwise(poses)
-    )
-    assert two < 0.02
-    assert two < one
-
-
 def test_what_would_come_to_cross_is_kept_apart_if_it_is_asked_for(monkeypatch):
     """Between its ends, a sheet above another one is an arch, which would relax through it."""
     one = sheet()
@@ -343,59 +291,6 @@ def test_far_from_what_moves_there_is_no_energy():
     assert value - rise == pytest.approx(least - more, rel=1e-9)
     rows = whole.laplacian[moving] - near.laplacian[moving]
     assert_allclose(rows.toarray(), 0.0, atol=1e-12)
-
-
-def test_two_finishes_at_once_of_one_deformer_give_the_same_as_one_after_the_other(monkeypatch):
-    """Both threads have run each kernel before either of them continues with its result."""
-    pytest.importorskip("numba")
-    monkeypatch.setattr(sizes, "COMPILED", 0)
-    deformer = SCENE.held()
-    solution = deformer.solve(SCENE.turned(40))
-    starts = solution, solution
-    expected = [deformer.finish(start).vertices for start in starts]
-    together, met = threading.Barrier(2, timeout=20.0), []
-    run_kernel = cell_energy.in_parallel
-
-    def in_turns(*task):
-        run_kernel(*task)
-        with suppress(threading.BrokenBarrierError):  # the other finish has ended
-            met.append(together.wait())
-
-    def finish(start):
-        try:
-            return deformer.finish(start).vertices
-        finally:
-            together.abort()
-
-    monkeypatch.setattr(cell_energy, "in_parallel", in_turns)
-    with ThreadPoolExecutor(2) as threads:
-        found = [*threads.map(finish, starts)]
-    assert len(met) > 10
-    for each, alone in zip(found, expected, strict=True):
-        assert_array_equal(each, alone)
-
-
-@pytest.mark.parametrize("scale", [2.0**200, 2.0**-200])
-def test_the_finish_of_a_huge_or_tiny_mesh_is_that_of_the_mesh(scale):
-    mesh, ends = SCENE.mesh, (SCENE.fixed, SCENE.handle)
-    options = {"n_regions": 1, "n_cage_vertices": 40}
-    one = deform(mesh, *ends, SCENE.turned(30), **options)
-    scaled = mesh.with_vertices(scale * mesh.vertices)
-    other = deform(scaled, *ends, scale * SCENE.turned(30), **options)
-    assert one.steps == other.steps
-    assert_allclose(other.vertices / scale, one.vertices, rtol=0, atol=1e-9)
-
-
-def test_a_hat_lifted_off_a_head_leaves_both_as_they_are():
-    head, faces = icosphere(3)
-    hat = 0.7 * head + [0.0, 0.0, 1.2]  # into the head
-    mesh = Mesh(np.vstack([head, hat]), np.vstack([faces, faces + len(head)]))
-    x = mesh.vertices
-    fixed = np.flatnonzero(x[:, 2] < -0.7)
-    handle = np.flatnonzero(x[:, 2] > 1.6)
-    solution = deform(mesh, fixed, handle, x[handle] + [0.0, 0.0, 1.0])
-    lifted = np.where(np.arange(len(x)) < len(head), 0.0, 1.0)[:, None] * [0.0, 0.0, 1.0]
-    assert_allclose(solution.vertices, x + lifted, atol=1e-5)
 
 
 def test_with_all_vertices_held_no_step_is_taken():
@@ -460,27 +355,6 @@ def test_with_and_without_compiled_kernels_energies_are_the_same(rounds, monkeyp
     assert_allclose(found[0][1], found[1][1], atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("per_cage", "rounds", "share"), [(0, 0, 0), (40, 1, 0.4), (60, 2, 0.3), (9000, 12, 0.5)]
-)
-def test_a_walk_is_a_hundredth_of_the_vertices_per_cage_vertex(per_cage, rounds, share):
-    """In rounds of one half at most, of which there are not more than twelve."""
-    energy = CellEnergy.of(SCENE.mesh, float(per_cage))
-    assert (energy._rounds, energy._share) == (rounds, pytest.approx(share))
-
-
-def test_where_almost_everything_moves_or_nothing_the_energy_is_all_of_it():
-    whole = CellEnergy.of(SCENE.mesh, PER_CAGE)
-    none, every = np.zeros(SCENE.mesh.n_vertices, bool), np.ones(SCENE.mesh.n_vertices, bool)
-    expected = whole.value_and_slope(SAUSAGE.start)
-    for moving in (none, every):
-        near = whole.near(moving)
-        assert near is not whole  # it has rooms of its own
-        value, slope = near.value_and_slope(SAUSAGE.start)
-        assert value == expected[0]
-        assert_array_equal(slope, expected[1])
-
-
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("n", [0, 1, 40])
 def test_the_factored_matrix_solves_as_the_dense_one(n, compiled, monkeypatch):
@@ -528,23 +402,3 @@ def test_a_mirrored_pose_lands_again_where_it_misses_several_volumes(monkeypatch
     made = finisher.made(found, lambda x: x).vertices
     for x, rest in ((made[:count], mesh.vertices), (made[count:], pair.vertices[count:])):
         assert abs(exact_volume_change(rest, x, mesh.faces)) < 1e-13
-
-
-def test_what_is_within_the_length_of_held_vertices_moves_along_with_them():
-    """Without a volume, as by the matrix of the finish without a force at free vertices."""
-    problem = bent(sheet())
-    mesh, held = problem.mesh, problem.held
-    offsets = np.where(mesh.vertices[held, :1] > 2.0, 0.4, 0.0) * [0.6, 0.0, 0.8]
-    x = problem.finisher()._at_places(problem.start, problem.places + offsets)
-    moved, weights = x - problem.start, mesh.vertex_areas / (0.06 * mesh.diagonal) ** 2
-    assert_allclose(moved[held], offsets, atol=1e-12)
-    force = CellEnergy.of(mesh, PER_CAGE).laplacian @ moved + weights[:, None] * moved
-    assert_allclose(force[~held], 0.0, atol=1e-12)
-    assert np.linalg.norm(moved[~held], axis=1).max() > 0.1
-
-
-def test_the_finish_reports_when_it_has_ended():
-    told = []
-    SAUSAGE.finisher().run(SAUSAGE.start, SAUSAGE.places, lambda *given: told.append(given))
-    assert told[-1] == (1.0, "finished")
-    assert [share for share, _ in told] == sorted(share for share, _ in told)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.sparse import csgraph
 from solids import icosphere, rotation
 
-from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.finish import CellEnergy, Finisher, untangling
-from vtk_segdeform.finish.untangling import around, contour, untangled
+from vtk_segdeform.finish.untangling import contour, untangled
 from vtk_segdeform.geometry import lids_of
 from vtk_segdeform.mesh import Crossings, Mesh
 from vtk_segdeform.solver import Bodies, total_volume
@@ -57,20 +55,6 @@ def test_the_gradient_is_that_of_the_length(monkeypatch):
         assert off[0] == pytest.approx(4.0 * off[1], rel=0.2)
 
 
-def test_the_gradient_counts_segments_that_end_at_a_common_corner():
-    # The second triangle pierces the first, and shares its corner 0 with it.
-    points = np.array([[0.0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0, 1.2]])
-    faces, pairs = np.array([[0, 1, 2], [3, 4, 0]]), np.array([[0, 1]])
-    length, slope = contour(points, faces, pairs)
-    assert length == pytest.approx(1.0)
-    for vertex in range(5):
-        for axis in range(3):
-            way = np.zeros_like(points)
-            way[vertex, axis] = 1e-6
-            ahead, behind = (contour(points + s * way, faces, pairs)[0] for s in (1, -1))
-            assert slope[vertex, axis] == pytest.approx((ahead - behind) / 2e-6, abs=1e-8)
-
-
 def test_parts_are_drawn_apart_and_what_is_held_stays():
     assert len(crossings().pairs(TOUCHING)) > 40
     apart = untangled(REST, TOUCHING, FREE, crossings())
@@ -87,16 +71,6 @@ def test_parts_are_drawn_apart_alike_in_any_place_and_unit():
     mesh = REST.with_vertices(moved(REST.vertices))
     there = untangled(mesh, moved(TOUCHING), FREE, Crossings(mesh.vertices, mesh.faces))
     assert_allclose(there, moved(untangled(REST, TOUCHING, FREE, crossings())), atol=1e-4)
-
-
-def test_a_vertex_of_a_tangle_moves_whatever_its_number():
-    crossing = np.unique(crossings().pairs(TOUCHING))
-    own = around(REST, crossing, 4)
-    middle = int(REST.faces[crossing[0], 0])
-    order = np.r_[np.setdiff1d(np.arange(len(own)), middle), middle]
-    mesh = Mesh(REST.vertices[order], np.argsort(order)[REST.faces])
-    apart = untangling._opened(mesh, TOUCHING[order], FREE[order], own[order])
-    assert (apart[-1] != TOUCHING[middle]).any()
 
 
 def test_a_pose_that_cannot_be_drawn_apart_stays_as_it_is():
@@ -133,15 +107,6 @@ def test_a_finish_draws_apart_what_crossed_before_it_if_it_is_asked_to(avoid_con
     assert (len(crossings().at(found.vertices)) == 0) == avoid_contact
     assert_array_equal(found.vertices[AWAY], TOUCHING[AWAY])
     assert max(abs(each.relative(found.vertices)) for each in constraints) < 1e-13
-
-
-def test_drawing_apart_can_be_cancelled():
-    def stop(fraction, text):
-        assert "separating" in text
-        raise Cancelled("enough")
-
-    with pytest.raises(Cancelled, match="enough"):
-        untangled(REST, TOUCHING, FREE, crossings(), progress=stop)
 
 
 def test_of_two_tangles_the_one_that_can_be_drawn_apart_is():
@@ -181,19 +146,3 @@ def test_the_gradient_is_bounded_where_an_edge_is_almost_in_the_plane():
     length, slope = contour(points, np.array([[0, 1, 2], [3, 4, 5]]), np.array([[0, 1]]))
     assert length > 0.1
     assert 1.0 < np.abs(slope).max() <= 2.0 * untangling._STEEPEST
-
-
-@pytest.mark.parametrize("rings", [0, 1, 3])
-def test_so_many_rings_around_faces_are_what_is_within_so_many_edges(rings):
-    corners = REST.faces[[5, 700]].ravel()
-    away = csgraph.dijkstra(REST.adjacency, unweighted=True, indices=corners, min_only=True)
-    assert_array_equal(around(REST, np.array([5, 700]), rings), away <= rings)
-
-
-def test_lengths_of_segments_with_two_ends_and_with_a_common_corner_add_up():
-    crossing = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1], [2, 1, 1], [1.5, 1, -1.0]])
-    sharing = np.array([[0.0, 0, 0], [2, -1, 0], [2, 1, 0], [1, 0, -1], [1, 0, 1.2]]) + 20.0
-    faces = np.array([[0, 1, 2], [3, 4, 5], [6, 7, 8], [6, 9, 10]])
-    points, pairs = np.concatenate([crossing, sharing]), np.array([[0, 1], [2, 3]])
-    assert contour(points, faces, pairs)[0] == pytest.approx(0.5 + 1.0)
-    assert contour(points, faces, pairs[::-1])[0] == pytest.approx(0.5 + 1.0)

@@ -7,12 +7,12 @@ import pytest
 import pyvista as pv
 from campaign import every
 from numpy.testing import assert_allclose
-from open_meshes import combined, part_of
+from open_meshes import combined
 from organs import mesh_from, nearest_labels, surface_of
 from scipy import ndimage
 from solids import icosphere, rotation
 
-from vtk_segdeform.geometry import chambers, lids_of, signed_volume
+from vtk_segdeform.geometry import lids_of, signed_volume
 from vtk_segdeform.mesh import HalfEdges, Mesh, mesh_of
 
 
@@ -156,27 +156,3 @@ def test_a_cavity_in_a_chamber_and_a_divided_body_in_a_cavity():
     lids = lids_of(mesh)
     assert lids.encloses.all()
     assert_allclose(signed_volume(mesh.vertices, lids.closed(mesh)), 1.001 - hole)
-
-
-def test_a_wall_with_a_hole_divides_nothing():
-    mesh = compartments((0.5,), (0.5,), (0.5,))
-    inner = (np.abs(mesh.vertices[mesh.faces] - 0.5).max(axis=1) < 1e-9).any(axis=1)
-    some = np.flatnonzero(inner)[0]
-    holed = part_of(mesh, np.arange(mesh.n_faces) != some)
-    whole = lids_of(holed, False)
-    found = np.sort([signed_volume(holed.vertices, f) for f in whole.chambers.inside])
-    assert_allclose(found, [0.125] * 6 + [0.25])
-
-
-def test_sides_that_are_left_over_are_joined_to_the_chambers_that_they_close(monkeypatch):
-    rightly = chambers._apart
-
-    def apart(*args: object) -> np.ndarray:
-        part = rightly(*args)
-        part[0] = part.max() + 1
-        return part
-
-    monkeypatch.setattr(chambers, "_apart", apart)
-    mesh = compartments((0.1, 0.3), (), ())
-    require_closed(mesh)
-    assert_allclose(volumes_of(mesh), [0.1, 0.2, 0.7])

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from open_meshes import sheet, together
 
-from vtk_segdeform import models, sizes
+from vtk_segdeform import models
 from vtk_segdeform.geometry import decimated, signed_volume
 from vtk_segdeform.mesh import connected
-from vtk_segdeform.regions import segment
 
 N = 1500
 
@@ -51,12 +50,3 @@ def test_the_shape_is_the_same_in_any_place_and_size():
     assert decimated(cactus(), 600)[0] is coarse  # known
     moved = cactus().with_vertices(1e-7 * cactus().vertices[:, [1, 2, 0]] + 3.0)
     assert np.mean(np.isin(decimated(moved, 600)[1], kept)) > 0.9
-
-
-def test_regions_of_a_large_mesh_are_those_of_a_decimated_one(monkeypatch):
-    plain = segment(cactus())
-    monkeypatch.setattr(sizes, "DECIMATED", 1310)
-    monkeypatch.setattr(sizes, "DECIMATED_POINTS", 1200)
-    regions = segment(cactus())
-    assert regions.n_regions == plain.n_regions == 3
-    assert np.mean(regions.labels == plain.labels) > 0.9

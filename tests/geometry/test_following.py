@@ -54,7 +54,7 @@ def test_what_is_inside_follows_wherever_it_is():
     assert_array_equal(carriers(joined(wide, ball(0.5, [0.0, 0.0, 2.9]))), [0, 1])
 
 
-@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_followers_do_not_depend_on_the_frame(scale):
     mesh = joined(BAR, tube(0.6, 0.7, 1.0, 3.0), beside(0.1), ball(0.1, [0.0, -0.62, 3.5]))
     turn = rotation([1.0, 2.0, -0.5], 0.8)

@@ -1,15 +1,12 @@
 from __future__ import annotations
 
-import threading
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from solids import icosphere, rotation, somewhere
 
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts, farthest_points
-from vtk_segdeform.kernels import threads
+from vtk_segdeform.geometry.kmeans import cluster_positions, cluster_within_parts
 
 
 def test_there_are_about_as_many_clusters_as_asked_for_and_none_is_empty():
@@ -37,31 +34,6 @@ def test_no_cluster_spans_two_parts():
     clusters = cluster_within_parts(positions, some[parts], 30, shares=shares)
     numbers = [len(np.unique(clusters[parts == part])) for part in range(4)]
     assert numbers == [10, 2, 1, 18]
-
-
-def test_with_as_many_clusters_as_points_each_point_has_its_own():
-    positions = somewhere(20)
-    assert len(np.unique(cluster_positions(positions, 20))) == 20
-
-
-def test_small_sets_of_points_are_clustered_without_starting_threads(monkeypatch):
-    started = []
-    monkeypatch.setattr(threading.Thread, "start", started.append)
-    monkeypatch.setattr(threads, "n_threads", lambda: 2)
-    parts = np.repeat(np.arange(200), 40)
-    clusters = cluster_within_parts(np.random.default_rng(0).random((8000, 3)), parts, 300)
-    assert len(np.unique(clusters)) >= 200
-    assert not started
-
-
-def test_each_of_the_farthest_points_is_the_farthest_from_all_before_it():
-    points = somewhere(200, seed=4) + 7.0
-    chosen = farthest_points(points, 12)
-    apart = np.linalg.norm(points[:, None] - points[chosen], axis=2)
-    first = np.linalg.norm(points - points.mean(axis=0), axis=1)
-    assert chosen[0] == first.argmax()
-    for k in range(1, 12):
-        assert chosen[k] == apart[:, :k].min(axis=1).argmax()
 
 
 def test_centres_are_the_means_of_their_points_after_enough_rounds():

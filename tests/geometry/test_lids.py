@@ -14,7 +14,6 @@ from open_meshes import (
     cut,
     moebius_strip,
     open_box,
-    part_of,
     pipe,
     revolved,
     sheet,
@@ -222,23 +221,6 @@ def test_nothing_encloses_a_volume_of_zero():
 def test_a_one_sided_surface_encloses_nothing(option):
     strip = moebius_strip()
     assert not lids_of(strip, option).has_volume
-
-
-def test_several_loops_may_touch_at_a_vertex():
-    mesh = models.sphere(642)
-    rings = [np.flatnonzero((mesh.faces == v).any(axis=1)) for v in (100, *_two_away(mesh, 100))]
-    touching = part_of(mesh, ~np.isin(np.arange(mesh.n_faces), np.concatenate(rings[:2])))
-    assert len(touching.borders) == 2
-    assert set(touching.borders[0]) & set(touching.borders[1])
-    lids = lids_of(touching)
-    volume = signed_volume(lids.extension @ touching.vertices, lids.closed(touching))
-    assert 0.98 < volume / signed_volume(mesh.vertices, mesh.faces) < 1.0
-
-
-def _two_away(mesh: Mesh, vertex: int) -> list[int]:
-    """Return a vertex that shares exactly one neighbour with *vertex*."""
-    near = [set(mesh.faces[(mesh.faces == v).any(axis=1)].ravel()) - {v} for v in range(200)]
-    return [v for v in range(200) if v not in near[vertex] and len(near[v] & near[vertex]) == 1]
 
 
 SPIKE = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 4]])

@@ -135,8 +135,3 @@ def test_those_of_some_vertices_are_theirs_among_all(has_one_side, count):
     normals = VertexNormals(mesh)
     x = mesh.vertices * [1.0, 0.7, 1.2]
     assert_allclose(normals.subset(some)(x), normals.of(x)[some], atol=1e-6)
-
-
-def test_only_surfaces_with_one_side_have_turned_corners():
-    for mesh in (MESHES["torus"](), cut_ball(), finned_ball()):
-        assert not len(VertexNormals(mesh).turned)

@@ -41,14 +41,6 @@ def test_samples_and_cells_do_not_depend_on_the_frame():
     assert_array_equal(one[1], other[1])
 
 
-def test_with_as_many_samples_as_vertices_each_is_its_own_cell():
-    mesh = Mesh(*icosphere(2))
-    for n in (mesh.n_vertices, 10**6):
-        kept, cell = voronoi_cells(mesh, n, np.random.default_rng(0))
-        assert_array_equal(kept, np.arange(mesh.n_vertices))
-        assert_array_equal(cell, kept)
-
-
 def test_progress_of_sampling_increases_up_to_four_fifths():
     seen = []
     rng = np.random.default_rng(0)

@@ -99,19 +99,6 @@ def test_the_step_reaches_the_target_volume(mesh, seed):
     assert signed_volume(vertices + t * d, faces) == pytest.approx(target, rel=1e-14 * 4)
 
 
-def test_the_smallest_of_several_steps_is_returned():
-    # (t - 1)(t - 2)(t + 5) = t^3 + 2 t^2 - 13 t + 10
-    assert step_to_volume(np.array([10.0, -13.0, 2.0, 1.0]), 0.0) == pytest.approx(1.0, rel=1e-15)
-    # (t + 0.1)(t - 1)(t - 3) = t^3 - 3.9 t^2 + 2.6 t + 0.3
-    assert step_to_volume(np.array([0.3, 2.6, -3.9, 1.0]), 0.0) == pytest.approx(-0.1, rel=1e-14)
-
-
-def test_linear_and_quadratic_cases_are_solved():
-    assert step_to_volume(np.array([1.0, 2.0, 0.0, 0.0]), 4.0) == pytest.approx(1.5, rel=1e-15)
-    assert step_to_volume(np.array([0.0, 0.0, 2.0, 0.0]), 8.0) in (-2.0, 2.0)
-    assert step_to_volume(np.array([0.0, 0.0, 0.0, 1.0]), 8.0) == pytest.approx(2.0, rel=1e-15)
-
-
 def test_the_step_is_zero_if_the_target_is_met():
     assert step_to_volume(np.array([3.0, 1.0, 1.0, 1.0]), 3.0) == 0.0
     assert step_to_volume(np.array([3.0, 0.0, 0.0, 1.0]), 3.0) == pytest.approx(0.0, abs=1e-15)

@@ -24,7 +24,6 @@ from vtk_segdeform.files import landlock
 from vtk_segdeform.io import confined, meshlab, reading_child
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
-from vtk_segdeform.io.vtk_formats import _first_message
 
 NAMES = ["<&\">'", "a\nb", "100%", "%3C", "Größe", "身体", "a b"]
 
@@ -61,20 +60,6 @@ def test_the_whole_file_is_read_with_or_without_the_child_process(
         assert_array_equal(again.cell_data[name], surface.cell_data[name])
     assert list(again.field_data["maker"]) == ["somebody", "<else>"]
     assert again.point_data.active_texture_coordinates_name == "uv"
-
-
-@pytest.mark.parametrize("suffix", [".vtp", ".vtk", ".vtkhdf"])
-def test_names_of_components_do_not_make_a_file_unreadable(tmp_path, suffix):
-    surface = to_polydata(Mesh(*CUBE))
-    surface.point_data["way"] = np.arange(16.0).reshape(8, 2)
-    for k, name in enumerate(["<{", "Süd 1%"]):
-        surface.GetPointData().GetArray("way").SetComponentName(k, name)
-    write_mesh(tmp_path / f"a{suffix}", surface)
-    assert surface.GetPointData().GetArray("way").GetComponentName(0) == "<{"
-    again = read_polydata(tmp_path / f"a{suffix}").GetPointData().GetArray("way")
-    if suffix != ".vtkhdf":  # which stores none
-        expected = {".vtp": "_{", ".vtk": "<_"}[suffix]
-        assert [again.GetComponentName(k) for k in (0, 1)] == [expected, "Süd 1%"]
 
 
 def test_pieces_of_a_file_are_one_surface(tmp_path):
@@ -163,8 +148,13 @@ def hdf(path, **other):
             group.create_virtual_dataset("Points", layout)
 
 
-@pytest.mark.parametrize("checked", [pytest.param(True), pytest.param(False, marks=LANDLOCK)])
-@pytest.mark.parametrize("how", ["storage", "link", "virtual"])
+@pytest.mark.parametrize(
+    ("how", "checked"),
+    [
+        *((how, True) for how in ("storage", "link", "virtual")),
+        *(pytest.param(how, False, marks=LANDLOCK) for how in ("storage", "virtual")),
+    ],
+)
 def test_data_of_other_files_are_not_read_by_hdf5(tmp_path, monkeypatch, fresh, how, checked):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "secret", "w") as file:
@@ -361,23 +351,6 @@ def test_an_interrupt_ends_the_process_and_the_next_file_is_read(tmp_path, monke
     assert read_mesh(tmp_path / "a.vtp").n_vertices == 8
 
 
-@MESHLAB
-def test_error_messages_of_pymeshlab_are_passed_on(tmp_path):
-    (tmp_path / "a.x3d").write_text("<X3D><unfinished")
-    with pytest.raises(MeshError, match=r"a\.x3d: PyMeshLab cannot read it: Unable to open"):
-        read_mesh(tmp_path / "a.x3d")
-
-
-def test_no_temporary_files_are_left_behind(tmp_path, monkeypatch, fresh):
-    write_mesh(tmp_path / "a.vtkhdf", Mesh(*CUBE))
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    read_mesh(tmp_path / "a.vtkhdf")
-    (tmp_path / "a.vtkhdf").write_bytes((tmp_path / "a.vtkhdf").read_bytes()[:-200])
-    with pytest.raises(MeshError):
-        read_mesh(tmp_path / "a.vtkhdf")
-    assert [path.name for path in tmp_path.iterdir()] == ["a.vtkhdf"]
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="a process that can be stopped")
 def test_a_reader_that_another_program_ends_is_not_blamed_on_the_file(tmp_path, fresh):
     write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))
@@ -397,11 +370,6 @@ def test_memory_in_use_is_known_without_proc(monkeypatch):
     assert 1 << 20 < reading_child._memory_in_use() < 1 << 40
 
 
-def test_the_first_message_of_vtk_is_not_the_place_of_a_warning():
-    text = "Warning: In vtkDataReader.cxx, line 3034\nvtkDataReader (0x1): Error reading METADATA\n"
-    assert _first_message(MeshError(text)) == "Error reading METADATA"
-
-
 @MESHLAB
 @pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes")
 def test_pymeshlab_cannot_open_names_that_are_not_utf_8(tmp_path):
@@ -409,10 +377,3 @@ def test_pymeshlab_cannot_open_names_that_are_not_utf_8(tmp_path):
     path.write_text(X3D.format(SHAPE))
     with pytest.raises(MeshError, match="its name is not valid UTF-8"):
         read_mesh(path)
-
-
-@MESHLAB
-def test_rounding_is_told_of_formats_that_renumber_vertices(tmp_path, caplog):
-    vertices, faces = icosphere(1)
-    write_mesh(tmp_path / "a.x3d", Mesh(vertices + (448262.0, 5411932.0, 132.0), faces))
-    assert ".x3d rounds coordinates: vertices moved by up to" in caplog.text

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from real_meshes import path_of, read_off
 from solids import icosphere
 
 from vtk_segdeform.errors import MeshError
@@ -32,49 +31,6 @@ def shuffled(seed: int = 1) -> Mesh:
     moved = np.empty_like(vertices)
     moved[number] = vertices + [1e5 / 3, -1e-9, 7.0]
     return Mesh(moved, rng.permutation(number[faces]))
-
-
-@pytest.mark.parametrize("suffix", EXACT)
-def test_meshes_are_read_as_written_to_the_last_digit_in_the_same_order(tmp_path, suffix):
-    mesh = shuffled()
-    write_mesh(tmp_path / f"a{suffix}", mesh)
-    again = read_mesh(tmp_path / f"a{suffix}")
-    assert_array_equal(again.vertices, mesh.vertices)
-    assert_array_equal(again.faces, mesh.faces)
-
-
-SEAMED = """mtllib paint.mtl
-v 0.1 0 0 1 0 0.2
-v 1 0 0 1 1 1
-v 0 1 0 0 0 0
-v 0 0 1 0.2 0.4 0.6
-vt 0 0
-vt 1 0
-vt 0 1
-vt 0.5 0.5
-usemtl red
-f 1/1 3/2 2/3
-f 1/4/1 2/2 4/3
-g back
-usemtl blue
-f -4/1 4/2 -2/3
-f 2/4 3/3 4/1
-"""
-
-
-def test_texture_seams_and_materials_of_an_obj_do_not_open_the_mesh(tmp_path):
-    (tmp_path / "a.obj").write_text(SEAMED)
-    surface = read_polydata(tmp_path / "a.obj")
-    assert from_polydata(surface).n_vertices == 4  # VTK's reader creates 12
-    write_mesh(tmp_path / "b.obj", with_vertices(surface, surface.points + 0.1))
-    again = read_polydata(tmp_path / "b.obj")
-    assert_array_equal(again.points, surface.points + 0.1)
-    for name in ("TextureCorners", "Material", "Group"):
-        assert_array_equal(again.cell_data[name], surface.cell_data[name])
-    assert again.cell_data["TextureCorners"][1].tolist() == [0.5, 0.5, 1, 0, 0, 1]
-    assert list(again.field_data["MaterialNames"]) == ["red", "blue"]
-    assert list(again.field_data["MaterialLibrary"]) == ["paint.mtl"]
-    assert again.point_data["RGB"].tolist()[3] == [51, 102, 153]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -165,19 +121,6 @@ def test_errors_say_what_is_wrong_with_the_file(tmp_path):
         write_mesh(tmp_path / "a.jpg", shuffled())
     with pytest.raises(MeshError, match="no folder"):
         write_mesh(tmp_path / "no" / "a.obj", shuffled())
-
-
-def test_real_files_are_read_as_by_an_independent_reader():
-    vertices, faces = read_off("botsch-sorkine/cactus.off")
-    mesh = read_mesh(path_of("botsch-sorkine/cactus.off"))
-    assert_array_equal(mesh.vertices, vertices)
-    assert_array_equal(mesh.faces, faces)
-    koala = read_mesh(path_of("koala.obj"))
-    theirs = pv.read(path_of("koala.obj"))
-    assert koala.n_vertices == 49_999
-    assert_array_equal(koala.faces, theirs.regular_faces)
-    assert_array_equal(koala.vertices.astype(np.float32), theirs.points.astype(np.float32))
-    assert read_polydata(path_of("dino.off")).point_data["RGBA"][0].tolist() == [192, 192, 192, 255]
 
 
 @pytest.mark.parametrize("suffix", [*EXACT, ".stl", ".vtu", ".glb", ".gltf"])

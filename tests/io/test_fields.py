@@ -148,11 +148,3 @@ def test_what_is_no_array_of_vectors_is_named(name, how):
     surface = Surface(block("triangles"))
     with pytest.raises(ArgumentError, match=f"no array '{name}' of vectors or tensors"):
         surface.moved(surface.mesh.vertices, **{how: [name]})
-
-
-def test_without_options_arrays_stay():
-    given = block("triangles")
-    moved = Surface(given).moved(Surface(given).mesh.vertices @ TURN.T)
-    for name in ARRAYS:
-        assert_array_equal(moved[name], given[name])
-        assert_array_equal(moved.cell_data[name], given.cell_data[name])

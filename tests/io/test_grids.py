@@ -74,23 +74,6 @@ def test_a_grid_is_written_as_it_was_read(tmp_path, suffix, cells, texts):
     assert contents(found) == contents(expected)
 
 
-def test_the_cells_of_a_grid_are_those_of_the_mesh(tmp_path):
-    grid().save(tmp_path / "a.vtu")
-    mesh = Surface.read(tmp_path / "a.vtu").mesh
-    assert mesh.is_closed
-    assert mesh.n_vertices == 12
-
-
-def test_other_formats_know_nothing_of_the_grid(tmp_path, caplog):
-    grid().save(tmp_path / "a.vtu")
-    surface = read_polydata(tmp_path / "a.vtu")
-    for suffix in (".vtp", ".obj", ".vtkhdf"):
-        write_mesh(tmp_path / f"b{suffix}", surface)
-        assert "grid" not in caplog.text
-        assert list(read_polydata(tmp_path / f"b{suffix}").field_data) in (["times"], [])
-    assert len(surface.field_data) == 2
-
-
 def test_the_types_of_other_cells_are_not_used(tmp_path):
     grid().save(tmp_path / "a.vtu")
     surface = read_polydata(tmp_path / "a.vtu")

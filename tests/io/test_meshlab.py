@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import numpy as np
@@ -16,7 +15,6 @@ from solids import icosphere, torus
 from vtk_segdeform.errors import MeshError, MissingDependencyError
 from vtk_segdeform.geometry import local_volume_change
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.interpreter import python_command, python_environment
 from vtk_segdeform.io import Surface, meshlab
 from vtk_segdeform.io.array_names import set_names
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
@@ -52,18 +50,6 @@ def test_without_pymeshlab_every_error_says_what_to_install(tmp_path):
         with pytest.raises(MissingDependencyError, match="pip install"):
             call()
     assert [path.name for path in tmp_path.iterdir()] == ["a.dae"]
-
-
-@pytest.mark.usefixtures("with_pymeshlab")
-def test_conversion_both_ways_changes_nothing():
-    mesh = Mesh(*torus())
-    surface = meshlab.from_meshset(meshlab.to_meshset(mesh))
-    assert not surface.point_data
-    assert not surface.cell_data
-    again = from_polydata(surface)
-    assert_array_equal(again.vertices, mesh.vertices)
-    assert_array_equal(again.faces, mesh.faces)
-    assert again.vertices.flags.c_contiguous
 
 
 def painted() -> pv.PolyData:
@@ -135,25 +121,6 @@ def test_other_arrays_become_custom_attributes_and_are_read_by_name():
     assert not meshlab.from_meshset(meshset).point_data
     with pytest.raises(MeshError, match="no attribute 'cold'"):
         meshlab.from_meshset(meshset, ["cold"])
-
-
-@pytest.mark.usefixtures("with_pymeshlab")
-def test_selected_vertices_can_be_fixed_a_handle_or_a_region():
-    scene = sausage(2)
-    meshset = meshlab.to_meshset(scene.mesh)
-    assert len(meshlab.selected_vertices(meshset)) == 0
-    meshset.compute_selection_by_condition_per_vertex(condselect="(x < -2.4)")
-    session = Session(scene.mesh)
-    session.set_fixed(meshlab.selected_vertices(meshset))
-    assert_array_equal(session.fixed, scene.fixed)
-    meshset.set_selection_none()
-    meshset.compute_selection_by_condition_per_face(condselect="((x0>2.4)&&(x1>2.4)&&(x2>2.4))")
-    of_faces = meshlab.selected_vertices(meshset)
-    whole = scene.mesh.faces[np.isin(scene.mesh.faces, scene.handle).all(axis=1)]
-    assert_array_equal(of_faces, np.unique(whole))
-    session.handles.add(of_faces, "tip")
-    session.painting.paint(1, of_faces)
-    assert session.regions.membership[1, of_faces].all()
 
 
 @pytest.mark.usefixtures("with_pymeshlab")
@@ -265,16 +232,3 @@ def test_an_unreadable_file_is_an_error_that_names_it(tmp_path):
     (tmp_path / "a.dae").write_text("rubbish")
     with pytest.raises(MeshError, match=r"a\.dae"):
         read_mesh(tmp_path / "a.dae")
-
-
-def test_python_ends_well_after_a_file_was_written_by_pymeshlab(tmp_path):
-    """Where PyMeshLab was imported in another thread, its Qt frees memory twice at the end."""
-    write_mesh(tmp_path / "ball.ply", Mesh(*icosphere(1)))
-    arguments = ["deform", "ball.ply", "-o", "bent.x3d", "--fixed", "z<-0.5", "--handle", "z>0.9",
-                 "--translate", "0.1,0,0", "--regions", "1", "--cage-vertices", "12"]  # fmt: skip
-    code = f"import sys; from vtk_segdeform.cli import main; sys.exit(main({arguments}))"
-    done = subprocess.run(
-        python_command(code), cwd=tmp_path, env=python_environment(), capture_output=True,
-        text=True, check=False,
-    )  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")

@@ -39,16 +39,6 @@ def project(folder, *layers: str, matrix: str = ""):
     return path
 
 
-@pytest.mark.usefixtures("without_pymeshlab")
-def test_layers_are_preserved_exactly_without_pymeshlab(tmp_path):
-    layers = {"torus": painted(), '<b> & "c"': to_polydata(BALL)}
-    write_project(tmp_path / "work.mlp", layers)
-    again = read_project(tmp_path / "work.mlp")
-    assert list(again) == list(layers)
-    assert all(same(again[name], layers[name]) for name in layers)
-    assert "selection" in layers["torus"].point_data  # the given surfaces are unchanged
-
-
 @pytest.mark.usefixtures("with_pymeshlab")
 def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
     import pymeshlab

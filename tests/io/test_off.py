@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from solids import OCTAHEDRON, TETRAHEDRON
 
 from vtk_segdeform.errors import MeshError
@@ -15,6 +15,8 @@ from vtk_segdeform.io.polygons import polydata_of
 
 VERTICES, FACES = TETRAHEDRON[0] / 3, TETRAHEDRON[1]
 BYTES = np.array([[0, 7, 255, 9], [2, 128, 0, 255], [254, 1, 0, 0], [40, 50, 60, 70]])
+
+
 LOW = np.array([[0, 1, 1, 1], [1, 0, 0, 1], [0, 0, 0, 0], [1, 1, 1, 0]])  # bytes as well
 
 
@@ -76,16 +78,6 @@ def test_colours_that_are_written_are_read_back(tmp_path, table, of_faces):
     assert_array_equal((again.cell_data if of_faces else again.point_data)[name], table)
 
 
-def test_colours_of_0_and_1_are_fractions_and_one_over_1_is_clipped(tmp_path):
-    columns = [["1", "0", "0"], ["0", "1", "0"], ["0", "0", "0"], ["1.0000001", "1", "nan"]]
-    surface = read_polydata(save(tmp_path / "a.off", header="COFF", columns=columns))
-    expected = [[255, 0, 0], [0, 255, 0], [0, 0, 0], [255, 255, 0]]
-    assert surface.point_data["RGB"].tolist() == expected
-    columns[0][1] = "2"  # which is no fraction
-    surface = read_polydata(save(tmp_path / "a.off", header="COFF", columns=columns))
-    assert surface.point_data["RGB"].tolist() == [[1, 2, 0], [0, 1, 0], [0, 0, 0], [1, 1, 0]]
-
-
 NORMAL, COLOUR, TEXTURE = ["0.6", "0.8", "0.0"], ["255", "7", "9", "200"], ["0.25", "0.5"]
 
 
@@ -119,22 +111,6 @@ def test_numbers_after_positions_are_those_of_the_header(tmp_path, letters, colu
         assert data["RGBA"][2].tolist() == [255, 7, 9, 200]
     if "ST" in letters:
         assert surface.active_texture_coordinates[2].tolist() == [0.25, 0.5]
-
-
-@pytest.mark.parametrize("n", [3, 4])
-def test_meshlab_and_this_package_read_the_same_columns(tmp_path, n):
-    pymeshlab = pytest.importorskip("pymeshlab")
-    meshes = pymeshlab.MeshSet(verbose=False)
-    colours = np.hstack([BYTES[:, :3] / 255.0, np.ones((4, 1))])
-    texture = {"v_tex_coords_matrix": np.full((4, 2), 0.25)} if n == 4 else {}
-    meshes.add_mesh(pymeshlab.Mesh(VERTICES, FACES, v_color_matrix=colours, **texture))
-    meshes.save_current_mesh(str(tmp_path / "a.off"), save_vertex_normal=True)
-    surface = read_polydata(tmp_path / "a.off")
-    assert (tmp_path / "a.off").read_text().startswith("NC")
-    assert_allclose(surface.points, VERTICES, atol=1e-5)
-    assert_array_equal(surface.point_data["RGBA"][:, :3], BYTES[:, :3])
-    normals = meshes.current_mesh().vertex_normal_matrix()
-    assert_allclose(surface.point_data["Normals"], normals, atol=1e-5)
 
 
 def binary():

@@ -87,14 +87,6 @@ def test_what_holds_a_surface_is_taken_everywhere(tmp_path, name):
         sd.Mesh(given)
 
 
-def test_a_grid_keeps_its_arrays_and_types():
-    grid = ball().cast_to_unstructured_grid()
-    grid.point_data["heat"] = np.arange(18.0)
-    surface = sd.Surface(grid)
-    assert_array_equal(surface.given.point_data["heat"], grid.point_data["heat"])
-    assert_array_equal(surface.mesh.faces, icosphere(1)[1])
-
-
 def test_names_of_blocks_are_groups_and_lost_arrays_are_told(tmp_path, caplog):
     given = blocks()
     surface = sd.Surface(given)

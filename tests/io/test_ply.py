@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere
+from solids import CUBE, TETRAHEDRON, icosphere
 from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh, sizes
-from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
@@ -32,29 +31,6 @@ def text(vertices, rows, rest):
     lines = [" ".join(map(repr, row)) for row in vertices.tolist()] + rows
     head = HEADER.format(kind="ascii", n=len(vertices), rest=rest)
     return head + "\n".join(lines) + "\n"
-
-
-def test_arrays_called_x_y_and_z_do_not_become_the_coordinates(tmp_path):
-    surface = to_polydata(Mesh(*icosphere(1)))
-    for name in "xyz":
-        surface.point_data[name] = np.full(surface.n_points, 7.0)
-    warnings = Warnings(tmp_path / "a.ply", surface)
-    again = read_polydata(tmp_path / "a.ply")
-    assert_array_equal(again.points, surface.points)
-    assert again.point_data["x_1"].tolist() == [7.0] * again.n_points
-    assert "point array 'x' is written as 'x_1'" in warnings.texts
-
-
-def test_the_command_line_reports_renamed_arrays(tmp_path, capsys):
-    surface = to_polydata(Mesh(*icosphere(1)))
-    surface.point_data["x"] = np.zeros(surface.n_points)
-    surface.point_data["way"] = np.zeros((surface.n_points, 3))
-    write_mesh(tmp_path / "a.vtp", surface)
-    options = ["--regions", "1"]
-    assert main(["regions", str(tmp_path / "a.vtp"), "-o", str(tmp_path / "b.ply"), *options]) == 0
-    said = capsys.readouterr().err
-    assert "segdeform regions: point array 'x' is written as 'x_1'" in said
-    assert "segdeform regions: PLY cannot store point array 'way': left out" in said
 
 
 def test_a_face_of_300_corners_is_preserved(tmp_path):
@@ -143,18 +119,6 @@ def test_degenerate_triangles_that_join_strips_are_left_out(tmp_path):
     assert read_polydata(tmp_path / "a.ply").regular_faces.tolist() == [[0, 1, 2], [1, 3, 0]]
 
 
-def test_keywords_of_the_header_are_valid_names(tmp_path):
-    vertices, faces = TETRAHEDRON
-    rest = "comment end_header \nobj_info x\n" + FACES.format(m=4) + "property int end_header\n"
-    rows = [f"3 {a} {b} {c} {k}" for k, (a, b, c) in enumerate(faces)]
-    for newline in ("\n", "\r\n", "\r"):
-        data = text(vertices, rows, rest).replace("\n", newline).encode()
-        (tmp_path / "a.ply").write_bytes(data)
-        again = read_polydata(tmp_path / "a.ply")
-        assert_array_equal(again.regular_faces, faces)
-        assert again.cell_data["end_header"].tolist() == [0, 1, 2, 3]
-
-
 @pytest.mark.parametrize(
     ("rest", "rows", "message"),
     [
@@ -220,13 +184,6 @@ def test_a_truncated_file_says_so_wherever_it_ends(tmp_path, kind):
             read_polydata(tmp_path / "a.ply")
     (tmp_path / "a.ply").write_bytes(whole)
     assert read_mesh(tmp_path / "a.ply").n_faces == 4
-
-
-def test_the_first_line_may_be_in_capitals(tmp_path):
-    path = tmp_path / "a.ply"
-    write_mesh(path, Mesh(*OCTAHEDRON))
-    path.write_bytes(b"PLY" + path.read_bytes()[3:])
-    assert read_polydata(path).n_cells == 8
 
 
 def test_a_word_among_numbers_is_shown(tmp_path):

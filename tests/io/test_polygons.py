@@ -11,7 +11,6 @@ from solids import rotation
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.polygons import (
-    _failed,
     cells_of,
     corner_values,
     cut_into_triangles,
@@ -126,20 +125,6 @@ def test_repeated_and_collinear_corners(polygon, n):
     assert (owner[:2] == 0).all()
 
 
-def test_strips_become_triangles_and_other_cells_none():
-    points = flat((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1), (9, 9))
-    polydata = pv.PolyData()
-    polydata.points = points
-    polydata.strips = np.array([6, 0, 1, 2, 3, 4, 5, 3, 0, 1, 6])
-    polydata.lines = np.array([2, 0, 6])
-    polydata.verts = np.array([1, 6])
-    triangles = triangles_of(polydata)
-    assert len(triangles) == 5
-    assert_allclose(area_vectors(points, triangles[:4])[:, 2], -0.5)  # all alike
-    polydata.faces = np.array([4, 0, 2, 3, 1])
-    assert len(triangles_of(polydata)) == 7
-
-
 def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
     polydata = pv.PolyData()
     polydata.points = flat((0, 0), (1, 0), (0, 1))
@@ -148,30 +133,6 @@ def test_polygons_of_two_corners_are_ignored_and_bad_indices_are_not():
     polydata.faces = np.array([3, 0, 1, 3])
     with pytest.raises(MeshError, match="faces use vertices 0 to 3, but there are 3"):
         triangles_of(polydata)
-
-
-def test_no_polygons_have_no_triangles():
-    assert triangles_of(pv.PolyData()).shape == (0, 3)
-    assert len(triangles_of(polydata_of(np.eye(3), np.array([3]), np.array([0, 1, 2])))) == 1
-
-
-def test_polygons_that_were_cut_wrongly_are_found():
-    dart = flat((0, 0), (2, 0), (0.5, 0.5), (0, 2))
-    bent = dart + np.outer([0, 0, 1, 0], [0.0, 0.0, 0.5])
-    inside, outside = [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]  # the second one is turned
-
-    def failed(points, *cuts):
-        counts = np.full(len(cuts), 4)
-        corners = np.tile(np.arange(4), len(cuts))
-        polygon = np.repeat(np.arange(len(cuts)), [len(each) for each in cuts])
-        return _failed(points, counts, corners, np.concatenate(cuts), polygon).tolist()
-
-    assert failed(dart, inside, outside, inside, inside[:1]) == [1, 3]
-    assert failed(dart @ TURN, outside, inside) == [0]
-    assert failed(bent, outside, inside) == []  # not planar: no side is the upper one
-    repeated = np.array([0, 1, 1, 3])  # has one triangle only
-    args = np.array([4]), repeated, np.array([[0, 1, 3]]), np.array([0])
-    assert _failed(dart, *args).tolist() == []
 
 
 @pytest.mark.parametrize("size", [4, 5, 7])

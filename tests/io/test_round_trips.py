@@ -236,14 +236,6 @@ def test_a_face_of_one_or_two_corners_is_kept_and_the_others_can_be_bent(
     assert_allclose(again.given.point_data["Normals"], given.point_data["Normals"], atol=1e-6)
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".glb"])
-def test_formats_of_triangles_leave_out_faces_of_two_corners(tmp_path, suffix):
-    counts, corners = polygons_of(prism(3))
-    given = polydata_of(prism(3).points, np.append(2, counts), np.append([0, 4], corners))
-    write_mesh(tmp_path / f"a{suffix}", given)
-    assert Surface.read(tmp_path / f"a{suffix}").mesh.n_faces == 8
-
-
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".stl"])
 @settings(EASY, max_examples=8)
 @given(surface=surfaces())

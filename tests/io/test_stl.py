@@ -90,14 +90,6 @@ def test_text_in_utf_16_says_so(tmp_path):
         read_polydata(path)
 
 
-def test_truncated_text_is_an_error(tmp_path):
-    path, data = octahedron(tmp_path, binary=False)
-    for text in (data[: len(data) // 2], data.replace(b"vertex", b"corner", 1), data[:-12]):
-        path.write_bytes(text)
-        with pytest.raises(MeshError, match=r"a\.stl: is truncated"):
-            read_polydata(path)
-
-
 def test_a_vertex_that_is_not_numbers_is_named(tmp_path):
     path, data = octahedron(tmp_path, binary=False)
     path.write_bytes(re.sub(rb"vertex (\S+) (\S+)", rb"vertex \1 x\2", data, count=1))
@@ -232,37 +224,12 @@ def test_text_has_all_digits_and_the_order_of_the_triangles(tmp_path):
     assert names_of(again) == [written[name] for name in names_of(surface)]
 
 
-def test_objects_become_solids_and_arrays_of_binary_files_are_told(tmp_path, caplog):
-    surface = patches()
-    surface.cell_data["Object"] = np.array(surface.cell_data["Group"])
-    set_names(surface, "ObjectNames", ["above", "below"])
-    surface.cell_data["Attribute"] = np.arange(8, dtype=np.uint16)
-    write_mesh(tmp_path / "a.stl", surface)
-    assert "a text STL cannot store cell array 'Object', cell array 'Attribute'" in caplog.text
-    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"inlet", "outer_wall"}
-    del surface.cell_data["Group"]
-    write_mesh(tmp_path / "a.stl", surface)
-    assert set(names_of(read_polydata(tmp_path / "a.stl"))) == {"above", "below"}
-
-
 @pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
 def test_names_that_are_not_ascii_are_read(tmp_path, encoding):
     save_solids(tmp_path / "a.stl", patches())
     text = (tmp_path / "a.stl").read_text(encoding="utf-8").replace("outer wall", "Außenwand")
     (tmp_path / "a.stl").write_text(text, encoding=encoding)
     assert get_names(read_polydata(tmp_path / "a.stl"), "GroupNames") == ["inlet", "Außenwand"]
-
-
-def test_solids_without_names_are_numbered_and_those_of_one_name_are_one_group(tmp_path):
-    save_solids(tmp_path / "a.stl", patches())
-    text = (tmp_path / "a.stl").read_text(encoding="utf-8")
-    (tmp_path / "a.stl").write_text(text.replace(" inlet", "").replace(" outer wall", ""))
-    surface = read_polydata(tmp_path / "a.stl")
-    assert names_of(surface) == 4 * ["solid 1"] + 4 * ["solid 2"]
-    (tmp_path / "a.stl").write_text(text.replace("outer wall", "inlet"))
-    assert names_of(read_polydata(tmp_path / "a.stl")) == 8 * ["inlet"]
-    (tmp_path / "a.stl").write_text("solid nothing\nendsolid\n" + text)
-    assert get_names(read_polydata(tmp_path / "a.stl"), "GroupNames") == ["inlet", "outer wall"]
 
 
 def test_a_solid_that_is_cut_off_is_an_error_or_told(tmp_path, caplog):

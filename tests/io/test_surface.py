@@ -7,7 +7,7 @@ import organs
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import icosphere, rotation, torus
+from solids import rotation, torus
 
 import vtk_segdeform as sd
 from vtk_segdeform.errors import ArgumentError, ConstraintError, MeshError
@@ -21,21 +21,8 @@ def surface_of(points, *polygons):
     return polydata_of(np.asarray(points, float), counts, np.concatenate(polygons))
 
 
-def triangles(vertices, faces):
-    return pv.PolyData.from_regular_faces(vertices, faces)
-
-
 def texts(surface):
     return [str(each) for each in surface.workarounds]
-
-
-def test_a_triangle_mesh_is_its_own_mesh():
-    vertices, faces = icosphere(2)
-    surface = sd.Surface(triangles(vertices, faces))
-    assert_array_equal(surface.mesh.vertices, vertices)
-    assert_array_equal(surface.mesh.faces, faces)
-    assert_array_equal(surface.vertex_of, np.arange(len(vertices)))
-    assert surface.workarounds == ()
 
 
 def test_a_cube_with_seams_is_welded_and_each_workaround_says_where():
@@ -49,21 +36,6 @@ def test_a_cube_with_seams_is_welded_and_each_workaround_says_where():
     assert_array_equal(welded.points, np.arange(24))
     assert_array_equal(surface.mesh.vertices[surface.vertex_of], surface.given.points)
     assert len(surface.vertices_at(np.arange(4))) == 4
-
-
-def test_concave_polygons_become_a_closed_mesh_of_the_right_volume():
-    angle = np.arange(10) * np.pi / 5
-    r = np.where(np.arange(10) % 2, 0.35, 1.0)
-    rim = np.stack([r * np.cos(angle), r * np.sin(angle), 0.0 * angle], axis=1)
-    i = np.arange(10)
-    walls = np.stack([i, (i + 1) % 10, (i + 1) % 10 + 10, i + 10], axis=1)
-    prism = surface_of([*rim, *(rim + [0, 0, 2])], i[::-1], i + 10, *walls)
-    surface = sd.Surface(prism)
-    area = 0.5 * (rim[:, 0] * np.roll(rim[:, 1], -1) - rim[:, 1] * np.roll(rim[:, 0], -1)).sum()
-    assert surface.workarounds == ()
-    assert surface.mesh.is_two_manifold
-    volume = signed_volume(surface.mesh.vertices, surface.mesh.faces)
-    assert volume == pytest.approx(2.0 * area)
 
 
 def test_all_that_differs_is_told():
@@ -87,32 +59,6 @@ def test_all_that_differs_is_told():
     assert_array_equal(places[Kind.HOLE], np.unique([*faces[0], *faces[100], *fin]))
 
 
-def test_lines_vertex_cells_and_strips_are_allowed():
-    vertices, faces = icosphere(1)
-    n = len(vertices)
-    polydata = triangles(np.append(vertices, [[0, 0, 3.0], [np.nan, 0, 0]], axis=0), faces[4:])
-    polydata.lines = np.array([2, 0, n])
-    polydata.verts = np.array([1, n, 1, n + 1])
-    polydata.strips = np.concatenate([[3, *face] for face in faces[:4]])
-    surface = sd.Surface(polydata)
-    assert surface.mesh.is_two_manifold
-    assert texts(surface) == ["2 points are in no face"]
-    assert surface.vertex_of[n] == vertices[:, 2].argmax()
-    moved = surface.moved(2.0 * surface.mesh.vertices)
-    assert_array_equal(moved.points[:n], 2.0 * vertices)
-    assert np.isnan(moved.points[n + 1]).any()
-
-
-def test_single_precision_seams_are_welded_exactly():
-    vertices, faces = icosphere(3)
-    split = vertices[faces].reshape(-1, 3).astype(np.float32)
-    given = pv.PolyData.from_regular_faces(split, np.arange(len(split)).reshape(-1, 3))
-    surface = sd.Surface(given)
-    assert surface.mesh.is_two_manifold
-    assert surface.mesh.n_vertices == len(vertices)
-    assert surface.given.points.dtype == np.float32
-
-
 @pytest.mark.parametrize(
     ("polydata", "message"),
     [
@@ -126,18 +72,6 @@ def test_single_precision_seams_are_welded_exactly():
 def test_what_cannot_be_deformed_is_refused_at_once(polydata, message):
     with pytest.raises(MeshError, match=message):
         sd.Surface(polydata)
-
-
-def test_the_given_surface_is_not_changed():
-    vertices, faces = icosphere(1)
-    given = triangles(vertices, faces[:, ::-1])
-    given.cell_data["part"] = np.arange(len(faces))
-    before = given.copy()
-    surface = sd.Surface(given)
-    assert texts(surface) == [f"flipped {len(faces)} faces"]
-    assert given == before
-    moved = surface.moved(surface.mesh.vertices)
-    assert_array_equal(moved.regular_faces, given.regular_faces)
 
 
 def test_a_handle_of_points_in_no_face_is_an_error():

@@ -7,15 +7,13 @@ are replaced before any format sees them (`array_names.storable`).
 
 from __future__ import annotations
 
-import json
 import logging
 
 import numpy as np
 import pytest
-from gltf_files import octahedron
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from solids import CUBE, OCTAHEDRON
+from solids import CUBE
 from vtkmodules.vtkCommonCore import vtkStringArray
 
 import vtk_segdeform as sd
@@ -176,89 +174,6 @@ def test_every_text_is_read_back_or_a_warning_says_what_became_of_it(tmp_path, s
     surface = cube()
     place(surface, TEXTS)
     assert changed(tmp_path, suffix, surface) == []
-
-
-@pytest.mark.parametrize("suffix", FORMATS)
-def test_unnamed_arrays_are_given_names(tmp_path, suffix):
-    surface = cube()
-    for sort, count in (("Point", 8), ("Cell", 12), ("Field", 3)):
-        for _ in range(2):
-            getattr(surface, f"Get{sort}Data")().AddArray(numbers(np.arange(float(count))))
-    write_mesh(tmp_path / f"a{suffix}", surface)
-    assert read_polydata(tmp_path / f"a{suffix}").n_points == 8
-    if suffix == ".vtp":
-        again = read_polydata(tmp_path / "a.vtp")
-        assert list(again.point_data) == ["unnamed", "unnamed_"]
-
-
-def ply_with(text):
-    header = [
-        b"ply", b"format ascii 1.0", b"comment " + text, b"obj_info " + text,
-        b"element vertex 4", b"property double x", b"property double y", b"property double z",
-        b"property double a" + b"".join(text.split()), b"element face 4",
-        b"property list uchar int vertex_indices", b"end_header",
-    ]  # fmt: skip
-    rows = [b"0 0 0 1", b"1 0 0 2", b"0 1 0 3", b"0 0 1 4"]
-    faces = [b"3 0 2 1", b"3 0 1 3", b"3 1 2 3", b"3 2 0 3"]
-    return b"\n".join([*header, *rows, *faces, b""])
-
-
-def obj_with(text):
-    return b"\n".join([
-        b"# " + text, b"mtllib " + text, b"v 0 0 0", b"v 1 0 0", b"v 0 1 0", b"v 0 0 1",
-        b"o " + text, b"g " + text, b"usemtl " + text, b"f 1 3 2", b"f 1 2 4",
-        b"usemtl other", b"f 2 3 4", b"f 3 1 4", b"",
-    ])  # fmt: skip
-
-
-def stl_with(text):
-    rows = np.zeros(4, dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="f4")
-    rows["corners"] = corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]]
-    return text[:80].ljust(80, b"\0") + (4).to_bytes(4, "little") + rows.tobytes()
-
-
-def gltf_with(text):
-    document = octahedron(*OCTAHEDRON)
-    name = text.decode("utf-8", "surrogatepass") if isinstance(text, bytes) else text
-    document.head["materials"] = [{"name": name, "extras": {name: name}}]
-    document.head["meshes"][0]["primitives"][0]["material"] = 0
-    document.head["nodes"][0]["name"] = name
-    return document
-
-
-MAKERS = {".ply": ply_with, ".obj": obj_with, ".stl": stl_with}
-
-
-def converted_from(folder, source, text):
-    """Read a file with *text* in it, and write it in every format; each can be read."""
-    path = folder / f"given{source}"
-    path.write_bytes(MAKERS[source](text))
-    given_ = read_polydata(path)
-    for suffix in FORMATS:
-        write_mesh(folder / f"b{suffix}", given_)
-        again = read_polydata(folder / f"b{suffix}")
-        assert again.n_points == given_.n_points
-        assert "\0" not in json.dumps(repr(contents(again)).replace("\\x00", "\0"))
-
-
-@pytest.mark.parametrize("source", MAKERS)
-@pytest.mark.parametrize("text", [b"made\0by hand", b"\x1b[31mr\xe9d", b"%00<&>"])
-def test_a_file_with_such_texts_can_be_written_in_every_format(tmp_path, source, text):
-    if source == ".obj" and b"\0" in text:
-        with pytest.raises(sd.errors.MeshError, match="not text"):
-            converted_from(tmp_path, source, text)
-        return
-    converted_from(tmp_path, source, text)
-
-
-@pytest.mark.parametrize("text", ["a\0b", "\ud800", "\x1b[0m"])
-def test_names_of_a_gltf_file_are_storable(tmp_path, text):
-    path = gltf_with(text).save(tmp_path / "given.gltf")
-    given_ = read_polydata(path)
-    for suffix in (".glb", ".obj", ".vtp"):
-        write_mesh(tmp_path / f"b{suffix}", given_)
-        assert read_polydata(tmp_path / f"b{suffix}").n_points == 6
 
 
 def test_texts_with_lone_surrogates_do_not_abort_the_process():

@@ -5,18 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import pyvista as pv
-from given_surfaces import save_raw
 from numpy.testing import assert_array_equal
-from solids import OCTAHEDRON
 from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
 from vtkmodules.vtkCommonDataModel import vtkDataSetAttributes
 from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
-from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.confined import read_confined
-from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
+from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.reading_child import without_ranges
 from vtk_segdeform.io.vtk_arrays import data_sets
 
@@ -158,27 +155,6 @@ def test_all_legacy_versions_are_read_as_vtk_reads_them(tmp_path, grid, make, bi
     assert contents(read_in_child(path)) == contents(pv.read(path))
 
 
-def test_arrays_of_bits_and_of_cells_of_one_size_are_plain_numbers(tmp_path):
-    path = tmp_path / "a.vtk"
-    path.write_bytes(SOUND.replace(b"c 1 4 int\n5 6 7 8", b"c 1 4 bit\n1 0 0 1"))
-    assert read_polydata(path).point_data["c"].tolist() == [1, 0, 0, 1]
-
-
-def test_raw_bytes_may_look_like_tags(tmp_path):
-    surface = to_polydata(Mesh(*OCTAHEDRON))
-    bait = np.frombuffer(6 * b"</AppendedData></VTKFile><a b='", dtype=np.uint8)
-    surface.point_data["a"] = bait.reshape(6, -1)
-    save_raw(tmp_path / "a.vtp", surface)
-    assert_array_equal(read_polydata(tmp_path / "a.vtp").point_data["a"], bait.reshape(6, -1))
-
-
-def test_what_has_been_read_can_be_changed(tmp_path):
-    write_mesh(tmp_path / "a.vtp", Mesh(*OCTAHEDRON))
-    surface = read_polydata(tmp_path / "a.vtp")
-    surface.points[0] = 7.0
-    assert_array_equal(surface.points[0], [7.0, 7.0, 7.0])
-
-
 XML = """<?xml version="1.0"?>
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt32">
 <PolyData><Piece NumberOfPoints="4" NumberOfPolys="4">
@@ -316,11 +292,3 @@ def test_the_title_is_kept(tmp_path, as_grid, binary):
         write_mesh(tmp_path / "b.vtk", read)
         assert (tmp_path / "b.vtk").read_bytes().split(b"\n")[1] == title.encode()
         assert list(pv.read(tmp_path / "b.vtk").field_data) == ["times", "texts"]
-
-
-def test_a_field_array_of_the_same_name_is_not_replaced_by_the_title(tmp_path):
-    surface = rich()
-    surface.field_data["Header"] = [1.0, 2.0]
-    data = written_legacy(tmp_path / "a.vtk", surface, binary=True, version=_NEW)
-    (tmp_path / "a.vtk").write_bytes(data.replace(b"vtk output", b"scan of mine", 1))
-    assert read_polydata(tmp_path / "a.vtk").field_data["Header"].tolist() == [1.0, 2.0]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_array_equal
-from solids import TETRAHEDRON, icosphere
+from solids import TETRAHEDRON
 from test_round_trips import Warnings, prism
 
 from vtk_segdeform import Mesh
@@ -100,27 +100,6 @@ def test_smoothing_and_materials_are_repeated_after_each_object(tmp_path):
     assert lines[:2] == ["# Blender 4.2", "mtllib Körper.mtl"]
 
 
-def test_a_material_library_that_is_not_beside_the_file_is_told(tmp_path, caplog):
-    for folder in ("here", "there"):
-        (tmp_path / folder).mkdir()
-    (tmp_path / "here" / "a.obj").write_text(BLENDER, encoding="utf-8")
-    (tmp_path / "here" / "Körper.mtl").write_text("newmtl Haut")
-    surface = read_polydata(tmp_path / "here" / "a.obj")
-    write_mesh(tmp_path / "here" / "b.obj", surface)
-    assert caplog.text == ""
-    write_mesh(tmp_path / "there" / "b.obj", surface)
-    assert "the OBJ file refers to 'Körper.mtl': copy it to the same folder" in caplog.text
-    assert not (tmp_path / "there" / "Körper.mtl").exists()
-
-
-@pytest.mark.parametrize(
-    ("word", "group"), [("off", 0), ("0", 0), ("", 0), ("1", 1), ("7", 7), ("on", 1)]
-)
-def test_smoothing_groups_are_numbers(tmp_path, word, group):
-    (tmp_path / "a.obj").write_text(BLENDER.replace("s 0", f"s {word}"), encoding="utf-8")
-    assert read_polydata(tmp_path / "a.obj").cell_data["Smoothing"][0] == group
-
-
 def test_a_newline_in_a_name_does_not_start_a_line(tmp_path):
     surface = to_polydata(Mesh(*TETRAHEDRON))
     surface.cell_data["Group"] = [0, 1, 2, 3]
@@ -173,16 +152,6 @@ def test_indices_before_the_first_are_errors(tmp_path, corner):
         read_polydata(tmp_path / "a.obj")
 
 
-def test_unused_vertices_keep_texture_coordinates_per_point(tmp_path):
-    surface = to_polydata(Mesh(*TETRAHEDRON))
-    surface = pv.PolyData(np.vstack([surface.points, [9.0, 9.0, 9.0]]), surface.faces)
-    surface.point_data["uv"] = np.arange(10.0).reshape(5, 2)
-    surface.point_data.active_texture_coordinates_name = "uv"
-    write_mesh(tmp_path / "a.obj", surface)
-    again = read_polydata(tmp_path / "a.obj")
-    assert_array_equal(again.active_texture_coordinates, surface.point_data["uv"])
-
-
 @pytest.mark.parametrize("reader", ["vtk", "pymeshlab"])
 def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp_path, reader):
     surface = prism(5)
@@ -205,16 +174,6 @@ def test_other_programs_read_the_same_surface_whatever_its_groups_are_called(tmp
         assert meshset.current_mesh().face_number() == 5 * 2 + 2 * 3
     np.testing.assert_allclose(points, surface.points, atol=1e-6)
     assert n_faces == surface.n_cells
-
-
-def test_a_sphere_with_smoothing_is_as_exact_as_one_without(tmp_path):
-    surface = to_polydata(Mesh(*icosphere(2, radius=1 / 3)))
-    surface.cell_data["Smoothing"] = np.ones(surface.n_cells, dtype=int)
-    write_mesh(tmp_path / "a.obj", surface)
-    again = read_polydata(tmp_path / "a.obj")
-    assert_array_equal(again.points, surface.points)
-    assert_array_equal(again.faces, surface.faces)
-    assert set(again.cell_data["Smoothing"]) == {1}
 
 
 TETRA = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

@@ -57,20 +57,6 @@ def name(request):
     return request.param
 
 
-def test_the_mode_and_links_are_kept(tmp_path, name):
-    there = tmp_path / "there"
-    there.mkdir()
-    path, link = there / name, tmp_path / name
-    path.write_bytes(b"old")
-    path.chmod(0o640)
-    link.symlink_to(path)
-    WRITERS[name](link)
-    assert link.is_symlink()
-    assert path.stat().st_mode & 0o777 == 0o640
-    assert path.stat().st_size > 3
-    assert os.listdir(there) == [name]
-
-
 def test_anything_but_a_regular_file_is_an_error_that_names_it(tmp_path, name):
     path = tmp_path / name
     for make in (os.mkfifo, os.mkdir, lambda path: os.symlink(name, path)):

@@ -179,14 +179,3 @@ def test_threads_take_quick_turns_until_the_last_one_has_ended():
             thread.join()
     assert max(inside) < 0.5 * before
     assert sys.getswitchinterval() == pytest.approx(before)
-
-
-def test_turns_shorter_than_quick_ones_stay():
-    before = sys.getswitchinterval()
-    sys.setswitchinterval(1e-5)
-    try:
-        with quick_turns():
-            assert sys.getswitchinterval() == pytest.approx(1e-5)
-        assert sys.getswitchinterval() == pytest.approx(1e-5)
-    finally:
-        sys.setswitchinterval(before)

@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from solids import CUBE, SOLIDS, icosphere, rotation, torus, two_components
+from solids import CUBE, SOLIDS, icosphere, rotation, together, two_components
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.mesh import faults as search
@@ -14,7 +14,6 @@ from vtk_segdeform.mesh import shells, topology, triangles
 from vtk_segdeform.mesh.faults import connectivity_faults, find_faults
 from vtk_segdeform.mesh.grouping import first_equal_row
 from vtk_segdeform.mesh.report import Fault, Kind
-from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.mesh_repair.repair import repair
 
 SPHERE = icosphere(2)
@@ -32,59 +31,12 @@ def kinds(vertices, faces):
     return {kind: n for kind, n in found.items() if kind not in HARMLESS}
 
 
-def together(*solids):
-    """Return solids as one mesh, with coincident vertices merged."""
-    vertices = np.concatenate([v for v, _ in solids])
-    starts = np.cumsum([0] + [len(v) for v, _ in solids])
-    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
-    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
-    return vertices, number.reshape(-1)[faces]
-
-
-@pytest.mark.parametrize("name", SOLIDS)
-def test_a_closed_oriented_manifold_has_no_faults(name):
-    report = find_faults(*SOLIDS[name])
-    assert report.ok
-    assert report.faults == report.notes == ()
-    assert report.n_components == 1
-
-
 def test_a_missing_face_leaves_three_open_edges_around_one_hole():
     vertices, faces = SPHERE
     report = find_faults(vertices, faces[1:])
     assert kinds(vertices, faces[1:]) == {Kind.OPEN_EDGE: 3, Kind.HOLE: 1}
     a, b, c = sorted(faces[0].tolist())
     assert sorted(report.notes[0].examples) == [(a, b), (a, c), (b, c)]
-
-
-def test_separate_holes_are_counted_separately():
-    vertices, faces = SPHERE
-    around = [np.flatnonzero((faces == v).any(axis=1)) for v in (0, 1)]
-    left = np.delete(faces, np.concatenate(around), axis=0)
-    expected = {Kind.UNREFERENCED: 2, Kind.OPEN_EDGE: sum(map(len, around)), Kind.HOLE: 2}
-    assert kinds(vertices, left) == expected
-
-
-def test_a_third_face_at_an_edge_is_found():
-    vertices, faces = SPHERE
-    fin = np.array([[faces[0, 0], faces[0, 1], N]])
-    found = kinds(np.append(vertices, [[3.0, 3.0, 3.0]], axis=0), np.append(faces, fin, axis=0))
-    assert found == {Kind.NON_MANIFOLD_EDGE: 1, Kind.OPEN_EDGE: 2, Kind.HOLE: 1}
-
-
-def test_cubes_that_share_a_corner_or_an_edge_have_different_faults():
-    vertices, faces = CUBE
-    corner = together(CUBE, (vertices + 1.0, faces))
-    assert kinds(*corner) == {Kind.NON_MANIFOLD_VERTEX: 1}
-    edge = together(CUBE, (vertices + [1.0, 1.0, 0.0], faces))
-    assert kinds(*edge) == {Kind.NON_MANIFOLD_EDGE: 1}
-
-
-def test_a_flipped_face_is_inconsistent_along_three_edges():
-    vertices, faces = SPHERE
-    turned = faces.copy()
-    turned[3] = turned[3, ::-1]
-    assert kinds(vertices, turned) == {Kind.TURNED_EDGE: 3}
 
 
 def test_borders_and_branches_are_allowed_and_turned_faces_are_not():
@@ -144,12 +96,6 @@ def test_overlapping_bodies_are_not_cavities():
     assert find_faults(*together((vertices, faces), (bump, faces))).ok
 
 
-def test_degenerate_and_duplicate_faces_are_the_only_faults_reported():
-    vertices, faces = SPHERE
-    more = np.concatenate([faces, [[0, 0, 1], [5, 7, 5]], faces[:3], faces[:1, ::-1]])
-    assert kinds(vertices, more) == {Kind.DEGENERATE: 2, Kind.DUPLICATE_FACE: 4}
-
-
 def test_a_face_without_area_and_a_coincident_vertex_are_notes():
     vertices, faces = SPHERE
     flat = vertices.copy()
@@ -181,12 +127,6 @@ def test_nan_and_infinite_coordinates_are_found():
     report = find_faults(broken, faces)
     assert kinds(broken, faces) == {Kind.NON_FINITE: 2}
     assert report.faults[0].examples == (4, 9)
-
-
-def test_bad_indices_are_found():
-    vertices, faces = CUBE
-    assert kinds(vertices, faces + 1)[Kind.BAD_INDEX] == np.sum((faces == 7).any(axis=1))
-    assert kinds(vertices, np.append(faces, [[0, 1, -1]], axis=0)) == {Kind.BAD_INDEX: 1}
 
 
 @pytest.mark.parametrize(
@@ -356,29 +296,6 @@ def test_rows_are_equal_by_value_not_by_bits():
         assert first_equal_row(many).tolist() == [
             seen.setdefault(tuple(row), i) for i, row in enumerate(many.tolist())
         ]
-
-
-def test_on_a_manifold_edges_fans_and_genus_agree():
-    for (vertices, faces), euler in ((SPHERE, 2), (torus(), 0), (two_components(), 4)):
-        half_edges = HalfEdges(faces, len(vertices))
-        assert len(vertices) - len(half_edges.first) + len(faces) == euler
-        assert half_edges.fans(half_edges.pairs).max() + 1 == len(vertices)
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_boxes_that_begin_within_another_are_among_few_candidates(axis):
-    rng = np.random.default_rng(3)
-    low = np.concatenate([rng.integers(0, 9, (300, 3)).astype(float), 9 * rng.random((100, 3))])
-    low[:, axis] *= 20.0  # along this axis the boxes overlap least
-    high = low + rng.integers(1, 6, (400, 3))
-    order, starts, stops = shells._beginning_within(low, high)
-    for k in range(400):
-        within = ((low > low[k]) & (high < high[k])).all(axis=1)
-        assert set(np.flatnonzero(within)) <= set(order[starts[k] : stops[k]])
-    row = 0.5 * rng.random((1000, 3))
-    row[:, axis] = 3.0 * np.arange(1000)  # separate boxes
-    _, starts, stops = shells._beginning_within(row - 1.0, row + 1.0)
-    assert (stops <= starts).all()
 
 
 def test_the_connectivity_of_a_cage_has_the_faults_of_its_faces():

@@ -72,16 +72,6 @@ def test_nodes_are_inside_where_points_are_and_also_where_the_body_reaches_beyon
         assert_array_equal(found.ravel()[clear], expected[clear])
 
 
-def test_a_doubly_enclosed_region_is_inside():
-    vertices, faces = icosphere(2)
-    both = np.vstack([4.0 * vertices + 5.1, 4.0 * vertices + [7.1, 5.1, 5.1]])
-    nodes = np.indices((13, 11, 11)).reshape(3, -1).T
-    expected = winding_number(nodes, both, np.vstack([faces, faces + len(vertices)])) > 0.5
-    found = inside_nodes(both, np.vstack([faces, faces + len(vertices)]), (13, 11, 11))
-    assert_array_equal(found.ravel(), expected)
-    assert found[6, 5, 5]
-
-
 def test_the_distance_to_a_cube_is_known_inside_and_outside(monkeypatch):
     x = somewhere(400, seed=1)
     x = np.vstack([x, CUBE[0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.0], [-1.0, 0.3, 0.3]]])
@@ -100,16 +90,6 @@ def test_the_distance_to_an_obtuse_triangle_is_that_to_its_nearest_corner_edge_o
     to_edge = np.array([-1.0, -1, 0]) @ np.array([1.0, 3, 0]) / np.sqrt(10.0)
     expected = [2.0, 1.0, 1.0, 2.0, 1.0, abs(to_edge)]
     assert_allclose(distance_to_surface(points, corners, face), expected, rtol=1e-12)
-
-
-def test_the_winding_number_is_an_integer_and_does_not_depend_on_blocks(monkeypatch):
-    vertices, faces = torus(24, 12)
-    x = somewhere(500, size=1.5)
-    number = winding_number(x, vertices, faces)
-    assert_allclose(number, number.round(), atol=1e-12)
-    assert set(number.round()) == {0.0, 1.0}
-    monkeypatch.setattr("vtk_segdeform.mesh.inside._BLOCK", 1)
-    assert_allclose(winding_number(x, vertices, faces), number, atol=1e-12)
 
 
 def test_faces_without_area_change_no_distance_to_a_surface():

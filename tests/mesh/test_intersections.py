@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import OCTAHEDRON, icosphere
+from solids import icosphere
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
 from vtk_segdeform.mesh import Crossings, new_crossings, self_intersections
@@ -65,14 +65,6 @@ def test_needles_have_no_plane():
     assert_array_equal(flat_faces(1e-3 * corners, faces), [1, 2])
 
 
-def test_coplanar_faces_beside_an_edge_do_not_intersect_however_they_are_oriented():
-    points = [[0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.4, -1, 0], [0.5, 0.5, 0]]
-    for other in ([1, 0, 3], [0, 1, 3]):  # on the other side of the edge 0 1
-        assert not len(self_intersections(points, [[0, 1, 2], other]))
-    for other in ([1, 0, 4], [0, 1, 4]):  # on the same side
-        assert self_intersections(points, [[0, 1, 2], other]).tolist() == [[0, 1]]
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_new_crossings_are_in_pairs_that_intersect_now_but_not_at_rest(seed):
     rng = np.random.default_rng(seed)
@@ -101,71 +93,6 @@ def test_crossings_of_one_pose_after_another_are_those_of_each(seed):
         assert_array_equal(crossings.at(pose), new_crossings(pose, rest, faces))
     assert not len(crossings.at(rest))
     assert max(len(crossings.at(pose)) for pose in poses) > 10
-
-
-def test_a_face_folded_over_its_neighbour_is_found():
-    vertices, faces = OCTAHEDRON
-    a, b, c = faces[0]
-    middle = vertices[[a, b, c]].mean(axis=0)
-    split = np.vstack([faces[1:], [[a, b, 6], [b, c, 6], [c, a, 6]]])
-    assert not len(self_intersections(np.vstack([vertices, middle]), split))
-    beyond = vertices[c] + 0.3 * (vertices[c] - middle)  # in the same plane, past the corner
-    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
-    beyond = vertices[[a, b]].mean(axis=0) * 1.3 - 0.3 * vertices[c]  # past the edge
-    assert len(self_intersections(np.vstack([vertices, beyond]), split)) > 0
-
-
-def test_faces_that_share_a_corner_may_touch_only_there():
-    fan = np.array([[0, 1, 2], [0, 3, 4]])
-    corner, wide = [0, 0, 0], [[2, -1, 0], [2, 1, 0]]
-
-    def meet(p, q):
-        return len(self_intersections(np.array([corner, *wide, p, q], float), fan)) == 1
-
-    assert meet([1, 0, -1], [1, 0, 1])  # pierced across
-    assert meet([4, 0, -1], [4, 0, 1])  # the other one is pierced
-    assert meet([1, 0, 0], [1, 3, 0])  # in one plane, overlapping
-    assert meet([1, 0.1, 0], [1, -0.1, 0])  # in one plane, inside
-    assert not meet([-1, 0, -1], [-1, 0, 1])
-    assert not meet([-2, 1, 0], [-2, -1, 0])
-    assert not meet([1, 0, 1], [1, 1, 1])
-    assert not meet([1, 0, 1e-6], [1, 1, 1e-6])
-    assert not meet([2, 1.5, 0], [2, 3, 0])  # in one plane, side by side
-
-
-def test_faces_that_share_an_edge_may_not_fold_over_one_another():
-    pair = np.array([[0, 1, 2], [1, 0, 3]])
-
-    def meet(apex):
-        return (
-            len(self_intersections(np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0], apex]), pair)) == 1
-        )
-
-    assert meet([0.3, 0.5, 0.0])
-    assert not meet([0.3, -0.5, 0.0])
-    assert not meet([0.3, 0.5, 1e-6])
-
-
-def test_both_sides_of_one_triangle_are_not_a_surface():
-    pillow = np.array([[0, 1, 2], [2, 1, 0]])
-    assert len(self_intersections(np.eye(3), pillow)) == 1
-
-
-def test_faces_that_share_nothing_may_not_even_touch():
-    pair = np.array([[0, 1, 2], [3, 4, 5]])
-    flat = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-
-    def meet(*other):
-        return len(self_intersections(np.array([*flat, *other], float), pair)) == 1
-
-    assert meet([0.2, 0.2, 0], [0.2, 0.2, 1], [0.3, 0.2, 1])  # a corner on the face
-    assert meet([0.5, 0.5, -1], [0.5, 0.5, 1], [1, 1, 0])  # an edge on the edge
-    assert meet([0, 0, 0], [0, 0, 1], [-1, 0, 1])  # a corner on the corner
-    assert meet([1, 0, 0], [2, 0, 0], [1, 1, 0])  # in one plane, corner on corner
-    assert meet([0.1, 0.1, 0], [0.2, 0.1, 0], [0.1, 0.2, 0])  # in one plane, inside
-    assert not meet([0.2, 0.2, 1e-9], [0.2, 0.2, 1], [0.3, 0.2, 1])
-    assert not meet([0.51, 0.51, 0], [1, 0.5, 0], [0.5, 1, 0])
-    assert not meet([0.6, 0.6, -1], [0.6, 0.6, 1], [1, 1, 0])
 
 
 @pytest.mark.usefixtures("either")

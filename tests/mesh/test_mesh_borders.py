@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import CUBE, SOLIDS, icosphere, torus
+from solids import CUBE, icosphere, torus
 
 from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.mesh.loops import loops_of
@@ -29,14 +29,6 @@ def soups():
     for vertices, faces in (icosphere(2), torus(12, 8)):
         for share in (0.1, 0.5, 0.9):
             yield faces[rng.random(len(faces)) < share], len(vertices)
-
-
-def test_a_closed_mesh_has_no_border():
-    for solid in SOLIDS.values():
-        mesh = Mesh(*solid)
-        assert mesh.is_closed
-        assert mesh.borders == ()
-        assert mesh.boundary.shape == (0, 2)
 
 
 def test_the_boundary_of_a_boundary_is_zero():
@@ -72,30 +64,6 @@ def test_reversing_the_faces_reverses_the_boundary():
         assert sorted(map(tuple, forth.tolist())) == sorted(map(tuple, back[:, ::-1].tolist()))
 
 
-def cyclic(loops):
-    """Return loops, each begun at its least vertex, in order."""
-    return sorted(tuple(np.roll(loop, -np.argmin(loop)).tolist()) for loop in loops)
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_loops_that_share_no_vertex_do_not_depend_on_numbers_or_order(seed):
-    rng = np.random.default_rng(seed)
-    vertices, faces = icosphere(3)
-    centres = rng.choice(len(vertices), 12, replace=False)
-    faces = faces[~np.isin(faces, centres).any(axis=1)]
-    boundary = HalfEdges(faces, len(vertices)).net_boundary
-    if np.bincount(boundary[:, 0]).max() > 1:
-        crossed = boundary[np.bincount(boundary[:, 0])[boundary[:, 0]] > 1, 0]
-        faces = faces[~np.isin(faces, crossed).any(axis=1)]
-        boundary = HalfEdges(faces, len(vertices)).net_boundary
-    assert np.bincount(boundary[:, 0]).max() == 1
-    number = rng.permutation(len(vertices))
-    other = number[rng.permutation(faces)]
-    found = loops_of(HalfEdges(other, len(vertices)).net_boundary)
-    assert cyclic(found) == cyclic([number[loop] for loop in loops_of(boundary)])
-    assert 2 <= len(found) <= 12
-
-
 def test_faces_are_on_the_left_of_a_border():
     vertices, faces = CUBE
     top = (vertices[faces][:, :, 2] == 1.0).all(axis=1)
@@ -106,17 +74,6 @@ def test_faces_are_on_the_left_of_a_border():
     assert 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() == pytest.approx(1.0)
 
 
-def test_two_holes_that_touch_are_two_loops():
-    vertices, faces = icosphere(2)
-    at = np.flatnonzero((faces == 2).any(axis=1))
-    other = next(f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1)
-    mesh = Mesh(vertices, np.delete(faces, [at[0], other], axis=0))
-    assert sorted(map(len, mesh.borders)) == [3, 3]
-    assert {tuple(sorted(loop.tolist())) for loop in mesh.borders} == {
-        tuple(sorted(faces[f].tolist())) for f in (at[0], other)
-    }
-
-
 def test_a_fin_has_a_border_and_its_body_has_none():
     vertices, faces = CUBE
     a, b, _ = faces[0]
@@ -125,15 +82,6 @@ def test_a_fin_has_a_border_and_its_body_has_none():
     assert not mesh.is_closed
     (loop,) = mesh.borders
     assert sorted(loop.tolist()) == sorted([a, b, 8])
-
-
-def test_the_order_of_loops_is_that_of_their_first_edges():
-    for faces, n in soups():
-        boundary = HalfEdges(faces, n).net_boundary
-        if len(boundary) and np.bincount(boundary[:, 0]).max() == 1:
-            begin = [int(loop[0]) for loop in loops_of(boundary)]
-            places = [boundary[:, 0].tolist().index(v) for v in begin]
-            assert places == sorted(places)
 
 
 def test_edges_at_a_border_are_listed_whatever_their_direction():

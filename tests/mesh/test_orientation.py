@@ -65,25 +65,6 @@ def test_cubes_that_share_an_edge_or_a_corner_both_face_outward(shift):
         assert mesh.is_closed
 
 
-def test_four_wedges_around_an_axis_face_outward():
-    # Every other one of eight wedges around an axis: eight faces meet there.
-    angle = np.arange(8) * np.pi / 4
-    rim = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
-    vertices = np.concatenate([rim, rim + [0, 0, 1], [[0.0, 0, 0], [0, 0, 1]]])
-    bodies = []
-    for k in (0, 2, 4, 6):
-        a, b, c, d, o, p = k, k + 1, k + 8, k + 9, 16, 17
-        bodies += [[o, b, a], [p, c, d], [a, b, d], [a, d, c]]
-        bodies += [[o, a, c], [o, c, p], [b, o, p], [b, p, d]]
-    faces = np.array(bodies)
-    wedge = signed_volume(vertices, faces[:8])
-    assert wedge > 0.0
-    for turned in itertools.product([False, True], repeat=4):
-        mesh = mesh_of(vertices @ TURN, flipped(faces, np.repeat(turned, 8))).mesh
-        assert mesh.is_closed
-        assert signed_volume(mesh.vertices, mesh.faces) == pytest.approx(4.0 * wedge)
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_a_body_with_a_fin_faces_outward_and_the_fin_keeps_its_orientation(seed):
     vertices, faces = SPHERE
@@ -105,37 +86,6 @@ def test_a_body_with_a_fin_faces_outward_and_the_fin_keeps_its_orientation(seed)
     mesh = mesh_of(vertices @ TURN, given).mesh
     assert_array_equal(mesh.faces[: len(faces)], faces)
     assert_array_equal(mesh.faces[len(faces) :], fin)
-
-
-def test_a_body_with_an_inner_wall_faces_outward():
-    vertices, faces = SPHERE
-    ring = np.flatnonzero(np.abs(vertices[:, 2]) < 1e-9)
-    ring = ring[np.argsort(np.arctan2(*vertices[ring, :2].T))]
-    wall = np.stack([ring, np.roll(ring, -1), np.full(len(ring), len(vertices))], 1)
-    vertices = np.append(vertices, [[0.0, 0.0, 0.1]], axis=0)
-    upper = (vertices[faces][:, :, 2] > -1e-9).all(axis=1)
-    for which in (upper, ~upper, np.zeros_like(upper), np.ones_like(upper)):
-        given = np.concatenate([flipped(faces, which), wall])
-        mesh = mesh_of(vertices @ TURN, given).mesh
-        assert_array_equal(mesh.faces[: len(faces)], faces)
-
-
-@pytest.mark.parametrize("open_sides", [[(2, 1)], [(2, 0), (2, 1)], [(0, 0)], []])
-def test_a_box_without_some_sides_faces_outward(open_sides):
-    vertices, faces = box(open_sides)
-    outward = mesh_of(vertices @ TURN, faces)
-    assert_array_equal(outward.mesh.faces, faces)
-    assert not any("flipped" in each.text for each in outward.workarounds)
-    inward = mesh_of(vertices @ TURN, faces[:, [0, 2, 1]])
-    assert_array_equal(inward.mesh.faces, faces)
-    assert inward.workarounds[0].text == f"flipped {len(faces)} faces"
-
-
-def test_a_sheet_keeps_its_orientation():
-    vertices, faces = box([(0, 0), (0, 1), (1, 0), (1, 1), (2, 0)])
-    bent = vertices + [0.0, 0.0, 0.2] * np.sin(3.0 * vertices[:, :1])
-    for given in (faces, faces[:, [0, 2, 1]]):
-        assert_array_equal(mesh_of(bent @ TURN, given).mesh.faces, given)
 
 
 @pytest.mark.parametrize("open_hull", [False, True])
@@ -243,20 +193,3 @@ def test_volumes_known_after_flipping_are_those_of_the_flipped_shells():
     fin = np.append(faces, [[*faces[0, :2], len(x)]], axis=0)
     half_edges = HalfEdges(fin, len(x) + 1)
     assert faces_to_flip(np.append(x, [[9.0, 9, 9]], axis=0), half_edges)[1] is None  # it branches
-
-
-@pytest.mark.usefixtures("with_and_without_numba")
-def test_a_ball_in_the_hole_of_a_ring_is_not_inside_it():
-    ring, ball = torus(24, 12), (0.3 * SPHERE[0], SPHERE[1])
-    for height, around_ball in ((0.0, 1), (2.5, 1), (9.0, 0)):
-        points, faces = together(
-            (3.0 * SPHERE[0], SPHERE[1]),
-            (ring[0] @ TURN, ring[1]),
-            (ball[0] + [0.0, 0.0, height], ball[1]),
-            (0.1 * SPHERE[0] + [0.0, 0.0, height], SPHERE[1]),
-        )
-        half_edges = HalfEdges(faces, len(points))
-        depth = shell_depths(points, half_edges, np.ones(4, dtype=bool))
-        assert_array_equal(depth, [0, 1, around_ball, around_ball + 1])
-        depth = shell_depths(points, half_edges, np.arange(4) == 3)
-        assert_array_equal(depth, [0, 0, 0, around_ball + 1])

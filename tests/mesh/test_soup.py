@@ -8,9 +8,7 @@ from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
 
-from vtk_segdeform import sizes
 from vtk_segdeform.errors import ConstraintError, MeshError
-from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh import Kind, find_faults, mesh_of
 
 SPHERE = icosphere(2)
@@ -70,17 +68,6 @@ def test_a_mesh_remains_the_same_bit_for_bit(body):
     assert found.workarounds == ()
 
 
-def test_an_oriented_sheet_remains_the_same():
-    vertices, faces = SPHERE
-    cap = faces[(vertices[faces][:, :, 2] > 0.3).all(axis=1)]
-    used = np.unique(cap)
-    for some in (cap, cap[:, ::-1]):  # it has no outside
-        some = np.searchsorted(used, some)
-        found = checked(vertices[used], some)
-        assert_array_equal(found.mesh.faces, some)
-        assert texts(found) == ["1 hole"]
-
-
 @pytest.mark.parametrize("body", BODIES, ids=len)
 def test_a_triangle_soup_is_welded_to_the_body(body):
     found = checked(*soup(*body))
@@ -131,27 +118,6 @@ def test_a_gap_of_one_step_of_coarse_coordinates_remains():
     assert mesh_of(both, faces).mesh.n_vertices == 8
 
 
-def test_coincident_vertices_of_closed_bodies_are_not_welded():
-    vertices, faces = CUBE
-    touching = np.concatenate([vertices, vertices + [1.0, 0.0, 0.0]])
-    found = checked(touching, np.concatenate([faces, faces + 8]))
-    assert_array_equal(found.mesh.vertices, touching)
-    assert found.workarounds == ()
-
-
-def test_seams_elsewhere_do_not_weld_bodies_that_touch(monkeypatch):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    vertices, faces = CUBE
-    corner, loose = vertices + [1.0, 1.0, 1.0], soup(*SPHERE)
-    points = np.concatenate([vertices, corner, loose[0] + 5.0])
-    triangles = np.concatenate([faces, faces + 8, loose[1] + 16])
-    found = checked(points, triangles)
-    assert found.mesh.n_vertices == 16 + len(SPHERE[0])
-    sliver = [[16, 17, np.flatnonzero((points == points[16]).all(axis=1))[1]]]
-    again = checked(points, np.concatenate([triangles, sliver]))
-    assert_array_equal(again.mesh.faces, found.mesh.faces)
-
-
 def test_a_sheet_given_twice_becomes_one_sheet():
     vertices, faces = SPHERE
     cap = faces[(vertices[faces][:, :, 2] > 0.3).all(axis=1)]
@@ -171,14 +137,6 @@ def test_a_sheet_given_twice_becomes_one_sheet():
     for found in (shared, apart, checked(*soup(*doubled))):
         assert found.mesh.n_vertices == n
         assert_array_equal(found.mesh.vertices[found.mesh.faces], sheet[0][sheet[1]])
-
-
-def test_of_a_wall_between_two_bodies_one_side_is_kept():
-    vertices, faces = CUBE
-    found = checked(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
-    assert texts(found) == ["ignored 2 duplicate faces", "4 edges with three or more faces"]
-    outer = (found.mesh.vertices[found.mesh.faces][:, :, 0] != 1.0).any(axis=1)
-    assert signed_volume(found.mesh.vertices, found.mesh.faces[outer]) == pytest.approx(2.0)
 
 
 def test_degenerate_faces_and_points_in_no_face_are_ignored():
@@ -206,13 +164,6 @@ def test_a_component_as_small_as_a_rounding_error_is_ignored(size):
     assert_array_equal(found.moved(found.mesh.vertices), points)
 
 
-def test_components_that_are_small_beside_their_distance_are_kept():
-    vertices, faces = SPHERE
-    points = np.concatenate([1e-14 * vertices, 1e-14 * vertices + [0.0, 0.0, 1.0]])
-    found = mesh_of(points, np.concatenate([faces, faces + len(vertices)]))
-    assert found.mesh.n_vertices == 2 * len(vertices)
-
-
 def test_a_component_without_area_follows_the_nearest_vertices():
     vertices, faces = SPHERE
     line = np.array([[2.0, 0, 0], [2, 0, 1], [2, 0, 3], [2, 0, 7]])
@@ -235,24 +186,6 @@ def test_a_component_without_area_follows_the_nearest_vertices():
         np.append(faces, joined, axis=0),
     ).mesh
     assert mesh.n_faces == len(faces) + 1
-
-
-def test_faces_without_area_hold_a_mesh_together():
-    vertices = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [1, 0, 0], [1, -1, 0]])
-    found = checked(vertices, [[0, 1, 2], [0, 3, 1], [0, 4, 3], [3, 4, 1]])
-    assert found.mesh.n_faces == 4
-    assert set(found.mesh.components) == {0}
-
-
-def test_the_minority_of_faces_is_flipped():
-    vertices, faces = SPHERE
-    some = np.random.default_rng(1).random(len(faces)) < 0.3
-    found = checked(vertices, np.where(some[:, None], faces[:, [0, 2, 1]], faces))
-    assert_array_equal(found.mesh.faces, faces)
-    assert texts(found) == [f"flipped {some.sum()} faces"]
-    assert_array_equal(found.workarounds[0].points, np.unique(faces[some]))
-    found = checked(vertices, faces[:, [0, 2, 1]])
-    assert_array_equal(found.mesh.faces, faces)
 
 
 def test_a_moebius_strip_is_left_as_it_is():

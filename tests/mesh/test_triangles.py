@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from vtk_segdeform.mesh.triangles import (
     corner_angles,
-    corner_columns,
     cross,
     cross_rows,
     least_angle,
@@ -49,11 +48,3 @@ def test_normals_and_norms_are_those_of_numpy():
     expected = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert_allclose(normals(corners), expected, atol=1e-14)
     assert_allclose(norm(expected.T), np.linalg.norm(expected, axis=1), rtol=1e-14)
-
-
-def test_the_corners_of_faces_are_columns():
-    points = np.random.default_rng(4).normal(size=(7, 3))
-    faces = np.array([[0, 3, 6], [5, 2, 1]])
-    for k, columns in enumerate(corner_columns(points, faces)):
-        assert_array_equal(columns, points[faces[:, k]].T)
-        assert columns.flags.c_contiguous

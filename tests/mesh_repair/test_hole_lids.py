@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from solids import icosphere
 
 from vtk_segdeform.geometry.volume import signed_volume
-from vtk_segdeform.mesh.intersections import intersections_of, self_intersections
+from vtk_segdeform.mesh.intersections import self_intersections
 from vtk_segdeform.mesh.topology import HalfEdges
 from vtk_segdeform.mesh.triangles import least_angle
 from vtk_segdeform.mesh_repair.hole_borders import border_loops
@@ -91,13 +91,6 @@ def test_a_planar_hole_gets_a_planar_lid_of_well_shaped_triangles(name):
     assert signed_volume(result.vertices, result.faces) == pytest.approx(area, rel=1e-9)
 
 
-@pytest.mark.parametrize("depth", every(3, [0.2, 0.6, 1.5]))
-def test_a_saddle_gets_a_smooth_lid(depth):
-    result = closed(*tube(polar(1.0, TURN, depth * np.cos(2.0 * TURN)), 4.0), least=12.0)
-    volume = signed_volume(result.vertices, result.faces)
-    assert volume == pytest.approx(4.0 * 32.0 * np.sin(np.pi / 32.0), rel=0.02)
-
-
 @pytest.mark.parametrize("share", every(3, [0.2, 0.5, 0.8]))
 def test_a_window_in_a_cylinder_gets_a_curved_lid(share):
     n, rows = 48, 16
@@ -122,24 +115,6 @@ def test_a_random_border_is_closed_without_a_crossing(seed):
     height = 0.5 * (waves[2] @ np.cos(phase) + waves[3] @ np.sin(phase))
     loop = polar(radius, angle) + height[:, None] * [0.0, 0.0, 1.0]
     closed(*tube(loop, 6.0), least=0.2)
-
-
-def test_a_tilted_spiral_is_closed_in_the_projection_along_its_axis():
-    t = np.linspace(0.0, 1.0, 40)
-    rise = np.array([0.0, 0.0, 1.0]) * np.concatenate([t, t[::-1]])[:, None]
-    inner, outer = (polar(r + t, 4.0 * np.pi * t) for r in (0.3, 0.55))
-    loop = np.concatenate([outer, inner[::-1]]) + rise
-    closed(*tube(loop, 3.0), least=1.0)
-
-
-@pytest.mark.parametrize(("few", "many"), every(2, [(60, 240), (80, 320)]))
-def test_the_number_of_lid_triangles_is_proportional_to_the_border(few, many):
-    sizes = {}
-    for n in (few, many):
-        loop = polar(1.0 + 0.2 * np.cos(9 * (angle := 2.0 * np.pi * np.arange(n) / n)), angle)
-        result = closed(*tube(loop, 1.0, 3), least=1.0)
-        sizes[n] = np.count_nonzero(result.face_map < 0)
-    assert sizes[many] < 6.0 * sizes[few]  # a uniform density would give sixteen times as many
 
 
 def test_ears_are_clipped_in_any_projection_in_which_the_loop_is_simple():
@@ -199,18 +174,3 @@ def test_touching_holes_are_separated():
     loops = border_loops(vertices, half_edges, 100)
     found = sorted(sorted(half_edges.head[loop].tolist()) for loop in loops)
     assert found == sorted(sorted(faces[f].tolist()) for f in (at[0], other[0]))
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_the_intersections_of_some_faces_agree_with_those_of_all(seed):
-    rng = np.random.default_rng(seed)
-    scale = 10.0 ** rng.uniform(-1.0, 0.5, 80)[:, None, None]
-    vertices = (rng.normal(size=(80, 1, 3)) + scale * rng.normal(size=(80, 3, 3))).reshape(-1, 3)
-    faces = np.arange(240).reshape(-1, 3)
-    some = np.sort(rng.permutation(80)[:25])
-    pairs = self_intersections(vertices, faces)
-    expected = {tuple(p) for p in [*pairs, *pairs[:, ::-1]] if p[0] in some}
-    found = [tuple(p) for p in intersections_of(vertices, faces, some)]
-    assert len(found) > 10
-    assert len(found) == len(set(found))
-    assert set(found) == expected

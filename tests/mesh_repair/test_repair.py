@@ -91,13 +91,6 @@ def test_vertices_that_nearly_coincide_are_welded_when_a_distance_is_given():
     assert len(result.vertices) == N
 
 
-def test_coincident_vertices_of_a_closed_surface_are_left_alone():
-    vertices, faces = SPHERE
-    double = np.concatenate([faces, faces[:, ::-1] + N])  # a cavity that coincides with the surface
-    result = repair(np.concatenate([vertices, vertices]), double[1:])
-    assert not any("weld" in step for step in result.steps)
-
-
 def test_degenerate_and_duplicate_faces_and_unreferenced_vertices_are_removed():
     vertices, faces = SPHERE
     result = repaired(
@@ -109,20 +102,6 @@ def test_degenerate_and_duplicate_faces_and_unreferenced_vertices_are_removed():
     )  # fmt: skip
     assert_array_equal(result.faces, faces)
     assert_array_equal(result.face_map, np.arange(1, M + 1))
-
-
-def test_a_duplicate_face_of_opposite_orientation_is_removed():
-    vertices, faces = SPHERE
-    result = repaired(vertices, np.append(faces, faces[7:8, ::-1], axis=0))
-    assert_array_equal(result.faces, faces)
-
-
-def test_both_faces_of_a_wall_between_two_bodies_are_removed():
-    vertices, faces = CUBE
-    result = repaired(*together(CUBE, (vertices + [1.0, 0.0, 0.0], faces)))
-    assert result.steps == ("remove 4 duplicate faces, 4 of them inner walls",)
-    assert signed_volume(result.vertices, result.faces) == pytest.approx(2.0)
-    assert result.report.n_components == 1
 
 
 def test_a_vertex_with_nan_coordinates_is_removed_and_the_hole_filled():
@@ -149,15 +128,6 @@ def test_the_minority_of_inconsistently_oriented_faces_is_flipped():
     most = repaired(vertices, np.where(some[:, None], faces, faces[:, [0, 2, 1]]))
     assert_array_equal(most.faces, faces)
     assert most.steps[1] == f"flip 1 inside-out component ({M} faces)"
-
-
-def test_an_outward_shell_within_a_body_becomes_a_cavity():
-    vertices, faces = SPHERE
-    result = repaired(*together(SPHERE, (0.5 * vertices, faces)))
-    assert result.steps == (f"flip 1 inside-out component ({M} faces)",)
-    assert signed_volume(result.vertices, result.faces) == pytest.approx(
-        signed_volume(*SPHERE) * (1.0 - 0.5**3)
-    )
 
 
 def test_a_cavity_in_a_body_with_a_hole_stays_a_cavity():
@@ -192,17 +162,6 @@ def test_touching_bodies_are_separated_without_moving_vertices(shift, step):
             result.vertices[np.unique(body)], np.searchsorted(np.unique(body), body)
         ).is_closed
         assert signed_volume(result.vertices, body) == pytest.approx(1.0)
-
-
-def test_touching_holes_are_filled_without_copying_vertices():
-    vertices, faces = SPHERE
-    at = np.flatnonzero((faces == 2).any(axis=1))
-    pair = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
-    assert len(pair) > 0
-    result = repaired(vertices, np.delete(faces, [at[0], pair[0]], axis=0))
-    assert result.steps == ("fill 2 holes of 3 edges with 2 triangles",)
-    assert len(result.vertices) == N
-    assert signed_volume(result.vertices, result.faces) == pytest.approx(signed_volume(*SPHERE))
 
 
 def test_a_hole_larger_than_largest_hole_remains_open():
@@ -282,13 +241,6 @@ def test_a_crack_is_closed_by_splitting_the_face_with_vertices_on_its_edge(n_on_
     assert signed_volume(result.vertices, result.faces) == pytest.approx(1.0, rel=1e-12)
 
 
-def test_two_lids_over_the_same_corners_do_not_share_a_diagonal():
-    vertices, faces = SOLIDS["octahedron"]
-    flat = vertices * [0.2, 1.0, 1.0]  # so that the short diagonal is best for both lids
-    result = repaired(flat, faces[[2, 3, 4, 5]])
-    assert result.steps == ("fill 2 holes of 4 edges with 4 triangles",)
-
-
 def test_edges_that_need_guessing_remain_in_the_report():
     vertices, faces = SPHERE
     fin = np.append(faces, [[faces[0, 0], faces[0, 1], N]], axis=0)
@@ -298,22 +250,6 @@ def test_edges_that_need_guessing_remain_in_the_report():
     assert result.report.ok
     assert not result.report.is_closed
     assert len(Mesh(result.vertices, result.faces).borders) == 1
-
-
-def test_a_moebius_strip_cannot_be_oriented():
-    k = np.arange(12)
-    a, t = 2 * np.pi * k / 12, np.pi * k / 12
-    r = np.stack([1 - 0.3 * np.cos(t), 1 + 0.3 * np.cos(t)], axis=1)
-    z = np.stack([-0.3 * np.sin(t), 0.3 * np.sin(t)], axis=1)
-    vertices = np.stack([r * np.cos(a)[:, None], r * np.sin(a)[:, None], z], axis=-1).reshape(-1, 3)
-    here, there = 2 * k, 2 * (k + 1)
-    one, two = np.where(k < 11, there, 1), np.where(k < 11, there + 1, 0)
-    faces = np.concatenate([np.stack([here, here + 1, one], 1), np.stack([here + 1, two, one], 1)])
-    result = repair(vertices, faces)
-    assert result.steps == ()
-    assert result.report.count(Kind.ONE_SIDED) == result.report.count(Kind.HOLE) == 1
-    assert result.report.ok
-    assert not result.report.is_closed
 
 
 @pytest.mark.parametrize(

@@ -166,16 +166,3 @@ def test_a_neck_is_one_if_it_is_sharp_and_its_limb_protrudes():
     assert found(2.51, 0.0999)
     assert not found(2.49, 0.0999)
     assert not found(2.51, 0.1001)
-
-
-def test_the_spread_of_a_ring_is_its_radius():
-    mesh = Mesh(*icosphere(4))
-    _, surface = coarsen(mesh, 10**6, np.random.default_rng(0))
-    ring = np.flatnonzero(np.abs(surface.vertices[:, 2]) < 1e-9)
-    assert limbs_module._spread(surface, ring) == pytest.approx(1.0, abs=1e-6)
-    assert limbs_module._spread(surface, ring[:0]) == 0.0
-    away = limbs_module._distance(surface, surface.vertices[:, 2] > 0.0, 0.4)
-    latitude = np.abs(np.arcsin(surface.vertices[:, 2].clip(-1, 1)))
-    near = latitude < 0.35
-    assert (np.abs(away[near] - latitude[near] + 0.1) < 0.12).all()  # from two rings on, on a side
-    assert np.isinf(away[latitude > 0.65]).all()

@@ -35,12 +35,6 @@ def test_any_surface_is_segmented_into_connected_regions(name):
             assert pieces(mesh, regions.members(r)) == 1 or regions.n_regions < components
 
 
-@pytest.mark.parametrize("n_regions", [2, 4])
-def test_the_regions_of_a_plate_are_of_similar_area(n_regions):
-    labels = segment(Mesh(*plate(24, 24)), n_regions).labels
-    assert np.bincount(labels).min() > 0.7 * len(labels) / n_regions
-
-
 def test_weights_fade_at_the_border_of_a_region_and_not_at_that_of_the_mesh():
     mesh = Mesh(*plate(20, 8, 20.0, 8.0))
     x, y, _ = mesh.vertices.T

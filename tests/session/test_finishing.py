@@ -245,54 +245,6 @@ def test_a_finish_fades_as_the_pose_is_bent_back_and_comes_again():
     assert difference(-1.1) > 0.9 * there
 
 
-def pulled(session: Session, vertex: int, by: float, **options: float) -> None:
-    unit = session.mesh.diagonal
-    session.pull(vertex, session.vertices[vertex] + [0.0, 0.0, by * unit], **options)
-    session.commit()
-
-
-@pytest.mark.campaign
-def test_pulls_are_finished_within_their_reach_and_add_up(tmp_path):
-    session = ready(sausage(2))
-    session.handles.remove("tip")
-    x, faces = session.mesh.vertices, session.mesh.faces
-    ends = int(x[:, 0].argmax()), int(np.abs(x - x[x[:, 0].argsort()[len(x) // 3]]).sum(1).argmin())
-    poses = []
-    for vertex, options in zip(ends, ({}, {"locality": 1.0, "radius": 0.25}), strict=True):
-        pulled(session, vertex, 0.12, **options)
-        before = session.vertices
-        solution = session.finish()
-        poses.append(session.vertices)
-        moved = np.abs(poses[-1] - before).max(axis=1) / session.mesh.diagonal
-        assert moved.max() > 1e-4
-        assert max(solution.handle_error, solution.fixed_error) < 1e-12
-        assert abs(solution.volume_change) < 1e-12
-        assert moved[ends[0]] < 1e-3
-    assert np.count_nonzero(moved < 1e-12) > len(x) // 4  # what the second pull does not reach
-    session.handles.pin(int(x[:, 2].argmax()))
-    free = np.setdiff1d(np.flatnonzero(x[:, 0] < 0.0), [*session.fixed, *session.state.handle])
-    session.set_fixed([*session.fixed, *free[:20]])  # which are fixed where they are now
-    pulled(session, ends[0], -0.05)
-    session.finish()
-    poses.append(session.vertices)
-    solution = session.solution
-    assert solution is not None
-    assert max(solution.handle_error, solution.fixed_error) < 1e-12
-    assert abs(signed_volume(poses[-1], faces) / signed_volume(x, faces) - 1.0) < 1e-12
-    save_session(tmp_path / "pulled", session)
-    loaded = load_session(tmp_path / "pulled")
-    for each in (session, loaded):
-        assert_array_equal(each.vertices, poses[2])
-        each.poses.memo.drop("path")
-        pulled(each, ends[1], 0.02)
-        each.finish()
-    assert_array_equal(loaded.vertices, session.vertices)
-    session.undo()
-    assert_array_equal(session.vertices, poses[2])
-    session.undo()
-    assert_array_equal(session.vertices, poses[1])
-
-
 @pytest.mark.parametrize(("growth", "left"), [(-0.3, 0.01), (-1.0, 0.01), (-1.5, 0.1)])
 def test_offsets_that_turn_with_their_pose_come_to_rest(growth, left):
     wanted, shift = np.zeros((1, 3)), np.ones((1, 3))

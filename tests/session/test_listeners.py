@@ -7,15 +7,6 @@ import pytest
 from vtk_segdeform.session.listeners import Change, Listeners
 
 
-def test_a_listener_removed_by_an_earlier_one_is_not_called_any_more():
-    listeners, heard = Listeners(), []
-    removers = []
-    listeners.add(lambda change: [remove() for remove in removers])
-    removers.append(listeners.add(heard.append))
-    listeners.notify(Change.POSE)
-    assert heard == []
-
-
 def test_a_listener_may_remove_itself():
     listeners, heard = Listeners(), []
 

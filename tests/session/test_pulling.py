@@ -20,7 +20,7 @@ from vtk_segdeform.errors import CageError, ConstraintError
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.mesh import Mesh, SurfacePoint
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session.pulls import can_grab, grabbed, locality_of
+from vtk_segdeform.session.pulls import can_grab, grabbed
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
@@ -101,22 +101,6 @@ def test_nothing_moves_at_the_press(before, locality):
         session.commit()
 
 
-def test_nothing_moves_at_the_press_after_loading(tmp_path):
-    session = pulled(TIP)
-    save_session(tmp_path / "pulled.segdeform", session)
-    loaded = load_session(tmp_path / "pulled.segdeform")
-    x = session.vertices
-    assert loaded.state.pulls == ("pull 1",)
-    assert vars(loaded.state.locality).keys() == vars(session.state.locality).keys()
-    assert_array_equal(loaded.vertices, session.vertices)
-    for each in (session, loaded):
-        each.poses.memo.drop("path")
-        each.pull(HIGH, x[HIGH], max_steps=8)
-        assert moved(each, x) < 1e-12
-        each.pull(HIGH, X[HIGH] + UP)
-    assert_array_equal(loaded.vertices, session.vertices)
-
-
 def test_vertices_fixed_after_a_pull_stay_where_they_are(tmp_path):
     session = ready()
     first = np.flatnonzero(X[:, 0] < -2.9)
@@ -154,30 +138,6 @@ def test_the_grabbed_vertex_follows_and_the_volume_is_exact_in_every_frame(local
     assert session.undo() == "drag pull 1"
     assert not session.history.can_undo
     assert_array_equal(session.vertices, X)
-
-
-def test_pulls_add_up_and_each_is_one_step():
-    session = pulled()
-    first = session.vertices
-    session.pull(TIP, X[TIP] + UP)
-    session.commit()
-    assert list(session.handles) == ["pull 1", "pull 2"]
-    for vertex in (HIGH, TIP):
-        assert np.linalg.norm(session.vertices[vertex] - X[vertex] - UP) < 6e-3 * D
-    session.undo()
-    assert_array_equal(session.vertices, first)
-    assert list(session.handles) == ["pull 1"]
-
-
-def test_another_vertex_radius_or_locality_begins_another_pull():
-    session = ready()
-    session.pull(HIGH, X[HIGH] + UP, max_steps=2)
-    session.pull(HIGH, X[HIGH] + 2.0 * UP, radius=0.2 * D, max_steps=2)
-    session.pull(TIP, X[TIP] + UP, max_steps=2)
-    session.commit()
-    labels = [session.undo() for _ in range(3)]
-    assert labels == ["drag pull 2", "drag pull 1", "drag pull 1"]
-    assert not session.history.can_undo
 
 
 def test_a_pulled_point_nearby_is_grabbed_again_and_farther_ones_are_carried_along():
@@ -218,23 +178,6 @@ def test_pins_stay_can_be_removed_and_three_make_the_surface_between_free():
     assert_array_equal(session.vertices, x)
     session.pull(HIGH, x[HIGH] + UP)
     assert np.isfinite(session.state.locality.reach)
-
-
-def test_a_renamed_pull_is_a_handle_like_any_other():
-    session = pulled()
-    session.handles.rename("pull 1", "nose")
-    session.pull(TIP, X[TIP] + UP, max_steps=2)
-    assert session.state.locality.reach > 4.0 * 0.15 * D  # a single point: less local
-    session.commit()
-    assert list(session.handles) == ["nose", "pull 1"]
-    up = np.eye(4)
-    up[:3, 3] = 0.5 * UP
-    session.move_handle("nose", up)
-    assert session.state.locality is None
-    assert_allclose(session.vertices[HIGH], X[HIGH] + 1.5 * UP, atol=1e-3 * D)
-    session.commit()
-    session.drag({"nose": X[[HIGH]]})
-    assert_allclose(session.vertices[HIGH], X[HIGH], atol=1e-3 * D)
 
 
 def test_a_matrix_turns_the_surface_around_the_point():
@@ -317,24 +260,6 @@ def test_a_turn_beside_an_earlier_pull_does_not_tear_the_surface(share):
     assert most_stretched() < 1.5  # it was 7.8
 
 
-@pytest.mark.parametrize("pins", [0, 2, 3])
-def test_the_default_locality_is_that_of_a_pull_in_one_call(pins):
-    session = ready()
-    for k in range(pins):
-        session.handles.pin(int(SCENE.fixed[k]))
-    assert locality_of(session.state) == {0: 0.2, 2: 0.05, 3: 0.0}[pins]
-    session.pull(HIGH, X[HIGH] + UP, max_steps=1)
-    assert session.state.locality.follows == 1.0 - locality_of(session.state)
-
-
-@pytest.mark.parametrize("locality", [0.0, 1.0])
-def test_a_local_pull_leaves_the_rest_where_it_is(locality):
-    session = pulled(shift=0.5 * UP, radius=0.12 * D, locality=locality)
-    away = np.linalg.norm(X - X[HIGH], axis=1)
-    far = np.linalg.norm(session.vertices - X, axis=1)[away > 3.0 * 0.12 * D]
-    assert (far.max() < 2e-3 * D) == (locality == 1.0)
-
-
 @pytest.mark.parametrize(
     ("scale", "shift"), [(1e-7, 0.0), (1e6, 0.0), (1.0, 1e6)], ids=["small", "large", "far"]
 )
@@ -379,26 +304,6 @@ def test_every_body_has_its_volume_in_every_frame_also_under_a_lid():
         stayed = session.vertices[right if vertex == tops[0] else ~right]
         assert np.abs(stayed - other).max() < 1e-3
     assert lids_of(mesh).has_volume
-
-
-def test_small_parts_near_the_grabbed_one_come_along():
-    ball, button = icosphere(3), icosphere(1, 0.06)
-    at = np.array([[1.0, 0.3, 0.0], [1.0, -0.3, 0.0], [-1.0, 0.0, 0.3]]) * 1.02
-    apart = [each + button[0] for each in at]
-    starts = len(ball[0]) + len(button[0]) * np.arange(3)
-    faces = [ball[1], *(button[1] + start for start in starts)]
-    session = Session(Mesh(np.concatenate([ball[0], *apart]), np.concatenate(faces)))
-    session.segment()
-    session.fit_cages()
-    x, grabbed = session.mesh.vertices, int(np.argmax(ball[0][:, 0]))
-    session.pull(grabbed, x[grabbed] + [0.6, 0.0, 0.0])
-    moved = session.vertices - x
-    for start, below in zip(starts, at, strict=True):
-        skin = np.argmin(np.linalg.norm(ball[0] - below, axis=1))
-        own = moved[start : start + len(button[0])].mean(axis=0)
-        assert_allclose(own, moved[skin], atol=0.05)
-    assert np.linalg.norm(moved[starts[0]]) > 0.1
-    assert np.linalg.norm(moved[starts[2]]) < 0.05
 
 
 def pipe(wall: float, around: int = 40, along: int = 24) -> Mesh:
@@ -509,13 +414,6 @@ def test_what_cannot_be_pulled_says_why_and_changes_nothing(wrong, says):
     assert session.state is state
 
 
-def test_a_tiny_or_a_huge_radius_is_no_error():
-    for radius in (1e-9 * D, 1e3 * D):
-        session = pulled(shift=0.2 * UP, radius=radius)
-        assert np.isfinite(session.vertices).all()
-        assert abs(session.volume_change) < 1e-13
-
-
 def test_the_locality_of_another_mesh_is_refused():
     state = pulled().state
     off = SurfacePoint.at_vertex(len(X))
@@ -526,18 +424,6 @@ def test_the_locality_of_another_mesh_is_refused():
     broken = replace(state, locality=replace(state.locality, cage_vertices=()))
     with pytest.raises(CageError):
         Session(MESH, state=broken)
-
-
-def test_in_a_live_pull_the_grabbed_vertex_keeps_to_the_pointer():
-    session = ready()
-    for share in (0.0, 0.5, 1.5, 0.5, 1.0, 1.5, 2.0):
-        to = X[HIGH] + share * UP
-        session.pull(HIGH, to, max_steps=3)
-        assert np.linalg.norm(session.vertices[HIGH] - to) < 1e-4 * D
-        assert abs(session.volume_change) < 1e-12
-    while session.refine(max_steps=3).status is Status.STEP_LIMIT:
-        pass
-    assert moved(session, pulled(shift=2.0 * UP).vertices) < 1e-4
 
 
 def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():

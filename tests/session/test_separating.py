@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import Scene, ball, bent, off_carrier, rod, tube
+from bodies import Scene, ball, bent, rod, tube
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import combined
@@ -37,18 +37,6 @@ def ends_of_sleeve(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(own & (z < 1.2)), np.flatnonzero(own & (z > 2.8))
 
 
-def test_the_sleeve_is_dragged_along_with_the_arm(scene, session):
-    for angle in range(6, 61, 6):
-        session.drag({"hand": scene.targets(angle)}, max_steps=8)
-    session.commit()
-    for _ in ("as dragged", "finished"):
-        off, gap = off_carrier(scene, session.vertices, 1, 0)
-        assert (off < 2.0 * gap + 0.05 * scene.mesh.diagonal).all()
-        assert len(session.solution.crossings()) == 0
-        session.finish()
-    assert session.regions.n_regions == 1
-
-
 def test_a_sleeve_with_handles_of_its_own_is_separated_in_the_same_step(scene, session):
     low, high = ends_of_sleeve(scene)
     session.set_fixed(np.append(scene.fixed, low))
@@ -76,28 +64,6 @@ def test_a_pose_remains_when_a_sleeve_is_separated(scene, session):
     assert_allclose(session.targets["hand"], scene.targets(40.0))
     session.undo()
     assert_array_equal(session.vertices, before)
-
-
-def test_pins_and_pulls_separate_nothing(scene, session):
-    _, high = ends_of_sleeve(scene)
-    session.handles.pin(int(high[0]))
-    session.pull(int(high[-1]), scene.mesh.vertices[high[-1]] + [0.1, 0.0, 0.0])
-    session.commit()
-    assert session.regions.n_regions == 1
-
-
-def test_the_body_inside_follows_if_only_the_sleeve_is_held(scene):
-    session, (low, high) = Session(scene.mesh), ends_of_sleeve(scene)
-    session.segment()
-    session.fit_cages()
-    session.set_fixed(low)
-    session.handles.add(high, "cuff")
-    assert session.regions.n_regions == 1
-    session.drag({"cuff": scene._replace(handle=high).targets(30.0)})
-    session.commit()
-    session.finish()
-    assert len(session.solution.crossings()) == 0
-    assert np.linalg.norm(session.vertices - scene.mesh.vertices, axis=1)[scene.handle].min() > 0.3
 
 
 def test_attachments_are_an_option_that_is_undone_and_kept_in_files(scene, session, tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import functools
 import itertools
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,7 +27,6 @@ from vtk_segdeform.session.state import Options, State
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.session.timeline import Timeline
 from vtk_segdeform.solver.solution import Status
-from vtk_segdeform.subspace.subspace import cage_subspace
 from vtk_segdeform.widgets.volume_overlay.region_volumes import RegionVolumes
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -150,19 +149,6 @@ def test_the_volume_is_exact_at_every_move_and_after_undo_and_redo():
         assert volume_error(session) < 1e-13
 
 
-def test_a_pose_is_the_product_of_its_cage_vertices_and_nothing_else():
-    session = ready()
-    solution = session.drag(SCENE.turned(50))
-    subspace = cage_subspace(SCENE.regions, SCENE.cages)
-    expected = subspace.map(np.concatenate(session.cage_vertices))
-    assert_allclose(session.vertices, expected, atol=1e-13)
-    assert solution.vertices is session.vertices
-    assert solution is session.solution
-    other = Session(SCENE.mesh, state=session.state)
-    assert_array_equal(other.vertices, session.vertices)
-    assert other.solution is None
-
-
 def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit(monkeypatch):
     monkeypatch.setattr(sizes, "SCALED_VOLUME", SCENE.mesh.n_vertices - 1)
     session, mapped = ready(), []
@@ -180,18 +166,6 @@ def test_a_drag_of_a_large_mesh_maps_it_once_a_frame_and_its_step_is_bit_for_bit
     assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
     assert session.refine(max_steps=2).steps == 2
     assert_array_equal(Session(SCENE.mesh, state=session.state).vertices, session.vertices)
-
-
-def test_after_undo_the_next_move_starts_from_the_pose_that_is_shown():
-    session = ready()
-    for degrees in (30, -30):
-        session.drag(SCENE.turned(degrees), max_steps=5)
-        session.commit()
-    session.undo()
-    fresh = Session(SCENE.mesh, state=session.state)
-    for each in (session, fresh):
-        each.drag(SCENE.turned(35), max_steps=1)
-    assert_array_equal(session.vertices, fresh.vertices)
 
 
 def test_history_holds_no_vertices_of_the_mesh():
@@ -232,21 +206,6 @@ def test_history_is_bounded_and_the_oldest_steps_go_first():
             session.history.jump(wrong)
     with pytest.raises(SessionError, match="number of steps"):
         Timeline(State(), 0)
-
-
-def test_the_oldest_state_is_named_by_the_last_step_that_was_discarded():
-    session = Session(SCENE.mesh, history=2)
-    session.set_fixed([0])
-    session.handles.add([5], "first")
-    assert session.history.labels == ("opened", "set fixed vertices", "set first")
-    session.handles.add([6], "second")
-    assert session.history.labels == ("set fixed vertices", "set first", "set second")
-    session.handles.add([7], "third")
-    assert session.history.labels == ("set first", "set second", "set third")
-    session.undo()
-    session.undo()
-    assert session.history.labels[session.history.position] == "set first"
-    assert list(session.handles) == ["first"]
 
 
 def test_there_is_nothing_to_redo_during_a_drag_which_goes_on():
@@ -339,33 +298,6 @@ def test_another_action_commits_the_drag_in_hand_first(action):
     assert snapshot(session) == dragged
 
 
-def test_a_matrix_moves_a_handle_from_where_the_drag_began():
-    session = ready()
-    turn = np.eye(4)
-    turn[:3, :3] = rotation([1, 0, 0], 0.4)
-    for matrix in (up(0.5), up(0.2), turn):
-        session.move_handle("tip", matrix, max_steps=3)
-    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
-    session.commit()
-    session.move_handle("tip", up(0.2), max_steps=3)
-    expected = VERTICES[SCENE.handle] @ turn[:3, :3].T + [0, 0, 0.2]
-    assert_allclose(session.targets["tip"], expected)
-    session.move_handle("tip", np.eye(4), max_steps=3)
-    assert_allclose(session.targets["tip"], VERTICES[SCENE.handle] @ turn[:3, :3].T)
-
-
-def test_targets_by_name_leave_the_other_handles_where_they_are():
-    session = ready()
-    session.handles.add(np.abs(X) < 0.1, "middle")
-    session.drag({"middle": session.targets["middle"] + [0, 0, 0.2]})
-    session.drag({"tip": session.targets["tip"] + [0, 0, 0.1]})
-    middle = VERTICES[np.abs(X) < 0.1]
-    assert_allclose(session.targets["middle"] - middle, [[0, 0, 0.2]] * len(middle))
-    both = np.concatenate([session.targets["tip"], session.targets["middle"]])
-    session.drag(both + [0, 0.1, 0])
-    assert_allclose(session.targets["tip"], both[: len(SCENE.handle)] + [0, 0.1, 0])
-
-
 def test_a_drag_stopped_early_is_refined_to_the_end():
     session = ready()
     for degrees in (10, 20, 25):
@@ -410,18 +342,6 @@ def test_fixed_vertices_and_handles_change_without_moving_anything():
     assert list(session.handles) == list(session.targets) == ["middle"]
     session.handles.remove("middle")
     assert not session.state.is_ready
-    assert volume_error(session) < 1e-13
-
-
-def test_a_volume_that_was_let_go_comes_back_with_the_option():
-    session = ready(preserve_volume=False)
-    session.drag(SCENE.turned(70))
-    session.commit()
-    assert volume_error(session) > 1e-4
-    loose = session.vertices
-    session.change_options(preserve_volume=True)
-    assert_array_equal(session.vertices, loose)
-    session.refine()
     assert volume_error(session) < 1e-13
 
 
@@ -474,14 +394,6 @@ def test_other_cages_are_carried_to_the_pose(by_pull):
     assert_array_equal(session.vertices, before)
     session.reset_pose()
     assert session.carried(cages) is None
-
-
-def test_flags_of_a_session_reach_its_deformer():
-    flags = {each.name: not each.default for each in fields(Options) if each.type == "bool"}
-    assert len(flags) > 2
-    session = ready(**flags)
-    held = session.poses.constrained(session.state)._options
-    assert {name: getattr(held, name) for name in flags} == flags
 
 
 def test_options_of_fitting_need_no_new_binding_and_others_do():
@@ -569,16 +481,6 @@ def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
     assert session.cages == ()
 
 
-def test_other_cages_put_the_pose_to_rest():
-    session = ready()
-    session.move_handle("tip", up(0.2), max_steps=2)
-    session.set_cages([Cage(1.01 * cage.vertices, cage.faces) for cage in SCENE.cages])
-    assert session.state.pose is None
-    assert_array_equal(session.targets["tip"], VERTICES[SCENE.handle])
-    assert session.undo() == "set cages"
-    assert session.state.pose is not None
-
-
 def test_cages_are_fitted_around_painted_regions():
     session = Session(SCENE.mesh)
     session.painting.paint(1, X > -0.5)
@@ -632,15 +534,6 @@ def test_a_cage_vertex_that_goes_out_and_back_in_one_drag_leaves_everything_wher
         assert (np.abs(session.cage_vertices[1] - before[1]).max() > 1e-6) == (way > 0.0)
     for after, cage in zip(session.cage_vertices, before, strict=True):
         assert_allclose(after, cage, atol=1e-12)
-
-
-def test_two_cages_moved_in_one_drag_are_both_where_they_were_put():
-    session = ready(preserve_volume=False)
-    moved = [cage + [0.0, 0.0, 0.1 * (k + 1)] for k, cage in enumerate(session.cage_vertices)]
-    session.move_cage(0, moved[0])
-    session.move_cage(1, moved[1])
-    for after, cage in zip(session.cage_vertices, moved, strict=True):
-        assert_array_equal(after, cage)
 
 
 def test_a_cage_vertex_can_be_moved_freely_and_the_volume_stays():
@@ -722,21 +615,6 @@ def test_listeners_hear_after_the_change_in_their_order_until_they_stop():
         Change.HISTORY,
         Change.POSE | Change.HISTORY,
     ]
-
-
-def test_what_is_handed_in_can_be_written_to_afterwards():
-    session = ready()
-    ids, targets = SCENE.handle[:5].copy(), VERTICES[SCENE.handle[:5]] + [0, 0, 0.1]
-    session.handles.add(ids, "tip")
-    session.drag(targets)
-    before = snapshot(session)
-    ids[:], targets[:] = 0, 0.0
-    assert snapshot(session) == before
-    targets = VERTICES[SCENE.handle[:5]].copy()
-    session.drag({"tip": targets})
-    before = snapshot(session)
-    targets[:] = 0.0
-    assert snapshot(session) == before
 
 
 NEAR = VERTICES[SCENE.handle]
@@ -934,19 +812,6 @@ def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
     assert session.region_names == ("region 1", "arm", "region 3", "leg")
     session.segment(2)  # other regions
     assert session.region_names == ("region 1", "region 2")
-
-
-def test_errors_and_steps_call_a_region_by_its_name():
-    session = ready()
-    session.painting.rename(0, "tail")
-    with pytest.raises(RegionError, match="are only in tail; add"):
-        session.painting.paint(0, X < -2.0, subtract=True)
-    with pytest.raises(RegionError, match="tail cannot be split"):
-        session.painting.split(0, X < 9.0)
-    with pytest.raises(CageError, match=r"tail .*outside the cage"):
-        session.set_cages([Cage(*icosphere(1))] * 2)
-    session.painting.split(0)
-    assert session.history.undo_label == "split tail"
 
 
 def test_halves_of_a_region_are_connected_overlap_and_cover_it():

@@ -49,34 +49,6 @@ def test_a_slider_is_one_undo_step_and_exact_in_every_move():
     assert session.options.volumes == (("whole", "81%"),)
 
 
-def test_a_slider_that_is_cancelled_changes_nothing():
-    session = SCENE.session()
-    turned(session)
-    before = session.vertices.copy()
-    session.set_volume("whole", "70%")
-    session.revert()
-    assert_array_equal(session.vertices, before)
-    assert session.options.volumes == ()
-
-
-def test_a_handle_that_is_dragged_later_keeps_the_volume_that_was_set():
-    session = SCENE.session()
-    session.set_volume("whole", "+20%")
-    session.commit()
-    turned(session)
-    assert_allclose(share(session), 1.2, rtol=EXACT)
-    session.refine()
-    assert_allclose(share(session), 1.2, rtol=EXACT)
-    turned(session, 50.0)
-    assert_allclose(share(session), 1.2, rtol=EXACT)
-    session.pull(int(session.mesh.vertices[:, 1].argmax()), [0.0, 1.4, 0.1])
-    session.commit()
-    assert_allclose(share(session), 1.2, rtol=EXACT)
-    session.set_volume("whole", "keep")
-    session.commit()
-    assert_allclose(share(session), 1.0, rtol=EXACT)
-
-
 @pytest.mark.parametrize("goal", ["85%", "at most 85%", "free"])
 def test_a_volume_is_set_in_a_finished_pose(goal):
     session = SCENE.session()
@@ -134,23 +106,6 @@ def test_resetting_the_pose_forgets_the_goals_and_undo_brings_them_back():
     session.history.undo()
     assert_array_equal(session.vertices, small)
     assert session.options.volumes == (("whole", "-15%"),)
-
-
-def test_a_session_is_saved_with_its_goals_and_continues_alike(tmp_path):
-    session = SCENE.session()
-    session.set_volume("whole", "-15%")
-    session.set_volume("region 0", "at least 0.1")
-    session.commit()
-    turned(session)
-    save_session(tmp_path / "a.segdeform", session)
-    again = load_session(tmp_path / "a.segdeform")
-    assert again.options == session.options
-    assert again.options.volumes == (("whole", "-15%"), ("region 0", "at least 0.1"))
-    assert_array_equal(again.vertices, session.vertices)
-    for each in (session, again):
-        turned(each, 50.0)
-    assert_allclose(again.vertices, session.vertices, atol=1e-5)  # one has an accelerated start
-    assert_allclose(share(again), 0.85, rtol=EXACT)
 
 
 def test_a_pull_whose_volumes_changed_is_saved_and_continues_alike(tmp_path):
@@ -249,14 +204,6 @@ def test_what_is_wrong_is_refused_and_changes_nothing(name, goal, says):
 def test_options_take_goals_only(volumes):
     with pytest.raises(SessionError, match="volumes must be goals by name"):
         Options(volumes=volumes)
-
-
-def test_options_with_goals_are_hashable_and_a_copy():
-    goals = {"whole": "90%"}
-    options = Options(volumes=goals)
-    goals["whole"] = "50%"
-    assert options == Options(volumes=(("whole", "90%"),))
-    assert len({options, Options(volumes={"whole": "90%"})}) == 1
 
 
 def test_a_pull_after_goals_were_given_as_options_starts_from_these_volumes():

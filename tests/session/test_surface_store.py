@@ -138,14 +138,6 @@ def test_only_sessions_that_earlier_programs_can_read_have_version_1(tmp_path):
         assert again.options == session.options
 
 
-def test_without_the_surface_a_file_has_the_mesh_alone(tmp_path):
-    session = Session(Surface(tube()))
-    save_session(tmp_path / "a.segdeform", session, surface=False)
-    loaded = load_session(tmp_path / "a.segdeform")
-    assert loaded.surface is None
-    assert_array_equal(loaded.mesh.vertices, session.mesh.vertices)
-
-
 SMALL = Session(Surface(tube(8, 4)))
 P, N = SMALL.surface.given.n_points, SMALL.mesh.n_vertices
 HUGE = 1 << 61

@@ -36,14 +36,6 @@ def test_a_linear_map_of_n_unknowns_is_solved_in_n_plus_two_steps():
     assert_allclose(_steps(Anderson(N), A, b, np.zeros_like(b), N + 2), b, atol=1e-9)
 
 
-def test_after_forget_the_next_step_is_the_plain_one():
-    A, b = _problem()
-    anderson = Anderson(N)
-    p = _steps(anderson, A, b, np.zeros_like(b), N)
-    anderson.forget()
-    assert_allclose(_steps(anderson, A, b, p, 1), p + 0.5 * A @ (b - p))
-
-
 @pytest.mark.parametrize("window", [1, 2])
 def test_a_step_combines_the_last_ones_so_that_their_residuals_cancel_best(window):
     """In the form with weights of sum 1, the residuals measured in a norm of their own."""

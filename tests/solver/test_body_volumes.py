@@ -21,11 +21,6 @@ def constraints_of(mesh: Mesh, moved=()):
     return bodies.constraints(bodies.numbers(np.array(moved, dtype=np.int64)))
 
 
-def test_one_body_has_the_constraint_of_the_whole():
-    bodies = Bodies(BAR, whole := total_volume(BAR), lids_of(BAR))
-    assert bodies.constraints(bodies.numbers(np.arange(1))) == (whole,)
-
-
 @pytest.mark.parametrize("count", [2, 6, 9])
 def test_the_volumes_of_all_bodies_add_up_to_the_whole(count):
     mesh = joined(*((BALL, 3.0 * k, 1.0 + 0.1 * k, 1) for k in range(count)))

@@ -6,17 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from campaign import every
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from open_meshes import bottle
 from scenes import sausage
-from scipy.spatial.transform import Rotation
 
-from vtk_segdeform import models, sizes
+from vtk_segdeform import sizes
 from vtk_segdeform.geometry import voronoi_cells
-from vtk_segdeform.regions.coarse import coarsen
 from vtk_segdeform.solver.coarse_volume import CoarseVolume, _matrix, _over_cells
-from vtk_segdeform.solver.solution import Status
 from vtk_segdeform.solver.volume_constraints import region_volumes, total_volume
 from vtk_segdeform.subspace.subspace import cage_subspace
 
@@ -115,60 +111,6 @@ def test_the_hessian_is_the_derivative_of_the_gradient(monkeypatch, constraints,
     exact = 0.5 * (pull(p + dp) - pull(p - dp))  # quadratic: no approximation
     guess = hessian_product(volumes, p, multipliers, dp)
     assert np.linalg.norm(guess - exact) < error * np.linalg.norm(exact)
-
-
-@pytest.mark.campaign
-def test_with_the_hessian_of_the_volume_a_pulled_body_takes_fewer_steps():
-    scene, steps, poses = sausage(2), [], []
-    for has_hessian in (True, False):
-        deformer = scene.deformer()
-        if not has_hessian:
-            own = deformer._constraints
-            volumes = replace(deformer.step_volumes, hessian=None)
-            deformer._hold(replace(own, solver=replace(own.solver, volumes=volumes)))
-        at_rest, way = scene.mesh.vertices[deformer.handle], [0.18, 0.0, 0.0]
-        solutions = [deformer.solve(at_rest + k * np.array(way)) for k in range(1, 7)]
-        steps.append(sum(solution.steps for solution in solutions))
-        assert solutions[-2].status is Status.CONVERGED
-        poses.append(solutions[-2].vertices)  # the last one may hit the step limit
-    assert steps[0] < 0.4 * steps[1]
-    assert_allclose(poses[0], poses[1], atol=1e-4 * scene.mesh.diagonal)
-
-
-@pytest.mark.usefixtures("coarse")
-def test_the_coarse_surface_of_a_closed_mesh_is_closed():
-    # A closed surface has the same volume about any origin.
-    held = region_volumes(SCENE.mesh, SCENE.regions.labels)
-    volumes = CoarseVolume.of(SCENE.mesh, SUBSPACE).volumes(held, SCENE.mesh.vertices)
-    x = volumes.surface.map(P0)
-    for each in volumes.constraints:
-        assert_allclose(each.violation(x + [3.0, -2.0, 5.0]), 0.0, atol=1e-11)
-
-
-@pytest.mark.parametrize("option", every(2, ["preserve_region_volumes", "preserve_volume"]))
-def test_the_pose_is_near_that_with_the_whole_mesh_and_its_volume_exact(monkeypatch, option):
-    scene = sausage(3, is_coarse=True)
-    targets = scene.turned(40)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 250)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 175)
-    rough = scene.deformer(**{option: True}).solve(targets)
-    monkeypatch.setattr(sizes, "COARSE_VOLUME", 10**9)
-    fine = scene.deformer(**{option: True}).solve(targets)
-    assert abs(rough.volume_change) < 1e-13
-    if option == "preserve_region_volumes":
-        assert np.abs(rough.region_volume_change).max() < 1e-12
-    away = np.linalg.norm(rough.vertices - fine.vertices, axis=1).max()
-    assert 0.0 < away < 3e-3 * scene.mesh.diagonal
-
-
-def test_cells_are_the_same_in_every_frame_even_at_equal_distances():
-    mesh = models.bar(divisions=(8, 8, 30))
-    cells, _ = coarsen(mesh, 300, np.random.default_rng(0))
-    for seed in range(3):
-        turn = Rotation.random(random_state=seed).as_matrix()
-        turned = mesh.with_vertices(3.7 * mesh.vertices @ turn.T + [1.0, -2.0, 5.0])
-        again, _ = coarsen(turned, 300, np.random.default_rng(0))
-        assert_array_equal(again, cells)
 
 
 @pytest.mark.parametrize("per_region", [False, True])

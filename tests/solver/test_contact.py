@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenes import sausage
 from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
@@ -127,15 +126,6 @@ def test_on_a_way_into_contact_no_pair_is_missed(fork, through, compiled, monkey
     assert 2 <= len(lists) <= 20
     assert values[0] == 0.0
     assert values[-1] > 0.0
-
-
-def test_far_from_contact_no_bit_changes():
-    scene = sausage(2, is_coarse=True)
-    free, avoiding = scene.deformer(), scene.deformer(avoid_contact=True)
-    targets = scene.mesh.vertices[scene.handle] + [0.0, 0.0, 0.01]
-    assert avoiding._constraints.contact.surface.spacing < 0.2
-    expected, solution = free.solve(targets), avoiding.solve(targets)
-    assert np.array_equal(solution.vertices, expected.vertices)
 
 
 def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thin_part():

@@ -26,7 +26,6 @@ from vtk_segdeform.subspace.gpu import GPUError, GPUSurface
 
 SCENE = sausage(2, is_coarse=True)
 TARGETS = SCENE.turned(40)
-VOLUME = signed_volume(SCENE.mesh.vertices, SCENE.mesh.faces)
 
 
 @pytest.mark.parametrize("missing", [-0.3, -1e-5, 1e-9, 0.4])

@@ -97,17 +97,6 @@ def test_a_turn_by_more_than_60_degrees_begins_a_new_way(degrees, count):
     assert way.ends[-2].targets[0, 0] == 5e-3
 
 
-def test_as_many_ends_are_kept_as_the_highest_degree_needs():
-    """Four determine a cubic, and a fifth tells whether it would have been right."""
-    assert len(along(1e-3 * np.arange(9), 3).ends) == 5
-
-
-def test_the_start_has_the_directions_of_the_last_end():
-    z = (np.ones((5, 3)), np.zeros((5, 3)))
-    way = along([0.0, 1e-3], 1).on_to(End(path(2e-3, 1), PLACES + [2e-3, 0.0, 0.0], z))
-    assert way.ahead(PLACES + [3e-3, 0.0, 0.0])[1] is z
-
-
 def test_targets_that_do_not_move_or_move_aside_have_no_start():
     way = along([0.0, 1e-3, 2e-3], 1)
     assert way.ahead(PLACES + [2e-3, 0.0, 0.0]) is None

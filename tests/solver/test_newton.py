@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.solver import Anderson, Status, Step, constrained_step, minimise
 
 N = 6
@@ -98,13 +97,6 @@ def test_an_accelerated_step_that_is_not_allowed_is_not_taken():
     assert limited.merits[-1] < 1e-3 * limited.merits[0]
 
 
-def test_a_step_that_is_too_long_is_halved():
-    problem = bowl()
-    problem.H = problem.A / 3.0  # three times too long
-    end = solved(problem, max_steps=1)
-    assert_allclose(end.pose.at, 1.5 * problem.goal)
-
-
 def test_another_matrix_is_tried_where_no_share_of_a_step_helps():
     problem = bowl()
     problem.H, problem.others = -problem.A, [-problem.A, problem.A]
@@ -151,14 +143,6 @@ def test_it_takes_at_most_so_many_steps_and_reports_each(most):
     assert end.step is None  # from the end no step was computed
     solved(bowl(), max_steps=1, progress=progress)
     assert told[-1] == (0.0, "solving")
-
-
-def test_progress_cancels_it():
-    def cancel(*_):
-        raise Cancelled
-
-    with pytest.raises(Cancelled):
-        solved(bowl(), progress=cancel)
 
 
 def test_the_constrained_step_is_that_of_the_dense_equations():

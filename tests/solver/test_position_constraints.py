@@ -14,7 +14,6 @@ from vtk_segdeform.solver.position_constraints import (
     Anchors,
     PositionTerm,
     connected_sets,
-    errors_at,
     position_term,
 )
 from vtk_segdeform.subspace import cage_subspace
@@ -49,14 +48,6 @@ def test_many_vertices_of_a_set_are_equivalent_to_few_rows():
     value, slope = few.value_and_slope(p)
     assert value == pytest.approx((term.weights * np.square(away).sum(axis=1)).sum(), rel=1e-13)
     assert_allclose(slope, rows.T @ (term.weights[:, None] * away), rtol=1e-11, atol=1e-10)
-
-
-def test_errors_are_the_largest_distances_in_units():
-    x = np.arange(12.0).reshape(4, 3)
-    lists = [np.array([3, 0]), np.array([1, 2]), np.zeros(0, dtype=int)]
-    off = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, -4.0]])
-    places = [x[lists[0]] + off, x[lists[1]] - 0.1 * off, np.empty((0, 3))]
-    assert_allclose(errors_at(lists, places, 2.0, x), [2.5, 0.25, 0.0])
 
 
 def test_sets_are_vertices_joined_by_edges_among_themselves():

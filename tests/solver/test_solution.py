@@ -55,13 +55,6 @@ def test_errors_are_those_of_its_vertices_each_computed_once():
     assert one.volume.calls == [()]
 
 
-def test_its_arrays_cannot_be_changed():
-    one = solution(unfinished=X + 1.0)
-    arrays = [one.vertices, one.cage_vertices[0], one.unfinished, one.unmoved]
-    arrays += [one.region_volume_change, one.crossings(), one.folds()]
-    assert not any(each.flags.writeable for each in arrays)
-
-
 def test_it_is_finished_if_it_has_the_mesh_before_its_finish():
     assert not solution().is_finished
     assert solution(unfinished=X).is_finished

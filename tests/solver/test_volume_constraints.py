@@ -92,11 +92,6 @@ def test_the_hessian_is_the_derivative_of_the_gradient():
         assert_allclose(product, exact, atol=1e-12)
 
 
-def test_one_region_has_the_volume_of_the_mesh():
-    (constraint,) = region_volumes(MESH, np.zeros(MESH.n_vertices, dtype=int))
-    assert_allclose(constraint.target, total_volume(MESH).target, rtol=1e-14)
-
-
 @pytest.mark.parametrize(("held", "size"), [(1.0, 1.0), (1e-13, 1.0), (1.0, 1e-4)])
 def test_steps_to_volume_meet_every_constraint(held, size):
     mesh = MESH.with_vertices(size * MESH.vertices)
@@ -158,21 +153,6 @@ def test_an_open_box_has_the_volume_of_the_box():
     assert_allclose(total_volume(wide).target, 6.0 * area, rtol=1e-13)
 
 
-def test_the_volume_of_a_bent_open_box_is_that_under_a_fan_over_its_rim():
-    mesh = open_box(2)
-    x = mesh.vertices + shaken(mesh)
-    rim = mesh.borders[0]
-    closed = Mesh(
-        np.vstack([x, x[rim].mean(axis=0)]),
-        np.vstack(
-            [mesh.faces, [[b, a, len(x)] for a, b in zip(rim, np.roll(rim, -1), strict=True)]]
-        ),
-    )
-    volume = total_volume(mesh)
-    expected = signed_volume(closed.vertices, closed.faces)
-    assert_allclose(volume.violation(x) + volume.target, expected, rtol=1e-14)
-
-
 @pytest.mark.parametrize("name", OPEN)
 def test_region_volumes_of_open_meshes_add_up_to_the_whole(name):
     mesh = OPEN[name]()
@@ -189,16 +169,6 @@ def test_volumes_of_open_meshes_do_not_change_under_a_motion(name):
     moved = mesh.vertices @ rotation([1, 2, 3], 2.0).T + [50.0, -20.0, 3.0]
     for constraint in constraints_of(mesh):
         assert abs(constraint.violation(moved)) < 1e-12 * total_volume(mesh).target
-
-
-def test_volumes_of_open_meshes_keep_their_digits_far_from_the_origin():
-    mesh = OPEN["bottle"]()
-    mesh = mesh.with_vertices(np.round(mesh.vertices * 2.0**28) / 2.0**28)
-    bent = np.round((mesh.vertices + shaken(mesh)) * 2.0**28) / 2.0**28
-    far = np.array([2.0**22, -(2.0**21), 2.0**22])
-    expected = [each.relative(bent) for each in constraints_of(mesh)]
-    moved = constraints_of(mesh.with_vertices(mesh.vertices + far))
-    assert_allclose([each.relative(bent + far) for each in moved], expected, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", OPEN)

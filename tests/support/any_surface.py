@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 import pyvista as pv
-from solids import OCTAHEDRON, icosphere, torus
-from zoo import Soup, body, cells, flipped, joined, klein, moebius, moved, soup_of, with_face
+from solids import OCTAHEDRON, icosphere, joined, torus
+from zoo import Soup, body, cells, flipped, klein, moebius, moved, soup_of, with_face
 
 from vtk_segdeform.io.polygons import polydata_of, triangles_of
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import solids
 from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
-from solids import icosphere
 
 from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray
 from vtk_segdeform.mesh import Mesh, normals
@@ -75,11 +75,9 @@ def tube(inner: float, outer: float, low: float, high: float, *, n=24, step=0.1)
     return revolved(corners, n, step)
 
 
-def joined(*solids: Solid) -> Mesh:
+def joined(*parts: Solid) -> Mesh:
     """Return one mesh of all; their components have their numbers."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in solids)])
-    faces = [own + start for (_, own), start in zip(solids, starts, strict=False)]
-    return Mesh(np.concatenate([vertices for vertices, _ in solids]), np.concatenate(faces))
+    return Mesh(*solids.joined(*parts))
 
 
 def bent(carrier: Solid, *others: Solid, follows: dict[int, int] | None = None) -> Scene:
@@ -136,7 +134,7 @@ def _shell(body: Mesh, mask: BoolArray, gap: float, thickness: float) -> Solid:
 
 def ball(radius: float, centre: Sequence[float], subdivisions: int = 2) -> Solid:
     """Return a sphere."""
-    vertices, faces = icosphere(subdivisions, radius)
+    vertices, faces = solids.icosphere(subdivisions, radius)
     return vertices + centre, faces
 
 

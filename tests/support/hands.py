@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
 from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
@@ -60,6 +61,28 @@ def plain_view(size: tuple[int, int] = (400, 400), *, is_own: bool = False) -> V
     if not is_own:
         _in_use.append((window, interactor))
     return View(renderer, interactor)
+
+
+def look_along_y(view: View) -> None:
+    """Show all that is in *view*, z up; a unit sphere is seen as `Painter` expects."""
+    view.camera.SetPosition(0.0, -4.0, 0.0)
+    view.camera.SetViewUp(0.0, 0.0, 1.0)
+    view.renderer.ResetCamera()
+    view.render()
+
+
+class Painter:
+    """What desks share whose `selector` paints a unit sphere with their `hand`."""
+
+    @property
+    def colours(self) -> np.ndarray:
+        """(n, 3) uint8: the colours of the vertices."""
+        shown = self.selector.surface.polydata.GetPointData().GetScalars()
+        return np.array(vtk_to_numpy(shown))
+
+    def under(self, x: float, z: float) -> tuple[float, float]:
+        """Return the pixel of the point (x, y, z) on the near side of the sphere."""
+        return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
 
 
 def draw_seldom(view: View) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from solids import joined
 
 from vtk_segdeform import models
 from vtk_segdeform.mesh.mesh import Mesh
@@ -72,16 +73,12 @@ def with_walls(mesh: Mesh, *heights: float) -> Mesh:
 
 def together(*meshes: Mesh) -> Mesh:
     """Return all meshes as one."""
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
+    return Mesh(*joined(*((mesh.vertices, mesh.faces) for mesh in meshes)))
 
 
 def combined(*meshes: Mesh) -> Mesh:
     """Return all meshes as one, with those in others turned inward, as cavities."""
-    starts = np.cumsum([0, *(mesh.n_vertices for mesh in meshes)])
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return mesh_of(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces)).mesh
+    return mesh_of(*joined(*((mesh.vertices, mesh.faces) for mesh in meshes))).mesh
 
 
 def open_box(n: int = 6) -> Mesh:

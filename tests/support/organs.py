@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista as pv
+from bodies import revolved, tube
 from open_meshes import combined
 
 from vtk_segdeform.geometry import signed_volume
@@ -39,31 +40,6 @@ def nearest_labels(seed: int, size: int, count: int | None = None) -> np.ndarray
     return np.where(np.linalg.norm(places, axis=-1) < 0.42, labels, 0)
 
 
-def revolved(profile: FloatArray, around: int) -> Mesh:
-    """Return the closed surface of the *profile* (k, 2), of radii and heights, about the z axis.
-
-    Its first and its last point are on the axis, with the body to its left.
-    """
-    angle = 2.0 * np.pi * np.arange(around) / around
-    r, z = profile[1:-1].T
-    rings = np.stack(
-        [np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.tile(z[:, None], around)], -1
-    )
-    number = np.arange(len(r) * around).reshape(len(r), around)
-    a, b = number[:-1], np.roll(number[:-1], -1, axis=1)
-    c, d = np.roll(number[1:], -1, axis=1), number[1:]
-    first, last = len(r) * around, len(r) * around + 1
-    bottom, top = number[0], number[-1]
-    faces = [
-        np.stack([a, b, c], -1).reshape(-1, 3),
-        np.stack([a, c, d], -1).reshape(-1, 3),
-        np.stack([np.full(around, first), np.roll(bottom, -1), bottom], -1),
-        np.stack([np.full(around, last), top, np.roll(top, -1)], -1),
-    ]
-    ends = [[0.0, 0.0, profile[0, 1]], [0.0, 0.0, profile[-1, 1]]]
-    return Mesh(np.concatenate([rings.reshape(-1, 3), ends]), np.concatenate(faces))
-
-
 def ventricle(around: int = 48) -> tuple[Mesh, np.ndarray]:
     """Return the ventricle of Land et al. 2015 at rest, in mm, and a mask of its endocardium.
 
@@ -77,32 +53,16 @@ def ventricle(around: int = 48) -> tuple[Mesh, np.ndarray]:
     outer, inner = ellipse(10.0, 20.0, around // 2), ellipse(7.0, 17.0, around // 2)
     outer[0, 0] = inner[0, 0] = 0.0
     middle = (outer[-1:] + inner[-1:]) / 2.0
-    mesh = revolved(np.concatenate([outer, middle, inner[::-1]]), around)
+    profile = np.concatenate([outer, middle, inner[::-1]])
+    mesh = Mesh(*revolved(profile, around, np.inf))
     r, z = np.hypot(*mesh.vertices[:, :2].T), mesh.vertices[:, 2]
     return mesh, np.abs((r / 7.0) ** 2 + (z / 17.0) ** 2 - 1.0) < 1e-9
 
 
-def tubes(around: int = 16, along: int = 24) -> Mesh:
+def tubes() -> Mesh:
     """Return a tube of 2 x 8 with a wall, in which there is another one, with a wall of its own."""
-
-    def tube(outer: float, inner: float) -> Mesh:
-        z = np.linspace(-4.0, 4.0, along + 1)
-        edges = np.concatenate(
-            [np.c_[np.full(along + 1, outer), z], np.c_[np.full(along + 1, inner), z[::-1]]]
-        )
-        angle = 2.0 * np.pi * np.arange(around) / around
-        r, z = edges.T
-        x = np.stack(
-            [np.outer(r, np.cos(angle)), np.outer(r, np.sin(angle)), np.tile(z[:, None], around)],
-            -1,
-        )
-        number = np.arange(len(r) * around).reshape(len(r), around)
-        below, above = number, np.roll(number, -1, axis=0)
-        a, b, c, d = below, np.roll(below, -1, 1), np.roll(above, -1, 1), above
-        faces = [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
-        return Mesh(x.reshape(-1, 3), np.concatenate(faces))
-
-    return combined(tube(1.0, 0.8), tube(0.6, 0.4))
+    walls = (tube(inner, inner + 0.2, -4.0, 4.0, n=16, step=1 / 3) for inner in (0.8, 0.4))
+    return combined(*(Mesh(*wall) for wall in walls))
 
 
 def organs(seed: int = 4, size: int = 16, count: int = 3) -> Mesh:

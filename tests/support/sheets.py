@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from solids import icosphere
+from solids import icosphere, joined
 
 from vtk_segdeform.mesh.mesh import Mesh
 
@@ -29,13 +29,6 @@ def welded(vertices, faces):
     rounded = np.round(vertices[faces.ravel()], 9) + 0.0
     points, number = np.unique(rounded, axis=0, return_inverse=True)
     return points, number.reshape(-1, 3)
-
-
-def joined(*parts):
-    """Return several surfaces as one."""
-    starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
-    faces = [f + start for (_, f), start in zip(parts, starts, strict=False)]
-    return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces)
 
 
 def tube(around=24, along=20, radius=0.3, length=2.0):

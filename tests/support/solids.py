@@ -105,11 +105,15 @@ def exact_volume_change(before: np.ndarray, after: np.ndarray, faces: np.ndarray
     return float(Fraction(six_volumes(after) - rest, rest))
 
 
+def joined(*solids):
+    """Return several surfaces as one."""
+    starts = np.cumsum([0] + [len(vertices) for vertices, _ in solids])
+    faces = [f + start for (_, f), start in zip(solids, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in solids]), np.concatenate(faces)
+
+
 def together(*solids):
-    """Return solids as one, coincident vertices merged."""
-    starts = np.cumsum([0] + [len(v) for v, _ in solids])
-    faces = np.concatenate([f + start for (_, f), start in zip(solids, starts, strict=False)])
-    vertices, number = np.unique(
-        np.concatenate([v for v, _ in solids]), axis=0, return_inverse=True
-    )
+    """Return several surfaces as one, coincident vertices merged."""
+    vertices, faces = joined(*solids)
+    vertices, number = np.unique(vertices, axis=0, return_inverse=True)
     return vertices, number.reshape(-1)[faces]

@@ -7,11 +7,8 @@ of our errors that names it; it never crashes the process, hangs, or exhausts th
 
 from __future__ import annotations
 
-import base64
-import json
 import os
 import re
-import struct
 import subprocess
 import sys
 from collections import Counter
@@ -21,7 +18,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from given_surfaces import save_raw
-from gltf_files import glb, octahedron
+from gltf_files import octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
 
@@ -157,79 +154,6 @@ def damaged(data, rng):
     return bytes(data)
 
 
-def entries(value):
-    """Yield (container, key) of every entry in a JSON value."""
-    if isinstance(value, dict | list):
-        for key in list(value) if isinstance(value, dict) else range(len(value)):
-            yield value, key
-            yield from entries(value[key])
-
-
-JSON_VALUES = [
-    0,
-    1,
-    -1,
-    2,
-    3,
-    5,
-    7,
-    255,
-    2**31,
-    2**32,
-    2**53,
-    2**63,
-    1.5,
-    -0.0,
-    1e308,
-    float("nan"),
-    True,
-    None,
-    "",
-    "x",
-    [],
-    {},
-    [0],
-    [[0]],
-    [0, 0],
-    {"0": 0},
-    "VEC3",
-    "../a",
-    "POSITION",
-]
-
-
-def damaged_json(head, rng):
-    """Return a JSON document with a value replaced, moved, removed or duplicated."""
-    head = json.loads(json.dumps(head))
-    found = list(entries(head))
-    container, key = found[int(rng.integers(len(found)))]
-    other, there = found[int(rng.integers(len(found)))]
-    kind = int(rng.integers(5))
-    if kind <= 1:
-        container[key] = JSON_VALUES[int(rng.integers(len(JSON_VALUES)))]
-    elif kind == 2:
-        del container[key]
-    elif kind == 3:  # a copy of another value
-        container[key] = json.loads(json.dumps(other[there]))
-    elif isinstance(container, list):
-        container.append(json.loads(json.dumps(container[key])))
-    else:
-        container[str(there)] = container[key]
-    return head
-
-
-def save_document(path, document):
-    """Write a document with any JSON, and its buffer."""
-    if path.suffix == ".glb":
-        path.write_bytes(glb(json.dumps(document.head).encode(), document.blob))
-        return
-    buffers = document.head.get("buffers")
-    if isinstance(buffers, list) and buffers and isinstance(buffers[0], dict):
-        code = base64.b64encode(document.blob).decode()
-        buffers[0].setdefault("uri", f"data:application/octet-stream;base64,{code}")
-    path.write_text(json.dumps(document.head))
-
-
 def mutants(folder, sound, count, seed):
     """Write *count* damaged files; return [(reader, path)]."""
     rng = np.random.default_rng(seed)
@@ -237,107 +161,11 @@ def mutants(folder, sound, count, seed):
     for number in range(count):
         reader, path = sound[number % len(sound)]
         place = folder / f"m{number}{path.suffix}"
-        if path.suffix in (".glb", ".gltf") and rng.random() < 0.8:
-            document = octahedron(*OCTAHEDRON)
-            for _ in range(int(rng.integers(1, 4))):
-                document.head = damaged_json(document.head, rng)
-            save_document(place, document)
-        else:
-            data = path.read_bytes()
-            for _ in range(int(rng.integers(1, 3))):
-                data = damaged(data or b"\0", rng)
-            place.write_bytes(data)
-        files.append((reader, place))
-    return files
-
-
-VTP = """<?xml version="1.0"?>{before}
-<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64"><PolyData>
-<Piece NumberOfPoints="{n}" NumberOfPolys="4">
-<PointData>{arrays}</PointData>
-<Points><DataArray type="Float32" NumberOfComponents="3" format="ascii">
-1 1 1 1 -1 -1 -1 1 -1 -1 -1 1</DataArray></Points>
-<Polys><DataArray type="Int64" Name="connectivity" format="ascii">{corners}</DataArray>
-<DataArray type="Int64" Name="offsets" format="ascii">{ends}</DataArray></Polys>
-</Piece></PolyData>{after}</VTKFile>
-"""
-SOUND = {"n": 4, "corners": "0 1 2 0 3 1 0 2 3 1 3 2", "ends": "3 6 9 12", "before": "",
-         "arrays": "", "after": ""}  # fmt: skip
-LEGACY = """# vtk DataFile Version 3.0
-x
-ASCII
-DATASET POLYDATA
-POINTS {points} float
-1 1 1 1 -1 -1 -1 1 -1 -1 -1 1
-POLYGONS {cells} {size}
-3 0 1 2 3 0 3 1 3 0 2 3 3 1 3 {last}
-"""
-FACES = {"points": 4, "cells": 4, "size": 16, "last": 2}
-BOMB = (
-    '<!DOCTYPE x [<!ENTITY a0 "aaaaaaaaaa">'
-    + "".join(f'<!ENTITY a{k} "{10 * f"&a{k - 1};"}">' for k in range(1, 12))
-    + "]>"
-)
-X3D = '<?xml version="1.0"?>{}<X3D version="3.0"><Scene>{}</Scene></X3D>'
-OUTSIDE = '<DataArray type="Float64" Name="a" format="appended" offset="{}"/>'
-
-
-def false_counts(folder):
-    """Write files with counts or nesting beyond any reader's limits; return [(reader, path)]."""
-    texts = {
-        "sound.vtp": VTP.format(**SOUND),
-        "corner.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 900000000"}),
-        "negative.vtp": VTP.format(**SOUND | {"corners": "0 1 2 0 3 1 0 2 3 1 3 -900000000"}),
-        "end.vtp": VTP.format(**SOUND | {"ends": "3 6 9 1200000000"}),
-        "back.vtp": VTP.format(**SOUND | {"ends": "3 -600000000 9 12"}),
-        "points.vtp": VTP.format(**SOUND | {"n": 999999999999}),
-        "few.vtp": VTP.format(**SOUND | {"n": 3}),
-        "deep.vtp": VTP.format(**SOUND | {"after": 300_000 * "<a>" + 300_000 * "</a>"}),
-        "bomb.vtp": VTP.format(**SOUND | {"before": BOMB, "arrays": "&a11;"}),
-        "offset.vtp": VTP.format(
-            **SOUND | {"arrays": OUTSIDE.format(2**62), "after": '<AppendedData encoding="raw">_x'}
-        ),
-        "minus.vtp": VTP.format(
-            **SOUND | {"arrays": OUTSIDE.format(-9), "after": '<AppendedData encoding="raw">_x'}
-        ),
-        "sound.vtk": LEGACY.format(**FACES),
-        "points.vtk": LEGACY.format(**FACES | {"points": 999999999999}),
-        "minus.vtk": LEGACY.format(**FACES | {"points": -4}),
-        "cells.vtk": LEGACY.format(**FACES | {"cells": 999999999999}),
-        "size.vtk": LEGACY.format(**FACES | {"size": 999999999999}),
-        "corner.vtk": LEGACY.format(**FACES | {"last": 900000000}),
-        "scalars.vtk": LEGACY.format(**FACES)
-        + "POINT_DATA 999999999999\nSCALARS a float 4\nLOOKUP_TABLE default\n1 2 3\n",
-        "name.vtk": LEGACY.format(**FACES) + f"POINT_DATA 4\nSCALARS {'a' * 100_000} float\n",
-        "many.off": "OFF\n1000000000000 1000000000000 0\n0 0 0\n",
-        "minus.off": "OFF\n-1 -1 0\n0 0 0\n",
-        "long.off": "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n1000000000000 0 1 2\n",
-        "many.ply": STRIPS.replace("vertex 4", "vertex 1000000000000"),
-        "strips.ply": STRIPS.replace("tristrips 1", "tristrips 1000000000000"),
-        "list.ply": STRIPS.replace("7 0 1", "1000000000000 0 1"),
-        "nothing.ply": STRIPS.replace("element tri", "element x 1000000000000\nelement tri"),
-        "corner.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n",
-    }
-    if meshlab.available():
-        deep = 20_000 * "<Group>" + 20_000 * "</Group>"
-        again = '<Group DEF="a"><Group USE="a"/></Group>'
-        texts |= {
-            "deep.x3d": X3D.format("", deep),
-            "bomb.x3d": X3D.format(BOMB, "<Shape>&a11;</Shape>"),
-            "use.x3d": X3D.format("", again),
-            "deep.wrl": "#VRML V2.0 utf8\n" + 20_000 * "Group { children [ " + 20_000 * "] }",
-            "use.wrl": "#VRML V2.0 utf8\nDEF a Group { children [ USE a ] }\n",
-        }
-    files = []
-    for name, text in texts.items():
-        (folder / name).write_text(text)
-        files.append(("mesh", folder / name))
-    for count in (0, 1, 31, 33, 2**31, 2**32 - 1):
-        path = folder / f"{count}.stl"
-        write_mesh(path, sd.Mesh(*icosphere(1)))  # 32 triangles
         data = path.read_bytes()
-        path.write_bytes(data[:80] + struct.pack("<I", count) + data[84:])
-        files.append(("mesh", path))
+        for _ in range(int(rng.integers(1, 3))):
+            data = damaged(data or b"\0", rng)
+        place.write_bytes(data)
+        files.append((reader, place))
     return files
 
 
@@ -391,11 +219,9 @@ def test_files_of_every_sort_are_read_or_the_error_names_them(tmp_path):
     """One program reads all of them: starting it takes longer than reading them."""
     valid = originals(tmp_path, ())  # those of PyMeshLab: in the campaign
     damaged_files = mutants(tmp_path, valid, 1, seed=1)
-    (tmp_path / "counts").mkdir()
     no_files = special(tmp_path, valid)[::53]
-    counts = false_counts(tmp_path / "counts")[::12]
     before = sorted(tmp_path.rglob("*"))
-    found = iter(answers([*valid, *damaged_files, *no_files, *counts]))
+    found = iter(answers([*valid, *damaged_files, *no_files]))
     assert sorted(tmp_path.rglob("*")) == before  # reading writes nothing
 
     read = {path.name: next(found)[0] for _, path in valid}
@@ -405,24 +231,6 @@ def test_files_of_every_sort_are_read_or_the_error_names_them(tmp_path):
     of_no_files = [next(found) for _ in no_files]
     assert not failures(no_files, of_no_files)
     assert Counter(answer for answer, _ in of_no_files)["refused"] > 0.9 * len(no_files)
-
-    of_counts = [next(found) for _ in counts]
-    assert not failures(counts, of_counts)
-    names = zip(counts, of_counts, strict=True)
-    refused = {path.name for (_, path), (answer, _) in names if answer != "read"}
-    assert len(refused) > 0.7 * len(counts)
-
-
-@pytest.mark.campaign
-def test_no_false_count_is_accepted(tmp_path):
-    files = false_counts(tmp_path)
-    found = answers(files)
-    assert not failures(files, found)
-    read = [
-        path.name for (_, path), (answer, _) in zip(files, found, strict=True) if answer == "read"
-    ]
-    # An unused offset, a count that VTK computes itself: all of these are valid.
-    assert read == ["sound.vtp", "minus.vtp", "sound.vtk", "cells.vtk", "nothing.ply"]
 
 
 @pytest.mark.campaign

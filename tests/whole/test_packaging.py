@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import configparser
-import importlib
 import os
 import re
 import shutil
@@ -60,21 +59,6 @@ def test_every_library_imported_is_declared(setup_cfg):
     assert {LIBRARY_OF.get(name, name) for name in used - UNDECLARED} <= declared
 
 
-def test_a_plain_install_includes_the_libraries_for_speed(setup_cfg):
-    required = setup_cfg["options"]["install_requires"]
-    assert {"numba", "threadpoolctl"} <= names_in(required)
-    # Without a wheel of numba pip would try to build LLVM; a marker prevents that.
-    numba = [line for line in required.splitlines() if line.startswith("numba")]
-    assert all("python_version<" in line for line in numba)
-    assert "fast" not in setup_cfg["options.extras_require"]
-
-
-def test_one_extra_installs_the_whole_desktop_program(setup_cfg):
-    app = setup_cfg["options.extras_require"]["app"]
-    assert {"PySide6-Essentials", "pyvistaqt", "qtpy"} <= names_in(app)
-    assert '!=6.12.0; python_version<"3.12"' in app
-
-
 @pytest.mark.campaign
 @pytest.mark.parametrize("versions", ["lowest", "newest"])
 def test_the_suite_passes_with_the_lowest_and_with_the_newest_versions(versions):
@@ -104,20 +88,6 @@ def test_every_folder_with_code_is_a_declared_package(setup_cfg):
     widgets = {path.relative_to(ROOT) for path in (ROOT / "widgets").rglob("__init__.py")}
     there = core | {Path("vtk_segdeform", path) for path in widgets}
     assert declared == {".".join(path.parent.parts) for path in there}
-
-
-def test_the_command_points_at_a_function(setup_cfg):
-    entry = setup_cfg["options.entry_points"]["console_scripts"].split("=")[1].strip()
-    module, function = entry.split(":")
-    assert callable(getattr(importlib.import_module(module), function))
-
-
-def test_the_widgets_are_a_subpackage_in_a_checkout():
-    widgets = importlib.import_module("vtk_segdeform.widgets")
-    assert Path(widgets.__file__).parent in (
-        ROOT / "widgets",
-        Path(vtk_segdeform.__file__).parent / "widgets",
-    )
 
 
 def test_importing_the_package_is_silent_and_loads_no_toolkit():

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
-from open_meshes import bottle, open_box, revolved, sheet, together, tube, with_holes
+from open_meshes import bottle, open_box, revolved, sheet, tube, with_holes
 from solids import rotation
 
 import vtk_segdeform as sd
 from vtk_segdeform import models, sizes
-from vtk_segdeform.errors import ArgumentError, SessionError
 from vtk_segdeform.solver import exact_volume, region_volumes, total_volume
 from vtk_segdeform.subspace import interpolated
 
@@ -138,54 +137,6 @@ def test_a_sheet_has_nothing_to_preserve():
     assert solution.region_volume_change.shape == (0,)
 
 
-def test_a_body_beside_a_sheet_keeps_its_volume():
-    label = flat(12)
-    mesh = together(BODIES["open box"](), label.with_vertices(0.2 * label.vertices + [0.9, 0, 0]))
-    deformer = bind(mesh, 2)
-    solution = deformer.solve(bent(deformer))
-    box = np.arange(BODIES["open box"]().n_vertices)
-    alone = total_volume(BODIES["open box"]())
-    assert abs(solution.volume_change) < EXACT
-    assert abs(alone.relative(solution.vertices[box])) < EXACT
-
-
-def test_the_option_turns_lids_off_and_on():
-    deformer = bound("bottle", 1)
-    off = held(deformer, lids=False)
-    assert not off.has_volume
-    assert off.solve(bent(deformer)).volume_change == 0.0
-    assert not held(off, preserve_volume=True).has_volume  # as before
-    on = held(off, lids=None)
-    assert abs(on.solve(bent(deformer)).volume_change) < EXACT
-    assert_array_equal(
-        on.solve(bent(deformer)).vertices, held(deformer).solve(bent(deformer)).vertices
-    )
-    cap = revolved([1.0, 0.02], [0.0, 0.2], 24, 10)
-    assert not bind(cap, 1).has_volume
-    forced = bind(cap, 1, lids=True)
-    assert forced.has_volume
-    assert abs(forced.solve(bent(forced, 10.0)).volume_change) < EXACT
-
-
-def test_on_a_plane_lids_have_no_effect():
-    plane = sheet(lambda u, v: (2 * u, v, 0 * u), 20, 10)
-    deformer = bind(plane, 1, lids=True)
-    assert not deformer.has_volume
-    solution = deformer.solve(bent(deformer))
-    assert solution.volume_change == 0.0
-    assert np.isfinite(solution.vertices).all()
-
-
-def test_lids_must_be_a_switch():
-    mesh = open_box()
-    with pytest.raises(ArgumentError, match="lids must be True, False or None; got 'yes'"):
-        sd.deform(mesh, [0], [1], [[0, 0, 0]], lids="yes")
-    with pytest.raises(ArgumentError, match="lids must be True, False or None; got 1"):
-        held(bound("bottle", 1), lids=1)
-    with pytest.raises(SessionError, match="lids must be True, False or None; got 2"):
-        sd.Options(lids=2)
-
-
 def session_of(mesh):
     session = sd.Session(mesh)
     z = mesh.vertices[:, 2]
@@ -236,18 +187,3 @@ def test_moving_a_cage_keeps_the_volume_under_lids():
     session.move_cage(0, cage * [1.3, 1.2, 1.0])
     assert session.volume_change == 0.0
     assert_allclose(session.cage_vertices[0], cage * [1.3, 1.2, 1.0])
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("n_vertices", [8_000, 40_000, 150_000])
-def test_the_volume_of_a_large_open_mesh_is_exact(n_vertices):
-    mesh = with_holes(models.cactus(n_vertices), 12, 0.03)
-    deformer = bind(mesh, 3)
-    solution = deformer.solve(bent(deformer))
-    each = held(deformer, preserve_region_volumes=True).solve(bent(deformer))
-    print(
-        f"{mesh.n_vertices} vertices: {solution.volume_change:.1e}, of regions "
-        f"{np.abs(each.region_volume_change).max():.1e}"
-    )
-    assert abs(solution.volume_change) < 1e-12
-    assert np.abs(each.region_volume_change).max() < 1e-12

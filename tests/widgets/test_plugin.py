@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from campaign import every
-from given_surfaces import GIVEN, holed, require_only_moved, tube
+from given_surfaces import GIVEN, require_only_moved, tube
 from hands import Hand, picture
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
@@ -119,19 +119,6 @@ def test_points_at_a_seam_with_different_targets_go_to_the_mean():
     assert np.allclose(ends[0] - given.points[seam], [0.15, 0.05, 0.05])
 
 
-@pytest.mark.parametrize("kind", every(2, ["polydata", "mesh", "surface", "session"]))
-def test_the_editor_takes_any_surface(kind, plotter):
-    given = holed()
-    surface = sd.Surface(given)
-    what = {
-        "polydata": given, "surface": surface, "mesh": surface.mesh, "session": sd.Session(surface)
-    }[kind]  # fmt: skip
-    editor = plotter.segdeform.edit(what)
-    assert_array_equal(editor.session.mesh.vertices, surface.mesh.vertices)
-    if kind != "mesh":
-        require_only_moved(given, editor.session.deformed)
-
-
 def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
     height = bar.points[:, 2]
     handle = height > 0.9
@@ -141,18 +128,6 @@ def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
             n_cage_vertices=12, refine=False,
         )  # fmt: skip
     assert "handle error" in caplog.text
-
-
-def test_regions_are_arrays_of_a_copy(bar):
-    coloured = bar.segdeform.regions(2)
-    assert "region" not in bar.point_data
-    assert set(coloured["region"]) == {0, 1}
-    assert coloured["region_weights"].shape == (bar.n_points, 2)
-    assert_array_equal(coloured["region_weights"].argmax(axis=1), coloured["region"])
-    assert np.allclose(coloured["region_weights"].sum(axis=1), 1.0)
-    assert set(coloured["regions_here"]) == {1, 2}
-    assert (coloured["region_weights"][coloured["regions_here"] == 1].max(axis=1) == 1.0).all()
-    assert_array_equal(coloured["number"], bar["number"])
 
 
 def test_check_names_the_faults_of_a_surface(bar):
@@ -405,19 +380,6 @@ def closed_early(tmp_path, session, monkeypatch):
     return run
 
 
-def test_a_window_closed_while_the_pose_settles_completes_it_first(closed_early, capfd):
-    session, shown, written = closed_early()
-    assert session.solution.status is not Status.STEP_LIMIT
-    assert not session.can_finish
-    assert session.solution.handle_error < 1e-12
-    assert abs(session.volume_change) < 1e-12
-    assert_array_equal(written, session.vertices)
-    assert np.abs(written - shown).max() > 1e-3
-    told = capfd.readouterr()
-    assert "finishing after the window was closed; Ctrl+C to stop" in told.out
-    assert told.err == ""
-
-
 def test_a_window_closed_during_the_drag_completes_its_pose_as_well(closed_early):
     session, _, written = closed_early(functools.partial(pull, shift=(30, -40), releases=False))
     assert not session.can_finish
@@ -481,13 +443,6 @@ def test_without_a_screen_the_command_says_so_in_one_line(tmp_path, bar, monkeyp
     assert told.count("\n") == 1
     assert "no window can be opened: there is no screen; set DISPLAY" in told
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_off_screen_the_command_says_that_nothing_can_be_edited(tmp_path, bar, capsys):
-    path = tmp_path / "bar.vtp"
-    convert.write_mesh(path, bar)
-    assert main(["edit", str(path)]) == 1
-    assert "pyvista renders off-screen" in capsys.readouterr().err
 
 
 def test_the_blocks_of_a_file_are_edited_as_one_surface(tmp_path, bar):

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, picture, plain_view
-from vtkmodules.util.numpy_support import vtk_to_numpy
+from hands import Hand, Painter, draw_seldom, look_along_y, picture, plain_view
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Regions, Session, models
 from vtk_segdeform.errors import ConstraintError, RegionError, SegDeformError
-from vtk_segdeform.pictures.palette import FIXED, HANDLE, rgb
 from vtk_segdeform.widgets.region_selector.region_outlines import RegionOutlines
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, RegionSelector, Tool
 from vtk_segdeform.widgets.scene.view import View
 
 
-class Desk:
+class Desk(Painter):
     """A sphere seen along y, z up, with a selector and a hand."""
 
     def __init__(self, *, halves=True):
@@ -26,10 +24,7 @@ class Desk:
             z = self.session.mesh.vertices[:, 2]
             self.session.set_regions(Regions.from_masks(self.session.mesh, [z > -0.2, z < 0.2]))
         self.selector = RegionSelector(self.view, self.session)
-        self.view.camera.SetPosition(0.0, -4.0, 0.0)
-        self.view.camera.SetViewUp(0.0, 0.0, 1.0)
-        self.view.renderer.ResetCamera()
-        self.view.render()
+        look_along_y(self.view)
         draw_seldom(self.view)
         self.hand = Hand(self.view)
         self.selector.On()
@@ -37,16 +32,6 @@ class Desk:
     @property
     def points(self):
         return self.session.mesh.vertices
-
-    @property
-    def colours(self):
-        """(n, 3) uint8: the colours of the vertices."""
-        shown = self.selector.surface.polydata.GetPointData().GetScalars()
-        return np.array(vtk_to_numpy(shown))
-
-    def under(self, x, z):
-        """Return the pixel of the point (x, y, z) on the near side of the sphere."""
-        return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
 
 
 @pytest.fixture
@@ -72,16 +57,6 @@ def test_a_brush_stroke_adds_the_vertices_along_its_path_in_one_step(desk):
         assert np.abs(places[:, 0] - x).min() < 0.15
     assert desk.session.undo() == "paint region 2"
     assert np.array_equal(desk.session.regions.membership[1], before)
-
-
-def test_a_second_stroke_adds_to_the_fixed_vertices(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    desk.hand.drag([(2, 2), (398, 120)])
-    first = desk.session.fixed
-    desk.hand.drag([(2, 300), (398, 398)])
-    assert len(first) > 0
-    assert np.isin(first, desk.session.fixed).all()
-    assert (desk.points[desk.session.fixed, 2] > 0.0).any()
 
 
 def test_control_erases(desk):
@@ -158,20 +133,6 @@ def test_a_lasso_selects_the_vertices_inside(desk):
     assert (places[:, 1] < 0.0).all()
 
 
-def test_the_line_is_drawn_while_the_button_is_down(desk):
-    idle = picture(desk.view)
-    desk.selector.tool = Tool.RECTANGLE
-    desk.hand.press((20, 20))
-    desk.hand.move((380, 380))
-    changed = (picture(desk.view) != idle).any(axis=2)
-    assert changed[18:23, 30:370].any(axis=0).all()
-    assert changed[30:370, 378:383].any(axis=1).all()
-    assert not changed[30:60, 30:60].any()  # the inside is not filled
-    desk.hand.key("Escape")
-    desk.hand.release()
-    assert (picture(desk.view) == idle).all()
-
-
 def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
     outlines, idle = RegionOutlines(desk.selector.surface), picture(desk.view)
     outlines.show(lines=True, numbers=False)
@@ -193,17 +154,6 @@ def test_outlines_run_between_the_regions_and_their_numbers_stand_on_them(desk):
     assert second.GetPosition()[1] < middle - reach
     outlines.remove()
     assert (picture(desk.view) == idle).all()
-
-
-def test_a_tiny_rectangle_selects_nothing(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.FIXED
-    nearest = desk.points[desk.points[:, 1].argmin()]
-    x, y = (int(p) for p in desk.hand.at(nearest))  # just below and left of a vertex
-    desk.hand.drag([(x, y), (x + 1, y + 1)])
-    desk.hand.click((x, y))
-    assert len(desk.session.fixed) == 0
-    desk.hand.drag([(x - 2, y - 2), (x + 3, y + 3)])
-    assert len(desk.session.fixed) == 1
 
 
 def test_a_click_selects_a_connected_part(desk):
@@ -228,16 +178,6 @@ def test_fixed_vertices_and_handles_remain_disjoint(desk):
     desk.selector.paints = Paint.FIXED
     desk.hand.drag([(2, 300), (398, 398)])
     assert isinstance(desk.hand.failures.pop(), ConstraintError)
-
-
-def test_a_second_handle_gets_its_own_name_and_vertices(desk):
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
-    desk.hand.drag([(100, 300), (200, 390)])
-    desk.selector.handle = None
-    desk.hand.drag([(200, 300), (300, 390)])
-    assert list(desk.session.handles) == ["handle 1", "handle 2"]
-    one, two = desk.session.handles.values()
-    assert not np.intersect1d(one, two).size
 
 
 def test_vertices_of_no_other_region_cannot_be_erased(
@@ -311,21 +251,6 @@ def test_a_brush_paints_visible_vertices_or_also_hidden_ones(desk):
     assert (sides < -0.8).any()
     assert (sides > +0.8).any()
     assert not ((sides > -0.6) & (sides < 0.6)).any()
-
-
-def test_the_preview_shows_only_vertices_that_will_change(desk):
-    desk.session.set_fixed(desk.points[:, 2] > 0.5)
-    desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
-    idle = picture(desk.view).astype(int)
-    desk.hand.press((2, 2))
-    desk.hand.move((398, 398))
-    now = picture(desk.view).astype(int)
-    (x, above), (_, below) = desk.under(0.0, 0.7), desk.under(0.0, 0.2)
-    assert np.array_equal(now[400 - round(above), round(x)], idle[400 - round(above), round(x)])
-    red, green, blue = now[400 - round(below), round(x)]
-    assert red > 3 * max(green, blue)
-    desk.hand.key("Escape")
-    desk.hand.release()
 
 
 def test_a_stroke_beside_the_mesh_makes_no_undo_step(desk):
@@ -402,21 +327,6 @@ def test_the_ring_has_the_radius_of_the_brush(desk):
     assert (picture(desk.view) == idle).all()
 
 
-def test_the_ring_disappears_with_the_pointer_and_with_the_tool(desk):
-    idle = picture(desk.view)
-    leave = [
-        lambda: desk.hand.event("LeaveEvent"),
-        lambda: setattr(desk.selector, "tool", Tool.LASSO),
-        lambda: desk.selector.Off(),
-    ]
-    for leaves in leave:
-        desk.selector.tool = Tool.BRUSH
-        desk.hand.hover(desk.under(0.0, 0.0))
-        assert (picture(desk.view) != idle).any()
-        leaves()
-        assert (picture(desk.view) == idle).all()
-
-
 def test_grow_and_shrink_change_one_ring_of_neighbours(desk):
     desk.selector.tool, desk.selector.paints = Tool.RECTANGLE, Paint.HANDLE
     desk.selector.through = True
@@ -429,22 +339,6 @@ def test_grow_and_shrink_change_one_ring_of_neighbours(desk):
     assert np.array_equal(large, np.union1d(small, reached))
     desk.selector.shrink()
     assert np.array_equal(desk.session.handles["handle 1"], small)
-
-
-def test_fixed_vertices_are_grey_handles_red_and_overlaps_mixed(desk):
-    def colour(x, z):
-        px, py = desk.under(x, z)
-        pixel = picture(desk.view)[400 - round(py), round(px)].astype(float)
-        return pixel / pixel.max()
-
-    upper, lower, between = colour(0.0, 0.8), colour(0.0, -0.8), colour(0.0, 0.0)
-    assert np.abs(upper - lower).max() > 0.3
-    assert np.abs(between - (upper + lower) / 2 / ((upper + lower) / 2).max()).max() < 0.25
-    desk.session.set_fixed(desk.points[:, 2] < -0.7)
-    desk.session.handles.add(desk.points[:, 2] > 0.7)
-    for (x, z), name in (((0.0, -0.85), FIXED), ((0.0, 0.85), HANDLE)):
-        wanted = rgb(name) / rgb(name).max()
-        assert np.abs(colour(x, z) - wanted).max() < 0.12
 
 
 def test_remove_restores_the_view():

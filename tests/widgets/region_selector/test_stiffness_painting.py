@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, Painter, draw_seldom, look_along_y, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
-from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.pictures.palette import BODY, INK, rgb
@@ -20,17 +19,14 @@ from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 
 
-class Desk:
+class Desk(Painter):
     """An editor over a session, in mode REGIONS, with a hand."""
 
     def __init__(self, session):
         self.session = session
         self.editor = DeformEditor(plain_view(), session)
         view = self.editor.view
-        view.camera.SetPosition(0.0, -4.0, 0.0)
-        view.camera.SetViewUp(0.0, 0.0, 1.0)
-        view.renderer.ResetCamera()
-        view.render()
+        look_along_y(view)
         draw_seldom(view)
         self.editor.On()
         self.editor.mode = Mode.REGIONS
@@ -41,14 +37,6 @@ class Desk:
     @property
     def stiffness(self):
         return self.session.state.stiffness
-
-    @property
-    def colours(self):
-        shown = self.selector.surface.polydata.GetPointData().GetScalars()
-        return np.array(vtk_to_numpy(shown))
-
-    def under(self, x, z):
-        return self.hand.at([x, -np.sqrt(max(0.0, 1.0 - x * x - z * z)), z])
 
 
 @pytest.fixture
