@@ -143,7 +143,7 @@ def test_keys_alone_reach_every_control(served: Served, browser: Chromium) -> No
     controls = f"""(() => {{ {SEEN} return [...document.querySelectorAll("{CONTROLS}")]
       .filter((e) => seen(e) && usable(e)); }})()"""
     count = page.evaluate(f"window.todo = new Set({controls}); window.todo.size")
-    assert count > 15
+    assert count > 10
     page.key("F6")
     for _ in range(2 * count):
         page.evaluate("window.todo.delete(document.activeElement)")
