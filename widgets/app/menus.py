@@ -10,7 +10,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.version import __version__
 
-from ..qt import add_view_entries, name_keys
+from ..qt import add_entry, add_view_entries, name_keys
 from . import saving
 from .dialogs import show_about
 from .start_page import home_as_tilde
@@ -100,11 +100,11 @@ class Menus:
                 home_as_tilde(path.parent), QtCore.Qt.TextElideMode.ElideMiddle, _FOLDER
             )
             name = f"{path.name}    {folder}".replace("&", "&&")
-            action = menu.addAction(f"&{number}  {name}")
+            action = add_entry(menu, f"&{number}  {name}")
             action.setEnabled(os.path.isfile(path))
             action.triggered.connect(_calling(window.open, path))
         menu.addSeparator()
-        clear = menu.addAction("&Clear list")
+        clear = add_entry(menu, "&Clear list")
         clear.setEnabled(bool(window.recent.paths))
         clear.triggered.connect(lambda: window.clear_recent())
 
@@ -131,7 +131,7 @@ class Menus:
         return menu
 
     def _add(self, menu: Any, text: str, call: Callable[[], object], keys: Any = None) -> Any:
-        action = menu.addAction(text)
+        action = add_entry(menu, text)
         if keys is not None:
             action.setShortcut(QtGui.QKeySequence(keys))
         action.triggered.connect(lambda: call())

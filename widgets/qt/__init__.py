@@ -15,11 +15,12 @@ The files, in reading order:
 
 from .controls import check_box, shortcut, stopper
 from .keys_dialog import menu_keys
-from .view_menu import add_view_entries, name_keys
+from .view_menu import add_entry, add_view_entries, name_keys
 from .widget import DeformWidget, deform_dock
 
 __all__ = [
     "DeformWidget",
+    "add_entry",
     "add_view_entries",
     "check_box",
     "deform_dock",

@@ -17,7 +17,7 @@ from ..editor import DeformEditor, actions, file_types
 from ..panel import Field, toolbar, tooltip
 from .controls import Press, highlighted, tool_button
 from .icons import icon
-from .view_menu import add_view_entries
+from .view_menu import add_entry, add_view_entries
 
 Qt = QtCore.Qt
 _SESSIONS = "Sessions (*.segdeform)"
@@ -104,7 +104,7 @@ class Toolbar(QtWidgets.QWidget):
                 add_view_entries(menu, lambda: self._editor)
             else:
                 for entry in filter(None, field.items):
-                    menu.addAction(entry.label).triggered.connect(self._asker(entry.name))
+                    add_entry(menu, entry.label).triggered.connect(self._asker(entry.name))
         elif field.kind == "file":
             button.clicked.connect(self._asker(name))
         elif field.kind == "hold":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from qtpy import QtWidgets
+from qtpy import QtGui, QtWidgets
 
 from ..editor import DeformEditor, Keys, key_cap, keys_of
 from ..panel import Field, view_entries
@@ -65,6 +65,17 @@ def name_keys(entries: Iterable[tuple[Any, str, str]], keys: Keys) -> None:
         entry.setText(f"{text}\t{key_cap(key[0])}" if key else text)
 
 
+def add_entry(menu: Any, text: str) -> Any:
+    """Add an action to a QMenu and return it.
+
+    For the action of ``menu.addAction(text)`` PySide may return the wrapper of a deleted object
+    that had its address.
+    """
+    action = QtGui.QAction(text, menu)
+    menu.addAction(action)
+    return action
+
+
 def _add(menu: Any, fields: Iterable[Field | None], entries: dict[str, Any], use: _Use) -> None:
     """Add the entries of *fields* to a menu and to *entries*, by their names."""
     for field in fields:
@@ -74,7 +85,7 @@ def _add(menu: Any, fields: Iterable[Field | None], entries: dict[str, Any], use
             entries[field.name] = menu.addMenu(_text(field))
             _add(entries[field.name], field.items, entries, use)
         else:
-            entry = entries[field.name] = menu.addAction(_text(field))
+            entry = entries[field.name] = add_entry(menu, _text(field))
             entry.setCheckable(field.kind == "toggle")
             entry.triggered.connect(lambda *_, name=field.name: use(name))
 
