@@ -43,9 +43,12 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     t = np.zeros(len(constraints))
     units = _units(constraints)
     here, before, inverse = np.ascontiguousarray(paths[:, :3]), np.inf, None
+    best, least = t.copy(), np.inf  # areas and centroids that cannot be met lead far away
     for _ in range(_NEWTON_STEPS):
         g = violations(constraints, here)
         error = float(np.abs(g / units).max())
+        if error < least:
+            best, least = t.copy(), error
         if error <= _EXACT or (error <= _SMALL and error > 0.5 * before):
             break
         if inverse is None or error > _SMALL:
@@ -59,7 +62,7 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
             inverse = np.linalg.pinv(jacobian / both, rcond=1e-12) / both
         t -= inverse @ g
         here, before = moved_along(paths, t), error
-    return t
+    return t if all(each.is_cubic for each in constraints) else best
 
 
 def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
@@ -70,7 +73,8 @@ def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
 def _units(constraints: Sequence[VolumeConstraint]) -> FloatArray:
     """Return what the error of each is relative to, (c,): of volumes the sum of all."""
     every = sum(abs(each.target) for each in constraints if each.is_cubic)
-    return np.array([every if each.is_cubic else abs(each.size) for each in constraints])
+    units = [every if each.is_cubic else abs(each.size) for each in constraints]
+    return np.maximum(units, np.finfo(float).tiny)
 
 
 def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
