@@ -252,6 +252,16 @@ def test_areas_and_centroids_are_those_of_their_goals(goals, offset):
             assert goal.bound * (target - now[at]) < 1e-9
 
 
+@pytest.mark.parametrize("goals", [{"area": "2%"}, {"area": "30%", "whole": "keep"}])
+def test_an_area_that_cannot_be_reached_is_told_and_leads_nowhere_far(goals):
+    mesh = ball(1.0, stretch=2.0)
+    deformer = bound(mesh)
+    solution = held(deformer, volumes=goals).solve(pulled(deformer))
+    assert solution.volume_error > 0.1
+    assert solution.status is not Status.CONVERGED
+    assert np.abs(solution.vertices).max() < 2.0 * mesh.diagonal
+
+
 def test_a_bound_holds_exactly_if_it_is_active_and_changes_nothing_if_not():
     free = held(hollow(), volumes={"whole": "free"})
     targets = pulled(free)
