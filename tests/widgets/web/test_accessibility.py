@@ -151,3 +151,16 @@ def test_keys_alone_reach_every_control(served: Served, browser: Chromium) -> No
     left = "[...window.todo].filter((e) => e.isConnected)"  # a job may have ended since
     assert page.evaluate(f"{left}.map((e) => e.outerHTML.slice(0, 120))") == []
     page.close()
+
+
+def test_no_two_controls_lie_over_each_other_on_a_phone(served: Served, browser: Chromium) -> None:
+    page = served.page(browser, size=(390, 844), touch=True)
+    found = page.evaluate(f"""(() => {{ {SEEN}
+      const boxes = [...document.querySelectorAll("{CONTROLS}")].filter(seen)
+        .map((e) => [e.dataset.name || e.title || e.tagName, e.getBoundingClientRect()]);
+      return boxes.flatMap(([name, a], k) => boxes.slice(k + 1)
+        .filter(([, b]) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2
+          && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2)
+        .map(([other]) => `${{name}} and ${{other}}`)); }})()""")
+    assert found == []
+    page.close()
