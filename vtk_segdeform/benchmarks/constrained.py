@@ -28,9 +28,10 @@ A bar that inner walls divide into seven parts is bent by its end, turned back a
 the pose is finished. In the row *none* only the whole volume is preserved, as it is in all rows. \
 *Stiffness*: one half is four times as stiff as the other; *rigid part*: the middle third between \
 fixed vertices and handle; *slides*: half of the fixed vertices slide instead, along planes in \
-which the bar bends, or along the surface; *symmetry*: about the plane of the bend; *followers*: \
-four balls that lie against the bar. *Volume change* is the largest of all frames. All times are \
-of the processor, summed over its cores."""
+which the bar bends, or along the surface; *symmetry*: about the plane of the bend; *area*: also \
+that of the whole surface; *centroid on an axis*: along the bar at rest; *followers*: four balls \
+that lie against the bar. *Volume change* is the largest of all frames. All times are of the \
+processor, summed over its cores."""
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
@@ -71,7 +72,9 @@ def begun(size: int, n_cage_vertices: int) -> dict[str, tuple[Hand, Session]]:
     share = (height - ends[0]) / (ends[1] - ends[0])  # 0 at the fixed vertices, 1 at the handle
     sliding = own.fixed[share[own.fixed] > 0.0]
     rigid = np.where(np.abs(share - 0.5) < 1.0 / 6.0, np.inf, 1.0)
+    along = int(np.ptp(bar.vertices, axis=0).argmax())
     three = {"volumes": dict.fromkeys(["whole", "body 0", "body 1"], "keep")}
+    axis = ["whole", *(f"centroid {name}" for k, name in enumerate("xyz") if k != along)]
     rows: list[tuple[str, dict[str, Any], Any, list[Slide]]] = [
         ("none", _WHOLE, None, []),
         ("stiffness", _WHOLE, np.where(share > 0.5, 4.0, 1.0), []),
@@ -82,6 +85,8 @@ def begun(size: int, n_cage_vertices: int) -> dict[str, tuple[Hand, Session]]:
         ("avoiding contact", {**_WHOLE, "avoid_contact": True}, None, []),
         ("three volumes", three, None, []),
         ("seven volumes", {}, None, []),
+        ("area", {"volumes": dict.fromkeys(["whole", "area"], "keep")}, None, []),
+        ("centroid on an axis", {"volumes": dict.fromkeys(axis, "keep")}, None, []),
         ("followers", _WHOLE, None, []),
     ]
     found: dict[str, tuple[Hand, Session]] = {}
