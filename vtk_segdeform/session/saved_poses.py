@@ -96,7 +96,7 @@ class SavedPoses(Mapping[str, State]):
         return in_pose(self._poses, self._history.state, self._own[name])
 
     def has_cages(self, name: str) -> bool:
-        """Return whether a pose was saved with the cages of now, so that `applied` is quick."""
+        """Return whether a pose was saved with the current cages, so that `applied` is quick."""
         self._require(name)
         saved = self._own[name]
         return saved.pose is None or _has_cages(self._history.state, saved)
