@@ -669,8 +669,8 @@ class Deformer:
         if solution.status is Status.STEP_LIMIT:
             return solution
         remaining = self._path.remaining() * self._problem.frame.size / self.mesh.diagonal
-        is_stalled = solution.status is Status.STALLED
-        status = Status.STALLED if is_stalled else Status.STEP_LIMIT
+        is_final = solution.status in (Status.STALLED, Status.VOLUME_MISSED)
+        status = solution.status if is_final else Status.STEP_LIMIT
         if remaining <= CONVERGED:
             status = self._or_missed(Status.CONVERGED, solution)
         return replace(solution, remaining=remaining, status=status)
@@ -703,8 +703,13 @@ class Deformer:
         )
 
     def _or_missed(self, status: Status, solution: Solution) -> Status:
-        """Return *status*, or what a converged *solution* misses."""
-        return (self._missed(solution) if status is Status.CONVERGED else None) or status
+        """Return *status*, or what a converged *solution* misses, or a stalled one of volumes."""
+        missed = None
+        if status in (Status.CONVERGED, Status.STALLED):
+            missed = self._missed(solution)
+        if status is Status.STALLED and missed is not Status.VOLUME_MISSED:
+            return status
+        return missed or status
 
     def _missed(self, solution: Solution) -> Status | None:
         """Return the status of a *solution* with a handle, a volume or a contact that is off."""
