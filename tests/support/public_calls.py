@@ -578,6 +578,10 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "save_session.view": lambda: {"mode": "PULL"},
     "require_writable.path": lambda: Path("written.vtp"),
     "write.path": lambda: Path("written.ply"),
+    "write_motion.path": lambda: Path("written.glb"),
+    "write_motion.poses": lambda: [mesh().vertices + 0.1],
+    "write_motion.seconds": lambda: [1.0],
+    "write_motion.surface": mesh,
     "write_mesh.path": lambda: Path("written.ply"),
 }
 
