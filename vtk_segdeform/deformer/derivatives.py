@@ -26,13 +26,13 @@ from ..checks import all_of, shown
 from ..errors import ArgumentError
 from ..solver import (
     CentroidConstraint,
+    Curvature,
     Solution,
     SolverOptions,
     StationaryPoint,
     Status,
     VolumeConstraint,
     Volumes,
-    curvature,
     half_gradient,
     off_volumes,
     rows_of,
@@ -182,9 +182,9 @@ class Linearised:
         return np.asarray(np.linalg.lstsq(columns, moved, rcond=None)[0])
 
     @cached_property
-    def _turned(self) -> FloatArray:
-        """sum_k t_k d2g_k, (3m, 3m)."""
-        return curvature(self._volumes, self.path.end, self._steps)
+    def _turned(self) -> Curvature:
+        """sum_k t_k d2g_k."""
+        return Curvature.of(self._volumes, self.path.end, self._steps)
 
     @cached_property
     def _responses(self) -> FloatArray:
@@ -298,11 +298,10 @@ class Linearised:
             return *self._point.loads(c), c, nu
         nu = self._responses.T @ np.einsum("kma,ma->k", self._directions, c)
         c = c - np.einsum("k,kma->ma", nu, self._rows_on_mesh)
-        turned = self._turned @ np.concatenate(self.path.solver.directions([c])).T.ravel()
-        return *self._point.loads(c + turned.reshape(3, -1).T), c, nu
+        (moved,) = self.path.solver.directions([c])
+        return *self._point.loads(c + self._turned.times(moved)), c, nu
 
     def _of_directions(self, dp: FloatArray) -> FloatArray:
         """Return sum_k t_k dZ_k for a motion *dp* (m, 3) of the cages."""
-        load = (self._turned @ dp.T.ravel()).reshape(3, -1).T
-        (found,) = self.path.solver.directions([load])
+        (found,) = self.path.solver.directions([self._turned.times(dp)])
         return found

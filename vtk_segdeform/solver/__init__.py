@@ -39,7 +39,7 @@ from .other_measures import CentroidConstraint, area_of, centroid_of
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
-from .stationary import StationaryPoint, curvature, half_gradient, off_volumes, rows_of
+from .stationary import Curvature, StationaryPoint, half_gradient, off_volumes, rows_of
 from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
@@ -63,6 +63,7 @@ __all__ = [
     "CoarseVolume",
     "Contact",
     "ContactSurface",
+    "Curvature",
     "GaussNewton",
     "HeldVolumes",
     "MirrorTerm",
@@ -83,7 +84,6 @@ __all__ = [
     "centroid_of",
     "connected_sets",
     "constrained_step",
-    "curvature",
     "errors_at",
     "gradients",
     "half_gradient",

@@ -17,15 +17,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from ..arrays import FloatArray, IntArray
 from ..energy import rotation_term
 from ..errors import ArgumentError
+from ..subspace import Subspace
 from .gauss_newton import GaussNewton
 from .other_measures import AreaConstraint, CentroidConstraint
 from .terms import hessian_of, with_terms
 from .volume_constraints import Volumes, gradients, violations
+
+_AXES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # a, b, c with eps_abc = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,8 @@ class StationaryPoint:
         for axis in range(3):
             own = slice(axis * m, (axis + 1) * m)
             hessian[own, own] += quadratic
-        hessian += curvature(volumes, p, multipliers)
+        if rows:
+            hessian += Curvature.of(volumes, p, multipliers).matrix(m)
         kept = across
         if exact is not None:
             kept = np.reshape([row.T.ravel() for row in exact], across.shape)
@@ -102,34 +106,55 @@ def off_volumes(volumes: Volumes, p: FloatArray) -> FloatArray:
     return violations(volumes.constraints, _surface(volumes, p))
 
 
-def curvature(volumes: Volumes, p: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return sum_k weights_k d2g_k/dp2, (3m, 3m), stacked axis by axis, at cages *p* (m, 3).
+@dataclass(frozen=True, eq=False)
+class Curvature:
+    """sum_k w_k d2g_k/dp2 at cages p (m, 3): W~^T A W~, with A of the points and sparse.
 
-    Raises
-    ------
-    ArgumentError
-        If an area is among the volumes.
+    ``A[a, b] = sum_c eps_abc turned_c`` of the axes a, b, and that of centroids, *rest* (3m, 3m).
     """
-    m, surface = len(p), volumes.surface
-    total = np.zeros((3 * m, 3 * m))
-    if not volumes.constraints:
+
+    surface: Subspace
+    turned: list[sparse.csr_array]  # (n, n) for each axis c
+    rest: FloatArray | float
+
+    @classmethod
+    def of(cls, volumes: Volumes, p: FloatArray, weights: FloatArray) -> Curvature:
+        """Return that of *volumes* with *weights* (c,); ArgumentError if an area is among them."""
+        if any(isinstance(each, AreaConstraint) for each in volumes.constraints):
+            raise ArgumentError("there are no derivatives while an area is kept; set it free")
+        x, n = volumes.surface.map(p), volumes.surface.n_vertices
+        halves, rest = sparse.csr_array((3 * n, n)), 0.0
+        for each, weight in zip(volumes.constraints, weights, strict=True):
+            of_faces = None
+            if isinstance(each, CentroidConstraint):
+                rows = volumes.surface.at(np.arange(n))
+                rows = rows if each.extension is None else np.asarray(each.extension @ rows)
+                of_faces, more = each.second_derivatives(each.extended(x), rows)
+                rest = rest + weight * more
+            halves = halves + weight * each.hessian_halves(x, of_faces)
+        parts = [halves[c * n : (c + 1) * n] for c in range(3)]
+        return cls(volumes.surface, [sparse.csr_array(part - part.T) for part in parts], rest)
+
+    def matrix(self, m: int) -> FloatArray:
+        """Return it for m cage vertices, (3m, 3m), stacked axis by axis."""
+        total = np.zeros((3 * m, 3 * m)) + self.rest
+        for a, b, c in _AXES:
+            block = self.surface.adjoint(self.surface.premultiplied(self.turned[c]))
+            total[a * m : (a + 1) * m, b * m : (b + 1) * m] += block
+            total[b * m : (b + 1) * m, a * m : (a + 1) * m] -= block
         return total
-    if any(isinstance(each, AreaConstraint) for each in volumes.constraints):
-        raise ArgumentError("there are no derivatives while an area is kept; set it free")
-    x, w = surface.map(p), surface.at(np.arange(surface.n_vertices))
-    for each, weight in zip(volumes.constraints, weights, strict=True):
-        of_faces = None
-        if isinstance(each, CentroidConstraint):
-            rows = w if each.extension is None else each.extension @ w
-            of_faces, rest = each.second_derivatives(each.extended(x), np.asarray(rows))
-            total += weight * rest
-        halves = (each.hessian_halves(x, of_faces) @ w).reshape(3, len(x), m)
-        turned = w.T @ halves
-        turned -= np.swapaxes(turned, 1, 2)
-        for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # eps_abc
-            total[a * m : (a + 1) * m, b * m : (b + 1) * m] += weight * turned[c]
-            total[b * m : (b + 1) * m, a * m : (a + 1) * m] -= weight * turned[c]
-    return total
+
+    def times(self, v: FloatArray) -> FloatArray:
+        """Return its product with a motion *v* of the cages, (m, 3)."""
+        moved = self.surface.map(v)
+        found = np.zeros_like(moved)
+        for a, b, c in _AXES:
+            found[:, a] += self.turned[c] @ moved[:, b]
+            found[:, b] -= self.turned[c] @ moved[:, a]
+        product = self.surface.adjoint(found)
+        if isinstance(self.rest, float):
+            return product
+        return product + np.reshape(self.rest @ v.T.ravel(), (3, -1)).T
 
 
 def _surface(volumes: Volumes, p: FloatArray) -> FloatArray:
