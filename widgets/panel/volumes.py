@@ -20,6 +20,7 @@ _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
 _LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
 _DEFAULT, _KEEP, _FREE, _SET = "default", "keep", "free", "set"
 _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set", _SET))
+_OTHERS = ("area", "centroid x", "centroid y", "centroid z")  # of the whole
 _MOST_BODIES, _AUTO, _NOTHING = 12, "auto", "Nothing"
 _COLUMNS = (
     Column("volume", "Volume", "In the unit of the mesh, cubed"),
@@ -35,14 +36,14 @@ def volumes_section(editor: DeformEditor) -> Section:
     """Return the volume that is chosen, with its goal, and the plane of symmetry."""
     session, controller = editor.session, editor.controller
     is_ready = session.is_bound and session.has_volume
-    names = session.deformer.volume_names if is_ready else ()
+    names = (*session.deformer.volume_names, *_OTHERS) if is_ready else ()
     name = _chosen.get(controller, "whole")
     name = name if name in names else next(iter(names), "")
     volume, change = session.volume(name) if name else (0.0, 0.0)
     goal = dict(session.options.volumes).get(name, _DEFAULT)
     kind = goal if goal in (_DEFAULT, _KEEP, _FREE) else _SET
     part = editor.widgets.part
-    has_part = part in names
+    has_part, is_place = part in names, name.startswith("centroid")  # which is kept or free
     return Section(
         "volumes",
         "Volumes",
@@ -51,7 +52,8 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "volumes.name",
                 "choice",
                 "Volume of",
-                "A volume of the mesh: of the whole, a body, a cavity, a wall or a region",
+                "The volume of the whole, a body, a cavity, a wall or a region; the area "
+                "or a coordinate of the centroid",
                 value=name or "-",
                 enabled=len(names) > 1,
                 choices=tuple((_label(session, each), each) for each in names) or (("-", "-"),),
@@ -61,7 +63,8 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "volumes.value",
                 "label",
                 "Now",
-                "Its volume, in the unit of the mesh cubed, and how much it has changed",
+                "In the mesh's unit, cubed for a volume, and how much it has changed; a centroid "
+                "in diagonals",
                 value=f"{volume:.5g} ({percent(change)})" if name else "-",
             ),
             Field(
@@ -70,7 +73,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "Change",
                 "Changes the volume to more or less than at rest",
                 value=min(max(round(100.0 * change), _LEAST), _MOST),
-                enabled=bool(name),
+                enabled=bool(name) and not is_place,
                 minimum=_LEAST,
                 maximum=_MOST,
                 unit="%",
@@ -84,7 +87,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 "Whether this volume is kept as at rest, set to its change, or free",
                 value=kind,
                 enabled=bool(name),
-                choices=_GOALS,
+                choices=_GOALS[:-1] if is_place else _GOALS,
                 act=lambda kind: _with_goal(name, kind, change),
             ),
             (

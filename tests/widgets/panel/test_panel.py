@@ -356,6 +356,29 @@ def test_a_handle_is_a_part_whose_volume_is_listed_and_set():
         assert "the part 'pin 1' encloses no volume under a lid" in str(error)
 
 
+def test_an_area_is_set_and_a_centroid_is_kept_while_a_handle_moves():
+    with editing(Mode.DEFORM) as editor:
+        session = editor.session
+        press(editor, "volumes.name", "area")
+        press(editor, "volumes.change", 5)
+        editor.wait()
+        assert abs(session.volume("area")[1] - 0.05) < 1e-12
+        assert of(editor, "volumes.value").value.endswith("(+5 %)")
+        press(editor, "volumes.goal", "default")
+        press(editor, "volumes.name", "centroid z")
+        assert not of(editor, "volumes.change").enabled
+        assert [goal for _, goal in of(editor, "volumes.goal").choices] == [
+            "default", "keep", "free",
+        ]  # fmt: skip
+        press(editor, "volumes.goal", "keep")
+        editor.wait()
+        at = {name: each + 0.1 for name, each in session.targets.items()}
+        session.drag(at)
+        session.commit()
+        assert abs(session.volume("centroid z")[1]) < 1e-12
+        assert dict(session.options.volumes) == {"centroid z": "keep"}
+
+
 def test_a_job_disables_all_sections_until_it_ends():
     with editing(Mode.REGIONS) as editor:
         before, go_on = sections(editor), threading.Event()
