@@ -28,7 +28,7 @@ ROOMS = [
     "version", "importing", "errors", "interpreter", "sizes", "checks", "arrays", "progress",
     "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "finish", "deformer", "io", "any_mesh", "session", "models", "pictures", "filters",
+    "finish", "deformer", "io", "landmarks", "any_mesh", "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.films",
     "widgets.editor", "widgets.panel", "widgets.hosting",
