@@ -33,12 +33,14 @@ from .convert import (
     as_polydata,
     from_polydata,
     is_mesh_file,
+    read_points,
     read_polydata,
     require_writable,
     to_polydata,
     with_vertices,
     writable_suffixes,
     write_mesh,
+    write_points,
 )
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
@@ -59,6 +61,7 @@ __all__ = [
     "of_its_kind",
     "polydata_of",
     "read_mesh",
+    "read_points",
     "read_polydata",
     "read_project",
     "repair_surface",
@@ -73,5 +76,6 @@ __all__ = [
     "with_vertices",
     "writable_suffixes",
     "write_mesh",
+    "write_points",
     "write_project",
 ]

@@ -7,11 +7,12 @@ The files, in reading order:
     files    landmarks in files, by name
 """
 
-from .files import Landmarks, Pairs, paired, read_landmarks, write_landmarks
+from .files import LANDMARK_SUFFIXES, Landmarks, Pairs, paired, read_landmarks, write_landmarks
 from .fit import LandmarkFit, fit_landmarks
 from .spline import Spline
 
 __all__ = [
+    "LANDMARK_SUFFIXES",
     "LandmarkFit",
     "Landmarks",
     "Pairs",

@@ -92,9 +92,9 @@ def read_landmarks(path: str | os.PathLike[str]) -> Landmarks:
     suffix = path.suffix.lower()
     if suffix not in _READERS:
         imported("vtk_segdeform.io")  # imports pyvista
-        from ..io import read_polydata
+        from ..io import read_points
 
-        rows = [(f"{k}", *q, "") for k, q in enumerate(read_polydata(path).points.tolist(), 1)]
+        rows = [(f"{k}", *q, "") for k, q in enumerate(read_points(path).points.tolist(), 1)]
         return _checked(path, rows)
     try:
         with open_regular(path) as file:
@@ -218,3 +218,6 @@ _READERS = {
     ".json": _from_markups,
     ".pp": _from_picked,
 }
+
+LANDMARK_SUFFIXES = frozenset(_READERS)
+"""Of files that hold landmarks only."""
