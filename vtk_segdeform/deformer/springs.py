@@ -1,6 +1,6 @@
 """Poses that springs pull a body to: soft targets of any points, in place of handles.
 
-    minimise  E(p) + k sum_i w_i |x_i - u_i|^2,    sum_i w_i = 1
+    minimise  E(p) + k mean_i |x_i - u_i|^2
 
 Bending lets springs contract at little energy and stretching at much, so soft springs bend a body
 towards its targets, and what they leave is mostly growth; see `landmarks`.
@@ -89,7 +89,6 @@ class SpringBody:
         points: Passengers,
         which: IntArray,
         places: FloatArray,
-        weights: FloatArray,
         stiffness: Sequence[float],
     ) -> Iterator[SpringPose]:
         """Yield the poses of springs at some *points* for each *stiffness* k, which should rise.
@@ -102,8 +101,8 @@ class SpringBody:
             Of the body.
         which : (k,) int
             The points that have springs.
-        places, weights : (k, 3) float, (k,) float
-            u and w; the latter are divided by their sum.
+        places : (k, 3) float
+            u.
         stiffness : sequence of float
             In units of the energy.
         """
@@ -114,8 +113,8 @@ class SpringBody:
         loose = Anchors(problem.anchors_of_loose_parts(ids), p, np.zeros_like(p))
         targets, own = problem.frame.inward(places), np.arange(len(which))
         for k in stiffness:
-            pull = k * problem.energy.scale * weights / weights.sum()
-            term = PositionTerm(rows, own, pull, anchors=loose)
+            pulls = np.full(len(which), k * problem.energy.scale / len(which))
+            term = PositionTerm(rows, own, pulls, anchors=loose)
             solver = GaussNewton(problem.energy, term, Volumes(problem.subspace, ()))
             p = solver.minimise(p, targets, _STEPS).p
             yield SpringPose(problem, p)

@@ -197,11 +197,8 @@ class _Fitting:
             kept, spline = few[stays], Spline(a[few[stays]], smoothing[stays])
             self._splits.append((kept, left, spline))
             self._alone[left] = np.linalg.norm(spline.at(a[left], u[kept]) - u[left], axis=1)
-        spread = np.nanmean(self._alone**2) + np.finfo(float).tiny
-        self._weights = spread / (spread + sigma**2)
         self._scale = _scale_between(a[few], u[few])
-        motion = rigid_fit(self._scale * a[few], u[few], self._weights[few])
-        self._rotation, self._shift = motion
+        self._rotation, self._shift = rigid_fit(self._scale * a[few], u[few])
         self._u = (u - self._shift) @ self._rotation / self._scale
         self._sigma = sigma / self._scale
 
@@ -245,8 +242,7 @@ class _Fitting:
 
     def _poses(self, kept: IntArray, stiffness: Sequence[float]) -> Iterator[SpringPose]:
         """Yield the poses that springs of the landmarks *kept* pull the body to."""
-        u, weights = self._u[kept], self._weights[kept]
-        return self._body.poses(self._points, kept, u, weights, stiffness)
+        return self._body.poses(self._points, kept, self._u[kept], stiffness)
 
     def _left(self, pose: SpringPose) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return where landmarks are, their rotations, and what is left to the targets, at rest."""
