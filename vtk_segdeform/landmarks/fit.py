@@ -33,6 +33,7 @@ from ..arrays import FloatArray, IntArray, as_numbers, as_points
 from ..deformer import Deformer, SpringBody, SpringPose, checked_goals, regions_and_cages
 from ..errors import ArgumentError, ConstraintError
 from ..geometry import rigid_fit
+from ..kernels import one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from .spline import CENTRES, Compact, Spline, smoothing_of
@@ -79,6 +80,7 @@ class LandmarkFit:
         return new_crossings(self.vertices, rest=self._mesh.vertices, faces=self._mesh.faces)
 
 
+@one_blas_thread()
 def fit_landmarks(
     mesh: Mesh,
     source: ArrayLike,
