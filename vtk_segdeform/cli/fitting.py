@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import time
 from argparse import Namespace
 from collections.abc import Sequence
@@ -13,7 +12,6 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray
 from ..errors import ArgumentError, ConstraintError
-from ..files import replacing
 from ..io import Surface, stored_vertices, volume_change
 from ..landmarks import (
     LANDMARK_SUFFIXES,
@@ -24,6 +22,7 @@ from ..landmarks import (
     paired,
     read_landmarks,
     write_landmarks,
+    write_rows,
 )
 from ..pictures import picture_landmarks, require_picture
 from ..progress import Progress
@@ -137,8 +136,7 @@ def _write_residuals(path: Path, fit: LandmarkFit, pairs: Pairs) -> None:
         strict=True,
     )
     rows += [(name, *point, *errors) for name, point, *errors in columns]
-    with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
+    write_rows(path, rows)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -160,6 +160,7 @@ def read_points(path: str | Path) -> pv.PolyData | pv.UnstructuredGrid:
 def write_points(path: str | Path, data: pv.PolyData | pv.UnstructuredGrid) -> None:
     """Write what `read_points` returns; a MeshError as of `write_mesh` if that is impossible."""
     path = as_path(path)
+    require(data, (pv.PolyData, pv.UnstructuredGrid), "data")
     if isinstance(data, pv.PolyData) and data.GetNumberOfPolys() + data.GetNumberOfStrips():
         write_mesh(path, data)
         return
@@ -167,8 +168,11 @@ def write_points(path: str | Path, data: pv.PolyData | pv.UnstructuredGrid) -> N
     if path.suffix.lower() not in suffixes:
         raise MeshError(f"{path}: points without faces are written to {' or '.join(suffixes)} only")
     require_writable(path)
-    with replacing(path) as draft:
-        data.save(draft)
+    try:
+        with replacing(path) as draft:
+            data.save(draft)
+    except OSError as fault:
+        raise MeshError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 def write_mesh(

@@ -7,7 +7,15 @@ The files, in reading order:
     files    landmarks in files, by name
 """
 
-from .files import LANDMARK_SUFFIXES, Landmarks, Pairs, paired, read_landmarks, write_landmarks
+from .files import (
+    LANDMARK_SUFFIXES,
+    Landmarks,
+    Pairs,
+    paired,
+    read_landmarks,
+    write_landmarks,
+    write_rows,
+)
 from .fit import LandmarkFit, fit_landmarks
 from .spline import Spline
 
@@ -21,4 +29,5 @@ __all__ = [
     "paired",
     "read_landmarks",
     "write_landmarks",
+    "write_rows",
 ]

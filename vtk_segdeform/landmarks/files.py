@@ -127,8 +127,16 @@ def write_landmarks(path: str | os.PathLike[str], landmarks: Landmarks) -> None:
     each = zip(landmarks.names, landmarks.points.tolist(), landmarks.uncertainty, strict=True)
     for name, point, sigma in each:
         rows.append((name, *point, *["" if np.isnan(sigma) else float(sigma)] * has_sigma))
-    with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
+    write_rows(path, rows)
+
+
+def write_rows(path: Path, rows: Sequence[Sequence[object]]) -> None:
+    """Write a table to a .csv file; a MeshError if that is impossible."""
+    try:
+        with replacing(path) as draft, draft.open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
+    except OSError as fault:
+        raise MeshError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 _Row = tuple[Any, Any, Any, Any, Any]  # name, x, y, z and uncertainty, as numbers or texts
