@@ -28,7 +28,7 @@ def in_patient(points):
     """Return where points of the atlas are in the patient: grown, the tail turned to the side."""
     grown = points * [1.15, 1.0, 1.2]
     s = np.linspace(-1.5, 1.2, 2701)  # along the body; its middle line keeps its length
-    share = np.clip((s + 0.6) / 0.4, 0.0, 1.0)
+    share = np.clip((s + 0.95) / 0.3, 0.0, 1.0)
     angle = 1.8 * (1.0 - share**2 * (3.0 - 2.0 * share))
     line = np.cumsum([np.cos(angle), np.sin(angle)], axis=1) * (s[1] - s[0])
     along, across, angle = (np.interp(grown[:, 0], s, each) for each in (*line, angle))
@@ -38,7 +38,7 @@ def in_patient(points):
 
 
 truth = in_patient(x)
-landmarks = [0]
+landmarks = [int(x[:, 2].argmax())]
 while len(landmarks) < 24:  # each as far as possible from those before it
     away = np.linalg.norm(x[:, None] - x[landmarks], axis=2).min(axis=1)
     landmarks.append(int(away.argmax()))
