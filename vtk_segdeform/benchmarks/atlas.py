@@ -51,7 +51,7 @@ def run(scale: Scale, progress: Progress | None = None) -> Section:
 def grown(x: FloatArray) -> FloatArray:
     """Return points (n, 3) of a body of height 1 after growth."""
     t = x[:, 2:]
-    return x * np.array([1.3, 0.9, 1.2]) + t * x * np.array([0.2, 0.2, 0.4])
+    return np.asarray(x * [1.3, 0.9, 1.2] + t * x * [0.2, 0.2, 0.4])
 
 
 def bent(x: FloatArray) -> FloatArray:
@@ -92,9 +92,7 @@ def fits() -> list[tuple[Cell, ...]]:
             y = move(x)
             for count in _FEW:
                 ids = order[:count]
-                fit, seconds = timed(
-                    lambda i=ids, y=y, m=mesh: fit_landmarks(m, m.vertices[i], y[i])
-                )
+                fit, seconds = timed(partial(fit_landmarks, mesh, x[ids], y[ids]))
                 spline = Spline(x[ids], np.zeros(count)).at(x, y[ids])
                 own, other = (percent * _rms(each - y) for each in (fit.vertices, spline))
                 left = (
