@@ -61,6 +61,7 @@ if _TYPE_CHECKING:
     from .landmarks import LandmarkFit, Landmarks, fit_landmarks, read_landmarks, write_landmarks
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
+    from .motions import Motion, write_motion
     from .regions import Regions
     from .session import Change, Options, Session, load_session, save_session
     from .solver import Solution, Status
@@ -76,6 +77,7 @@ _MODULE_OF = {
     "LandmarkFit": "landmarks",
     "Landmarks": "landmarks",
     "Mesh": "mesh",
+    "Motion": "motions",
     "Options": "session",
     "Regions": "regions",
     "Slide": "deformer",
@@ -100,6 +102,7 @@ _MODULE_OF = {
     "volume_summary": "geometry",
     "write_landmarks": "landmarks",
     "write_mesh": "io",
+    "write_motion": "motions",
 }
 _SUBPACKAGES = {
     "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "landmarks", "mesh",
@@ -115,6 +118,7 @@ __all__ = [
     "LandmarkFit",
     "Landmarks",
     "Mesh",
+    "Motion",
     "Options",
     "Regions",
     "Session",
@@ -141,6 +145,7 @@ __all__ = [
     "volume_summary",
     "write_landmarks",
     "write_mesh",
+    "write_motion",
 ]
 
 

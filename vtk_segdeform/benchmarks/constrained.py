@@ -5,16 +5,19 @@ The drags take turns, one frame each, so that a busy machine slows all of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
-from ..deformer import Slide
+from ..cages import fit_cages
+from ..deformer import Deformer, Slide
 from ..progress import Progress, tell
+from ..regions import segment
 from ..session import Session
 from .drags import Drag, frames, ready, way_of_handle
-from .measuring import in_own_process, timed
+from .measuring import by_turns, in_own_process, timed
 from .results import Cell, Scale, Section, Table
 from .tasks import Hand, divided_bar, warm_up, with_loose_parts
 
@@ -23,6 +26,7 @@ _COLUMNS = (
     "vertices", "constraint", "median, ms", "median / none", "95 % / none", "steps",
     "volume change", "finish, ms", "finish / none",
 )  # fmt: skip
+_SLOPES = ("vertices", "solve, ms", "direction / solve", "gradient / solve")
 _TEXT = """\
 A bar that inner walls divide into seven parts is bent by its end, turned back and bent again, and \
 the pose is finished. In the row *none* only the whole volume is preserved, as it is in all rows. \
@@ -30,18 +34,41 @@ the pose is finished. In the row *none* only the whole volume is preserved, as i
 fixed vertices and handle; *slides*: half of the fixed vertices slide instead, along planes in \
 which the bar bends, or along the surface; *symmetry*: about the plane of the bend; *area*: also \
 that of the whole surface; *centroid on an axis*: along the bar at rest; *followers*: four balls \
-that lie against the bar. *Volume change* is the largest of all frames. All times are of the \
-processor, summed over its cores."""
+that lie against the bar. *Volume change* is the largest of all frames. *Derivatives* are those of \
+the pose of a solve by its targets, in one direction and the gradient of a function. All times are \
+of the processor, summed over its cores."""
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
     """Return a table with the rows of every size of *scale*."""
     rows: list[tuple[Cell, ...]] = []
+    slopes: list[tuple[Cell, ...]] = []
     for k, size in enumerate(scale.drag_sizes):
         tell(progress, k / len(scale.drag_sizes), f"drags with constraints, {size} vertices")
         found = in_own_process(constrained, size, scale.n_cage_vertices)
         rows += [(size, *row) for row in found]
-    return Section("Drags with constraints", _TEXT, [Table(_COLUMNS, rows, "frames and finish")])
+        slopes.append((size, *in_own_process(differentiated, size, scale.n_cage_vertices)))
+    tables = [Table(_COLUMNS, rows, "frames and finish"), Table(_SLOPES, slopes, "derivatives")]
+    return Section("Drags with constraints", _TEXT, tables)
+
+
+def differentiated(size: int, n_cage_vertices: int) -> tuple[Cell, ...]:
+    """Return the times of a solve of one mesh size, and of derivatives relative to it."""
+    warm_up()
+    bar = divided_bar(size)
+    own = Hand.on(bar)
+    regions = segment(bar, 3)
+    cages = fit_cages(bar, regions, n_cage_vertices)
+    deformer = Deformer(bar, regions, cages, fixed=own.fixed, handle=own.handle)
+    rest, targets = deformer.copy(), own.targets(0.5)
+    solution = deformer.solve(targets)
+    works: list[Callable[[], object]] = [
+        lambda: rest.copy().solve(targets),
+        lambda: deformer.jvp(solution, targets),
+        lambda: deformer.vjp(solution, solution.vertices),
+    ]
+    solve, direction, gradient = by_turns(works, 3)
+    return 1e3 * solve, direction / solve, gradient / solve
 
 
 def constrained(size: int, n_cage_vertices: int) -> list[tuple[Cell, ...]]:

@@ -8,6 +8,7 @@ The files, in reading order:
     fitting         ``segdeform landmarks``
     checking        ``segdeform check``
     subdividing     ``segdeform subdivide``
+    motions         ``segdeform motion``
     selection       point selections such as ``z>80%``
     motion          motions such as ``--rotate z,60``
     turns           how far a handle has turned in a pose

@@ -42,6 +42,7 @@ from .convert import (
     write_mesh,
     write_points,
 )
+from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
@@ -75,6 +76,7 @@ __all__ = [
     "volume_change",
     "with_vertices",
     "writable_suffixes",
+    "write_gltf_motion",
     "write_mesh",
     "write_points",
     "write_project",

@@ -18,6 +18,7 @@ The files, in reading order:
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
+    stationary              a minimum, to first order in its targets and volumes
 """
 
 from .anderson import Anderson
@@ -44,6 +45,7 @@ from .position_constraints import (
 )
 from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
+from .stationary import Curvature, StationaryPoint, half_gradient, off_volumes, rows_of
 from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
@@ -67,6 +69,7 @@ __all__ = [
     "CoarseVolume",
     "Contact",
     "ContactSurface",
+    "Curvature",
     "GaussNewton",
     "HeldVolumes",
     "MirrorTerm",
@@ -76,6 +79,7 @@ __all__ = [
     "Solution",
     "SolverOptions",
     "SolverResult",
+    "StationaryPoint",
     "Status",
     "Step",
     "Term",
@@ -89,10 +93,13 @@ __all__ = [
     "constrained_step",
     "errors_at",
     "gradients",
+    "half_gradient",
     "minimise",
     "moved_along",
+    "off_volumes",
     "position_term",
     "region_volumes",
+    "rows_of",
     "scale_to_volume",
     "steps_to_volume",
     "total_volume",
