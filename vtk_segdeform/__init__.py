@@ -41,6 +41,7 @@ if _TYPE_CHECKING:
         filters,
         geometry,
         io,
+        landmarks,
         mesh,
         mesh_repair,
         models,
@@ -57,6 +58,7 @@ if _TYPE_CHECKING:
     from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
     from .io import Surface, read_mesh, write_mesh
+    from .landmarks import LandmarkFit, Landmarks, fit_landmarks, read_landmarks, write_landmarks
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
     from .motions import Motion, write_motion
@@ -72,6 +74,8 @@ _MODULE_OF = {
     "Change": "session",
     "Deformed": "any_mesh",
     "Deformer": "deformer",
+    "LandmarkFit": "landmarks",
+    "Landmarks": "landmarks",
     "Mesh": "mesh",
     "Motion": "motions",
     "Options": "session",
@@ -85,21 +89,24 @@ _MODULE_OF = {
     "edit": "widgets.plugin",
     "find_faults": "mesh",
     "fit_cages": "cages",
+    "fit_landmarks": "landmarks",
     "load_session": "session",
     "local_volume_change": "geometry",
     "mean_value_coordinates": "cages",
     "pull": "any_mesh",
+    "read_landmarks": "landmarks",
     "read_mesh": "io",
     "repair": "mesh_repair",
     "save_session": "session",
     "segment": "any_mesh",
     "volume_summary": "geometry",
+    "write_landmarks": "landmarks",
     "write_mesh": "io",
     "write_motion": "motions",
 }
 _SUBPACKAGES = {
-    "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "mesh", "mesh_repair",
-    "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
+    "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "landmarks", "mesh",
+    "mesh_repair", "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
 }  # fmt: skip
 
 __all__ = [
@@ -108,6 +115,8 @@ __all__ = [
     "Change",
     "Deformed",
     "Deformer",
+    "LandmarkFit",
+    "Landmarks",
     "Mesh",
     "Motion",
     "Options",
@@ -122,16 +131,19 @@ __all__ = [
     "errors",
     "find_faults",
     "fit_cages",
+    "fit_landmarks",
     "load_session",
     "local_volume_change",
     "mean_value_coordinates",
     "models",
     "pull",
+    "read_landmarks",
     "read_mesh",
     "repair",
     "save_session",
     "segment",
     "volume_summary",
+    "write_landmarks",
     "write_mesh",
     "write_motion",
 ]

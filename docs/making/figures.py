@@ -44,6 +44,7 @@ from vtk_segdeform.pictures import (
     HANDLE,
     add_surface,
     of_region,
+    picture_landmarks,
     picture_volume_change,
     rgb,
 )
@@ -243,6 +244,18 @@ def organs() -> None:
     write("organs", [cut(x), cut(bent)], np.concatenate([x, bent]))
 
 
+def landmarks() -> None:
+    """Draw the landmarks of the example, and the atlas fitted to them."""
+    sys.argv[1:] = []
+    names = runpy.run_path(str(EXAMPLES / "fit_an_atlas.py"))
+    ids, fit = names["landmarks"], names["fit"]
+    ends = {"source": names["x"][ids], "target": names["truth"][ids]}
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    picture_landmarks(
+        FOLDER / "landmarks.png", names["atlas"], fit.vertices, residuals=fit.residuals, **ends
+    )
+
+
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -257,6 +270,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "derivatives": (derivatives, 2),
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
+    "landmarks": (landmarks, 0),
     "rigid": (rigid, 2),
     "slide": (slide, 2),
     "symmetry": (symmetry, 3),

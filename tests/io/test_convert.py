@@ -12,10 +12,12 @@ from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.convert import (
     from_polydata,
+    read_points,
     read_polydata,
     to_polydata,
     with_vertices,
     write_mesh,
+    write_points,
 )
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
@@ -141,3 +143,20 @@ def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_text("v 0 0 0\n")
     with pytest.raises(MeshError, match=f"does not begin as a {suffix} file does"):
         read_polydata(tmp_path / f"a{suffix}")
+
+
+def test_points_alone_and_grids_are_read_and_written_where_there_is_a_place_for_them(tmp_path):
+    points = pv.PolyData(np.arange(12.0).reshape(4, 3))
+    grid = pv.ImageData(dimensions=(3, 2, 2)).cast_to_unstructured_grid()
+    for data, name in ((points, "a.ply"), (points, "a.vtp"), (grid, "a.vtu")):
+        write_points(tmp_path / name, data)
+        again = read_points(tmp_path / name)
+        assert type(again) is type(data)
+        assert_array_equal(again.points, data.points)
+    for data, name in ((points, "b.obj"), (grid, "b.ply")):
+        with pytest.raises(MeshError, match="points without faces are written to"):
+            write_points(tmp_path / name, data)
+        assert not (tmp_path / name).exists()
+    (tmp_path / "c.ply").write_text("ply\nformat ascii 1.0\nelement vertex 0\nend_header\n")
+    with pytest.raises(MeshError, match=r"c\.ply: the PLY file has no vertices"):
+        read_points(tmp_path / "c.ply")

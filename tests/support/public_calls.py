@@ -105,8 +105,9 @@ def expensive(call: Call) -> bool:
     """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.pull", "PolyDataTools.regions",
-        "cactus", "deform", "dinosaur", "edit", "fit_cages", "film", "picture_before_after",
-        "picture_distortion", "picture_regions_and_cages", "picture_volume_change", "pull",
+        "cactus", "deform", "dinosaur", "edit", "fit_cages", "fit_landmarks", "film",
+        "picture_before_after", "picture_distortion", "picture_landmarks",
+        "picture_regions_and_cages", "picture_volume_change", "pull",
     }  # fmt: skip
 
 
@@ -325,8 +326,20 @@ def instance(cls: type) -> Any:
         "PolyDataTools": lambda: surface().segdeform,
         "PlotterTools": lambda: _plotter().segdeform,
         "Film": _film,
+        "LandmarkFit": _fit,
     }
     return made[name]() if name in made else _widget(cls)
+
+
+@functools.cache
+def _landmarks() -> sd.Landmarks:
+    return sd.Landmarks(("a", "b"), mesh().vertices[:2], np.zeros(2))
+
+
+@functools.cache
+def _fit() -> sd.LandmarkFit:
+    x = mesh().vertices[:60:10]
+    return sd.fit_landmarks(mesh(), x, x + 0.1, n_regions=1, n_cage_vertices=24)
 
 
 def _film() -> Film:
@@ -397,6 +410,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "keys": lambda: "",
     "label": lambda: "a step",
     "labels": lambda: (mesh().vertices[:, 0] > 0).astype(int),
+    "landmarks": _landmarks,
     "largest_hole": lambda: 10,
     "lids": lambda: None,
     "locked": lambda: True,
@@ -436,6 +450,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "refine": lambda: True,
     "regions": regions,
     "renderer": lambda: view().renderer,
+    "residuals": lambda: np.zeros((6, 3)),
     "result": _finished,
     "rings": lambda: 1,
     "rotation_groups": lambda: 20,
@@ -443,6 +458,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "seed": lambda: 3,
     "session": session,
     "size": lambda: (0.2, 0.2, 1.0),
+    "source": lambda: mesh().vertices[:60:10],
     "slides": lambda: [sd.Slide(_left())],
     "smoothness": lambda: 1.0,
     "spread": lambda: 0.3,
@@ -452,13 +468,16 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "subtract": lambda: False,
     "surface": surface,
     "symmetry": lambda: None,
+    "target": lambda: mesh().vertices[:60:10] + 0.1,
     "targets": _targets,
     "through": lambda: [_targets()],
     "turn": lambda: (),
     "push": lambda: (),
+    "volume": lambda: "keep",
     "volumes": lambda: {"whole": "keep"},
     "to": lambda: mesh().vertices[100] + [0.0, 0.0, 0.1],
     "tolerance": lambda: 1e-6,
+    "uncertainty": lambda: np.full(6, 0.01),
     "vertex": lambda: 100,
     "vertices": lambda: mesh().vertices,
     "view": view,
@@ -511,6 +530,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Session.set_volume.name": lambda: "whole",
     "Session.forget_volume.name": lambda: "whole",
     "Slide.vertices": _left,
+    "read_landmarks.path": lambda: _file("saved.ply"),
+    "write_landmarks.path": lambda: Path("saved.csv"),
     "Cage.vertices": lambda: cages()[0].vertices,
     "CageDisplay.opacity.value": lambda: 0.5,
     "DeformEditor.keys.value": lambda: "Blender",
@@ -574,6 +595,9 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "read_faces.path": lambda: _file("mesh.ply"),
     "read_mesh.path": lambda: _file("mesh.ply"),
     "read_polydata.path": lambda: _file("mesh.ply"),
+    "read_points.path": lambda: _file("mesh.ply"),
+    "write_points.path": lambda: Path("written.vtp"),
+    "write_points.data": surface,
     "require_writable.arrays": lambda: False,
     "save_session.view": lambda: {"mode": "PULL"},
     "require_writable.path": lambda: Path("written.vtp"),

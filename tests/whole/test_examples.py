@@ -64,6 +64,7 @@ RIGHT = {
         names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
     ),
     "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
+    "fit_an_atlas": lambda names: names["errors"]["fitted"] < 0.9 * names["errors"]["spline"],
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),

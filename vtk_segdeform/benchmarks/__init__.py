@@ -10,6 +10,7 @@ The files, in reading order:
     felt          what drags feel like, for 5 to 500 thousand vertices
     constrained   the same drag with rigid parts, slides, symmetry, volumes and followers
     opening       from opening a file to a surface that follows the pointer
+    atlas         bodies fitted to landmarks, beside a thin-plate spline
     mechanisms    what each mechanism of the solver buys
     paper         tables 1 and 2 of the paper
     peers         the same poses by libigl

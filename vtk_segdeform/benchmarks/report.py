@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import Cancelled, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import constrained, felt, mechanisms, opening, paper, peers
+from . import atlas, constrained, felt, mechanisms, opening, paper, peers
 from .measuring import conditions
 from .results import Scale, Section
 from .tasks import warm_up
@@ -20,6 +20,7 @@ EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "drag": felt.run,
     "constraints": constrained.run,
     "open": opening.run,
+    "landmarks": atlas.run,
     "mechanisms": mechanisms.run,
     "paper": paper.run,
     "peers": peers.run,

@@ -5,6 +5,7 @@ The files, in reading order:
     main            options, help and exit codes
     pulling         ``segdeform pull``
     commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
+    fitting         ``segdeform landmarks``
     checking        ``segdeform check``
     subdividing     ``segdeform subdivide``
     motions         ``segdeform motion``

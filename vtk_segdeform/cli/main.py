@@ -44,6 +44,7 @@ COMMANDS = {
     "demo": "demo",
     "pull": "pulling",
     "deform": "commands",
+    "landmarks": "fitting",
     "edit": "commands",
     "app": "application",
     "serve": "serving",
@@ -55,7 +56,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "constraints", "open", "mechanisms", "paper", "peers")
+EXPERIMENTS = ("drag", "constraints", "open", "landmarks", "mechanisms", "paper", "peers")
 
 _SELECTION = """\
 selections (SEL):
@@ -81,6 +82,7 @@ examples:
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
   segdeform deform heart.ply -o pumped.ply --volume 'cavity=-40%' --volume wall=keep
+  segdeform landmarks atlas.ply -o patient.ply --source atlas.fcsv --target patient.mrk.json
   segdeform regions horse.ply -o regions.vtp --regions 6
   segdeform cages horse.ply -o cages.vtp --regions 6 --cage-vertices 300
 
@@ -284,6 +286,10 @@ def _parser() -> argparse.ArgumentParser:
     _cages(sub)
     _handles(sub)
 
+    sub = add_command("landmarks", "grow and bend a mesh to the targets of its landmarks")
+    _input_output(sub, "the fitted mesh", required=True)
+    _landmarks(sub)
+
     sub = add_command("edit", "deform a mesh or a saved session in a window")
     text = "the deformed mesh, written when the window is closed"
     _input_output(sub, text, session=True)
@@ -420,6 +426,35 @@ def _pull(parser: argparse.ArgumentParser) -> None:
     _contact_and_lids(parser)
     _refine(parser, "with --avoid-contact")
     add("--picture", type=Path, metavar="PNG", help="write a picture of before and after")
+
+
+def _landmarks(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    formats = ".csv, .mrk.json, .fcsv, .pp, or points of a mesh file"
+    text = f"landmarks of the mesh: {formats}"
+    add("--source", type=Path, required=True, metavar="FILE", help=text)
+    text = "their targets, paired by name"
+    add("--target", type=Path, required=True, metavar="FILE", help=text)
+    text = "standard deviation of targets whose file gives none (default: 0, met exactly)"
+    add("--uncertainty", type=float, default=0.0, metavar="S", help=text)
+    text = "keep, a volume, or a change such as +5%% (default: free)"
+    add("--volume", default="free", metavar="GOAL", help=text)
+    text = "move another surface, points, curves, a grid or landmarks along; may be repeated"
+    add("--carry", type=_carried, action="append", default=[], metavar="IN=OUT", help=text)
+    text = "write the error of every landmark"
+    add("--residuals", type=Path, metavar="CSV", help=text)
+    text = "number of regions (default: auto)"
+    add("--regions", type=_count, default=None, metavar="N", help=text)
+    text = "total cage vertices (default: depends on the number of regions)"
+    add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
+    add("--picture", type=Path, metavar="PNG", help="write a picture of mesh and landmarks")
+
+
+def _carried(text: str) -> tuple[Path, Path]:
+    one, _, other = text.partition("=")
+    if not one or not other:
+        raise argparse.ArgumentTypeError(f"must be IN=OUT; got {text!r}")
+    return Path(one), Path(other)
 
 
 def _handles(parser: argparse.ArgumentParser) -> None:

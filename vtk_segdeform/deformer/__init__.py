@@ -24,6 +24,7 @@ The files, in reading order:
     as_printed       the paper as printed, for comparison
     deform           `deform`: the whole method in one call
     pull             `pull`: one point pulled, in one call
+    springs          poses that springs pull a body to
 """
 
 from .arguments import (
@@ -51,6 +52,7 @@ from .finishing import on_volumes
 from .problem import Problem
 from .pull import pull
 from .slides import Slide, checked_slides
+from .springs import SpringBody, SpringPose, regions_and_cages
 from .stiffness import Stiffness
 from .symmetry import Mirror
 from .volume_goals import OTHER_MEASURE, Goals, checked_goals, is_centroid
@@ -68,6 +70,8 @@ __all__ = [
     "PaperSolution",
     "Problem",
     "Slide",
+    "SpringBody",
+    "SpringPose",
     "Stiffness",
     "automatic_locality",
     "changing_components",
@@ -88,5 +92,6 @@ __all__ = [
     "on_volumes",
     "place_text",
     "pull",
+    "regions_and_cages",
     "solved_along",
 ]

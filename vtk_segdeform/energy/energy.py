@@ -94,9 +94,13 @@ class Energy:
         The rotations of clusters are blended: first those that move a cage vertex, by their squared
         rows of K, then those of the cage vertices by W~.  So they vary as smoothly as x.
         """
+        return self.rotations_at(self.subspace, p)
+
+    def rotations_at(self, points: Subspace, p: FloatArray) -> FloatArray:
+        """Return the same at other *points*, by their W~."""
         rotations = closest_rotations(self.covariances(p))
         of_cages = self._shares.T @ rotations.reshape(-1, 9)
-        blended = self.subspace.map(of_cages).reshape(-1, 3, 3)
+        blended = points.map(of_cages).reshape(-1, 3, 3)
         return closest_rotations(np.swapaxes(blended, 1, 2))
 
     @cached_property

@@ -33,12 +33,14 @@ from .convert import (
     as_polydata,
     from_polydata,
     is_mesh_file,
+    read_points,
     read_polydata,
     require_writable,
     to_polydata,
     with_vertices,
     writable_suffixes,
     write_mesh,
+    write_points,
 )
 from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
@@ -60,6 +62,7 @@ __all__ = [
     "of_its_kind",
     "polydata_of",
     "read_mesh",
+    "read_points",
     "read_polydata",
     "read_project",
     "repair_surface",
@@ -75,5 +78,6 @@ __all__ = [
     "writable_suffixes",
     "write_gltf_motion",
     "write_mesh",
+    "write_points",
     "write_project",
 ]

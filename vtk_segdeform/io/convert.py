@@ -21,6 +21,7 @@ from __future__ import annotations
 import copy
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -36,14 +37,16 @@ from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
 from .array_names import set_names, warn_left_out, warn_of_rounding, with_storable_texts
+from .confined import read_confined
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
 from .groups import GROUP, names_key
 from .moving import MovingSurface
 from .off import read_off, write_off
-from .ply import read_ply, write_ply
+from .ply import ply_points, read_ply, write_ply
 from .polygons import polydata_of, triangles_of
 from .stl import read_stl, write_stl
+from .vtk_arrays import data_sets
 from .vtk_formats import read_with_vtk, write_with_vtk
 from .wavefront import read_obj, write_obj
 
@@ -129,6 +132,47 @@ def read_polydata(path: str | Path) -> pv.PolyData:
             "export the mesh itself"
         )
     return surface
+
+
+def read_points(path: str | Path) -> pv.PolyData | pv.UnstructuredGrid:
+    """Read what `read_polydata` reads, or points alone (.ply), or cells of any kind (.vtu).
+
+    Raises
+    ------
+    MeshError
+        If it cannot be read.
+    """
+    path = as_path(path)
+    try:
+        return read_polydata(path)
+    except MeshError as fault:
+        others: list[pv.PolyData | pv.UnstructuredGrid] = []
+        with suppress(MeshError, ValueError, KeyError, OSError):
+            if path.suffix.lower() == ".ply":
+                others = [pv.PolyData(ply_points(path))]
+            elif path.suffix.lower() in (".vtp", ".vtu"):
+                others = [*data_sets(read_confined("vtk", path))]
+        if len(others) == 1 and others[0].n_points:
+            return others[0]
+        raise fault
+
+
+def write_points(path: str | Path, data: pv.PolyData | pv.UnstructuredGrid) -> None:
+    """Write what `read_points` returns; a MeshError as of `write_mesh` if that is impossible."""
+    path = as_path(path)
+    require(data, (pv.PolyData, pv.UnstructuredGrid), "data")
+    if isinstance(data, pv.PolyData) and data.GetNumberOfPolys() + data.GetNumberOfStrips():
+        write_mesh(path, data)
+        return
+    suffixes = (".ply", ".vtp") if isinstance(data, pv.PolyData) else (".vtu",)
+    if path.suffix.lower() not in suffixes:
+        raise MeshError(f"{path}: points without faces are written to {' or '.join(suffixes)} only")
+    require_writable(path)
+    try:
+        with replacing(path) as draft:
+            data.save(draft)
+    except OSError as fault:
+        raise MeshError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
 
 
 def write_mesh(

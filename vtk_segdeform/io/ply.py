@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from ..arrays import IntArray
+from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import (
     COMMENTS,
@@ -104,6 +104,14 @@ def read_ply(path: Path) -> pv.PolyData:
     if lost:
         _log.warning("lists of numbers are not read: %s", ", ".join(dict.fromkeys(lost)))
     return surface
+
+
+def ply_points(path: Path) -> FloatArray:
+    """Return the vertices (n, 3) of a PLY file, which may have no faces."""
+    vertex = tables_of(path.read_bytes()).get("vertex", {})
+    if not _has_numbers(vertex, "xyz"):
+        raise MeshError("the PLY file has no vertices with x, y, z")
+    return np.stack([np.asarray(vertex[name], dtype=float) for name in "xyz"], axis=-1)
 
 
 def _has_numbers(table: Table, names: Iterable[str]) -> bool:

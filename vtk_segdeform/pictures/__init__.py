@@ -34,6 +34,7 @@ from .pictures import (
     draw_mesh,
     picture_before_after,
     picture_distortion,
+    picture_landmarks,
     picture_regions_and_cages,
     picture_volume_change,
 )
@@ -54,6 +55,7 @@ __all__ = [
     "of_region",
     "picture_before_after",
     "picture_distortion",
+    "picture_landmarks",
     "picture_regions_and_cages",
     "picture_volume_change",
     "png_of",

@@ -4,6 +4,7 @@
     before and after    the mesh at rest and deformed; fixed vertices grey, handle red
     volume change       the deformed mesh coloured by a signed percentage, white at zero
     distortion          the deformed mesh coloured by a magnitude, dark at zero
+    landmarks           the mesh at rest and fitted, with landmarks, targets and residuals
 
 The colours are those of `palette`.  `canvas` chooses the camera and writes the files.
 """
@@ -27,6 +28,7 @@ from ..regions import CageSurface, Regions
 from .canvas import add_surface, view_of, write_panels
 from .palette import BODY, FIXED, HANDLE, INK, of_region
 
+_LANDMARK = 0.008  # radius, in diagonals
 _BAR = 0.17  # fraction of the height for the colour bar
 
 
@@ -156,6 +158,57 @@ def picture_distortion(
     values = _values(mesh, distortion, "distortion")
     limits = ("cividis", 0.0, _largest(values))
     _picture_values(path, mesh, vertices, values, "distortion", limits)
+
+
+def picture_landmarks(
+    path: str | Path,
+    mesh: Mesh,
+    vertices: ArrayLike,
+    *,
+    source: ArrayLike,
+    target: ArrayLike,
+    residuals: ArrayLike,
+) -> None:
+    """Draw *mesh* with its landmarks, and fitted, with their targets; lines are residuals.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PNG file to write.
+    mesh : Mesh
+        At rest, n vertices; drawn with the middle of the fitted one.
+    vertices : (n, 3) float
+        Fitted.
+    source, target : (k, 3) float
+        Landmarks at rest and their targets.
+    residuals : (k, 3) float
+        From where the landmarks are to their targets; `LandmarkFit.residuals`.
+    """
+    path = as_path(path)
+    require_mesh(mesh)
+    fitted = as_points(vertices, "vertices", mesh.n_vertices)
+    to = as_points(target, "target")
+    shift = fitted.mean(axis=0) - mesh.vertices.mean(axis=0)
+    rest, own = mesh.vertices + shift, as_points(source, "source", len(to)) + shift
+    off = as_points(residuals, "residuals", len(to))
+    everything = np.concatenate([rest, fitted, own, to])
+    radius = _LANDMARK * float(np.linalg.norm(np.ptp(everything, axis=0)))
+
+    def draw(plotter: pv.Plotter, x: FloatArray, points: FloatArray) -> None:
+        draw_mesh(plotter, mesh, vertices=x)
+        balls = pv.PolyData(points).glyph(geom=pv.Sphere(radius=radius), orient=False, scale=False)
+        plotter.add_mesh(balls, color=HANDLE)
+
+    def draw_rest(plotter: pv.Plotter) -> None:
+        draw(plotter, rest, own)
+
+    def draw_fitted(plotter: pv.Plotter) -> None:
+        draw(plotter, fitted, to)
+        lines = pv.line_segments_from_points(np.stack([to - off, to], axis=1).reshape(-1, 3))
+        plotter.add_mesh(lines.tube(radius=0.4 * radius), color=INK)
+
+    panels = [("landmarks", draw_rest), ("fitted; targets and residuals", draw_fitted)]
+    write_panels(path, panels, everything, view_of(rest, fitted))
 
 
 def draw_mesh(

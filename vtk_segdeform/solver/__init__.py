@@ -36,7 +36,13 @@ from .gauss_newton import GaussNewton, SolverOptions, SolverResult
 from .mirror_term import MirrorTerm
 from .newton import Step, constrained_step, minimise
 from .other_measures import CentroidConstraint, area_of, centroid_of
-from .position_constraints import Anchors, connected_sets, errors_at, position_term
+from .position_constraints import (
+    Anchors,
+    PositionTerm,
+    connected_sets,
+    errors_at,
+    position_term,
+)
 from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
 from .stationary import Curvature, StationaryPoint, half_gradient, off_volumes, rows_of
@@ -67,6 +73,7 @@ __all__ = [
     "GaussNewton",
     "HeldVolumes",
     "MirrorTerm",
+    "PositionTerm",
     "ScaledSurface",
     "Sliding",
     "Solution",

@@ -1,0 +1,33 @@
+"""A body fitted to landmarks, such as an atlas to a patient: grown and bent.
+
+The files, in reading order:
+
+    fit      `fit_landmarks`: what bends and what grows
+    spline   thin-plate splines
+    files    landmarks in files, by name
+"""
+
+from .files import (
+    LANDMARK_SUFFIXES,
+    Landmarks,
+    Pairs,
+    paired,
+    read_landmarks,
+    write_landmarks,
+    write_rows,
+)
+from .fit import LandmarkFit, fit_landmarks
+from .spline import Spline
+
+__all__ = [
+    "LANDMARK_SUFFIXES",
+    "LandmarkFit",
+    "Landmarks",
+    "Pairs",
+    "Spline",
+    "fit_landmarks",
+    "paired",
+    "read_landmarks",
+    "write_landmarks",
+    "write_rows",
+]
