@@ -40,6 +40,7 @@ if _TYPE_CHECKING:
         errors,
         filters,
         geometry,
+        inside,
         io,
         mesh,
         mesh_repair,
@@ -56,6 +57,7 @@ if _TYPE_CHECKING:
     from .deformer import Deformer, Slide
     from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
+    from .inside import VolumeMesh
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
@@ -79,6 +81,7 @@ _MODULE_OF = {
     "Solution": "solver",
     "Status": "solver",
     "Surface": "io",
+    "VolumeMesh": "inside",
     "deform": "any_mesh",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
@@ -95,8 +98,8 @@ _MODULE_OF = {
     "write_mesh": "io",
 }
 _SUBPACKAGES = {
-    "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "mesh", "mesh_repair",
-    "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
+    "cages", "deformer", "energy", "errors", "filters", "geometry", "inside", "io", "mesh",
+    "mesh_repair", "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
 }  # fmt: skip
 
 __all__ = [
@@ -113,6 +116,7 @@ __all__ = [
     "Solution",
     "Status",
     "Surface",
+    "VolumeMesh",
     "deform",
     "edit",
     "errors",

@@ -136,6 +136,30 @@ class Corners(NamedTuple):
         np.minimum.at(result, self.cell, found)
         return result
 
+    def gradients(
+        self, rest: FloatArray, points: FloatArray, n_cells: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the deformation gradients from *rest* to *points*, (p, 3, 3) and (n_cells, 3, 3).
+
+        Means over the corners at a point and in a cell, by volume; the unit matrix elsewhere.
+        """
+        used = self.volumes > 0.0
+        ids, cell, volumes = self.points[used], self.cell[used], self.volumes[used]
+        each = np.swapaxes(
+            np.linalg.solve(edges(rest, ids), edges(points, ids)), 1, 2
+        )  # F_ij = d x_i / d X_j
+        at = _mean(np.repeat(each, 4, axis=0), np.repeat(volumes, 4), ids.ravel(), len(rest))
+        return at, _mean(each, volumes, cell, n_cells)
+
+
+def _mean(values: FloatArray, weights: FloatArray, at: IntArray, count: int) -> FloatArray:
+    """Return the means (count, 3, 3) of *values* (k, 3, 3) by where they are *at* (k,)."""
+    total = np.bincount(at, weights, count)
+    sums = [np.bincount(at, weights * each, count) for each in values.reshape(-1, 9).T]
+    found = np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
+    found[total <= 0.0] = np.eye(3).ravel()
+    return np.asarray(found.reshape(-1, 3, 3))
+
 
 def edges(points: FloatArray, corners: IntArray) -> FloatArray:
     """Return the three edges (c, 3, 3) from *corners* (c, 4), as rows."""

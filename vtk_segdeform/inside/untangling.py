@@ -56,14 +56,16 @@ def inner_points(
     *,
     progress: Progress | None = None,
 ) -> FloatArray:
-    """Return all points (p, 3) with the *free* ones (p,) where E is smallest.
+    """Return all points (p, 3), with the free ones where E is smallest.
 
     Parameters
     ----------
     corners : Corners
         Of the mesh at rest.
     rest, start : (p, 3) float
-        All points at rest, and the others where they are to be.
+        All points at rest, and those that are not free where they are to be.
+    free : (p,) bool
+        The points that are found.
     progress : Progress, optional
         Called before every step; may raise `Cancelled`.
     """

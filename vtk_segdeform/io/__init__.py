@@ -40,6 +40,7 @@ from .convert import (
     writable_suffixes,
     write_mesh,
 )
+from .fields import follow
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
@@ -47,17 +48,20 @@ from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
+from .vtk_formats import read_data_sets, write_with_vtk
 
 __all__ = [
     "IS_ROUNDING",
     "Surface",
     "as_polydata",
+    "follow",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",
     "loss_of",
     "of_its_kind",
     "polydata_of",
+    "read_data_sets",
     "read_mesh",
     "read_polydata",
     "read_project",
@@ -74,4 +78,5 @@ __all__ = [
     "writable_suffixes",
     "write_mesh",
     "write_project",
+    "write_with_vtk",
 ]
