@@ -14,6 +14,7 @@ from volumes import bar, ends
 import vtk_segdeform as sd
 from vtk_segdeform.cli import main
 from vtk_segdeform.errors import ArgumentError, MeshError
+from vtk_segdeform.inside.volume_files import write_volume_file
 
 meshio = pytest.importorskip("meshio")
 
@@ -24,19 +25,16 @@ def with_patches():
     points = np.array(grid.points)
     volume = sd.VolumeMesh(grid)
     faces = np.array(volume.surface.given.regular_faces)
-    low = (points[faces][:, :, 2] < 1e-9).all(axis=1)
-    cells = [("hexahedron", grid.cells_dict[12]), ("quad", faces)]
+    height = points[faces][:, :, 2]
+    tags = np.where(height.min(axis=1) > 3.99, 7, np.where(height.max(axis=1) < 0.01, 5, 2))
     return meshio.Mesh(
         points,
-        cells,
-        cell_sets={"base": [np.empty(0, dtype=int), np.flatnonzero(low)]},
-        field_data={"tip": np.array([7, 2])},
+        [("hexahedron", grid.cells_dict[12]), ("quad", faces)],
+        cell_sets={"lowest": [np.empty(0, dtype=int), np.flatnonzero(tags == 5)]},
+        field_data={"tip": np.array([7, 2]), "base": np.array([5, 2])},
         cell_data={
-            "gmsh:physical": [
-                np.full(grid.n_cells, 1),
-                np.where(points[faces][:, :, 2].min(1) > 3.99, 7, 2),
-            ],
-            "fibre": [grid.cell_data["fibre"].copy(), np.zeros((len(faces), 3))],
+            "gmsh:physical": [np.full(grid.n_cells, 1), tags],
+            "fibre": [np.array(grid.cell_data["fibre"]), np.zeros((len(faces), 3))],
         },
         point_data={"height": points[:, 2].copy()},
     )
@@ -49,7 +47,7 @@ def given(kind, folder):
         return with_patches()
     path = folder / f"bar{kind}"
     if kind == ".msh":
-        meshio.gmsh.write(path, with_patches())
+        write_volume_file(path, with_patches())
     else:
         bar("wedge").save(path)
     return path
@@ -63,10 +61,10 @@ def test_deform_and_pull_give_back_the_kind_with_its_inside_moved(kind, tmp_path
     rest = np.array(before.grid.points, dtype=float)
     solution = sd.deform(mesh, *ends(rest, 40.0), n_regions=2)
     assert isinstance(solution.mesh, meshio.Mesh if is_meshio else pv.UnstructuredGrid)
-    assert solution.inside is not None and not len(solution.inside.inverted)
+    assert not len(solution.inside.inverted)
     assert abs(solution.volume_change) < 1e-12
     assert_array_equal(solution.mesh.points, solution.inside.points)
-    fixed, handle, targets = ends(rest, 40.0)
+    _, handle, targets = ends(rest, 40.0)
     on_surface = np.isin(handle, before._corners.faces)
     assert_allclose(solution.mesh.points[handle[on_surface]], targets[on_surface], atol=1e-6)
     assert_array_equal(solution.mesh.point_data["height"], rest[:, 2])
@@ -133,14 +131,15 @@ def test_other_cells_are_refused_by_name(name):
 def test_patches_have_names():
     patches = sd.VolumeMesh(with_patches()).patches
     height = with_patches().points[:, 2]
-    assert_array_equal(patches["base"], np.flatnonzero(height < 1e-9))
+    for name in ("base", "lowest"):
+        assert_array_equal(patches[name], np.flatnonzero(height < 1e-9))
     assert_array_equal(patches["tip"], np.flatnonzero(height > 4.0 - 1e-9))
 
 
 def test_vectors_turn_or_are_pushed_by_choice():
     volume = sd.VolumeMesh(bar("pyramid"))
     turn = Rotation.from_rotvec([0.3, -0.7, 0.2])
-    pose = volume.pose(2.0 * turn.apply(volume.surface.mesh.vertices))
+    pose = volume.pose(2.0 * turn.apply(np.array(volume.surface.mesh.vertices)))
     fibre = turn.apply([0.0, 0.0, 1.0])
     at = {}
     for how, length in (({}, None), ({"turn": ["fibre"]}, 1.0), ({"push": ["fibre"]}, 2.0)):
@@ -179,38 +178,30 @@ def test_a_damaged_file_is_an_error(suffix, tmp_path):
         sd.VolumeMesh.read(path)
 
 
-def test_the_command_line_deforms_a_patch_and_tells_the_quality(tmp_path, capsys):
-    path, out = tmp_path / "bar.msh", tmp_path / "out.vtu"
-    meshio.gmsh.write(path, with_patches())
-    words = ["deform", str(path), "-o", str(out), "--fixed", "base", "--handle", "tip"]
-    assert not main([*words, "--rotate", "y,40", "--pivot", "0,0,2", "--turn", "fibre"])
-    told = capsys.readouterr().out
-    assert "no cell inverted" in told
+def test_the_command_line_deforms_a_patch(tmp_path, capsys):
+    path, out = tmp_path / "bar.msh", tmp_path / "out.msh"
+    write_volume_file(path, with_patches())
+    words = ["deform", str(path), "--fixed", "base", "--handle", "tip", "--translate", "1,0,0"]
+    assert not main([*words, "-o", str(out)])
+    assert "no cell inverted" in capsys.readouterr().out
+    result = sd.VolumeMesh.read(out)
+    tip = result.patches["tip"]
+    assert_array_equal(tip, sd.VolumeMesh(with_patches()).patches["tip"])
+    assert_allclose(result.grid.points[tip] - with_patches().points[tip], [[1, 0, 0]] * len(tip))
+    assert main([*words, "-o", str(tmp_path / "out.ply")]) == 1
+    assert "cells cannot be written there" in capsys.readouterr().err
+
+
+def test_the_command_line_turns_vectors_and_tells_of_inverted_cells(tmp_path, capsys):
+    path, out = tmp_path / "bar.vtu", tmp_path / "out.vtu"
+    bar("hexahedron").save(path)
+    words = [str(path), "-o", str(out), "--turn", "fibre", "--displacement", "u"]
+    bend = ["--fixed", "z<8%", "--handle", "z>92%", "--rotate", "y,40"]
+    assert not main(["deform", *words, *bend])
+    assert "no cell inverted" in capsys.readouterr().out
     result = pv.read(out)
-    tip = np.flatnonzero(np.asarray(result.point_data["height"]) > 4.0 - 1e-9)
-    expected = np.cos(np.radians(40.0)), np.sin(np.radians(40.0))
-    fibre = np.asarray(result.cell_data["fibre"])
-    last = fibre[np.linalg.norm(fibre, axis=1) > 0.5][-1]
-    assert_allclose(last[[2, 0]], expected, atol=0.1)
-    assert result.points[tip][:, 0].mean() > 1.0
-    assert (
-        main(["pull", str(path), "-o", str(tmp_path / "x.vtu"), "--at", "0,0,4", "--to", "1,0,4"])
-        == 0
-    )
-    assert (
-        main(
-            [
-                "deform",
-                str(path),
-                "-o",
-                str(tmp_path / "x.ply"),
-                "--fixed",
-                "base",
-                "--handle",
-                "tip",
-                "--rotate",
-                "y,4",
-            ]
-        )
-        == 1
-    )
+    expected = [np.sin(np.radians(40.0)), 0.0, np.cos(np.radians(40.0))]
+    assert_allclose(result.cell_data["fibre"][-1], expected, atol=0.02)
+    assert_allclose(result["u"], result.points - bar("hexahedron").points)
+    assert main(["pull", *words, "--at", "0,0,4", "--to", "0,0,1", "--radius", "0.4"]) == 1
+    assert "inverted" in capsys.readouterr().err

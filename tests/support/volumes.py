@@ -1,4 +1,4 @@
-"""Volume meshes made at run time: bars of every kind of cell, bent and tapered, and sampled bodies."""
+"""Volume meshes made at run time: tapered bars of every kind of cell, and their bends."""
 
 from __future__ import annotations
 

@@ -61,30 +61,53 @@ def write_volume_file(path: str | Path, given: Any) -> None:
                 write_with_vtk(draft, given if is_grid else pv.from_meshio(given))
             else:
                 mesh = pv.to_meshio(given) if is_grid else given
-                _meshio(suffix).write(draft, _for_medit(mesh) if suffix == ".mesh" else mesh)
+                mesh, options = (_for_medit if suffix == ".mesh" else _for_gmsh)(mesh)
+                _meshio(suffix).write(draft, mesh, **options)
     except Exception as fault:  # and its writers
         reason = getattr(fault, "strerror", None) or fault
         raise MeshError(f"{path}: cannot be written ({reason})") from fault
 
 
-def _for_medit(mesh: Any) -> Any:
-    """Return *mesh* with the first array of one integer for each cell only, or for each point.
+def _for_medit(mesh: Any) -> tuple[Any, dict[str, str]]:
+    """Return *mesh* with one array of integers of its cells and one of its points, at most.
 
     The format stores no others, and of several ones meshio may write none.
     """
-    plain = copy.copy(mesh)
 
     def is_tag(values: Any) -> bool:
-        return values.ndim == 1 and values.dtype.kind in "iu"
+        return bool(values.ndim == 1 and values.dtype.kind in "iu")
 
     cells = [name for name, rows in mesh.cell_data.items() if all(map(is_tag, rows))]
     points = [name for name, values in mesh.point_data.items() if is_tag(values)]
-    kept = cells[:1], points[:1]
-    plain.cell_data = {name: mesh.cell_data[name] for name in kept[0]}
-    plain.point_data = {name: mesh.point_data[name] for name in kept[1]}
-    lost = [*(mesh.cell_data.keys() - kept[0]), *(mesh.point_data.keys() - kept[1])]
+    return _with_arrays(mesh, cells[:1], points[:1], ".mesh"), {}
+
+
+def _for_gmsh(mesh: Any) -> tuple[Any, dict[str, str]]:
+    """Return *mesh* as meshio can write and read it again, and the options of its writer.
+
+    If there are several types of cells it reads no arrays of cells but those of Gmsh, and version
+    4.1 needs the entities of all points, which only a mesh of Gmsh has.
+    """
+    if len(mesh.cells) == 1:
+        return mesh, {}
+    own = [name for name in mesh.cell_data if name.startswith("gmsh:")]
+    options = {} if "gmsh:dim_tags" in mesh.point_data else {"fmt_version": "2.2"}
+    return _with_arrays(
+        mesh, own, list(mesh.point_data), ".msh with several types of cells"
+    ), options
+
+
+def _with_arrays(mesh: Any, cells: list[str], points: list[str], what: str) -> Any:
+    """Return *mesh* with these arrays of its cells and points only; warn of the others."""
+    plain = copy.copy(mesh)
+    plain.cell_data = {name: mesh.cell_data[name] for name in cells}
+    plain.point_data = {name: mesh.point_data[name] for name in points}
+    lost = {*mesh.cell_data, *mesh.point_data, *mesh.cell_sets} - {*cells, *points}
+    plain.cell_sets = {}
     if lost:
-        _log.warning(".mesh stores one integer a cell only; left out: %s", ", ".join(sorted(lost)))
+        _log.warning(
+            "%s cannot store the arrays and sets %s: left out", what, ", ".join(sorted(lost))
+        )
     return plain
 
 
