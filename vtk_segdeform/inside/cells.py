@@ -16,7 +16,7 @@ that most of the cell has at rest.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,7 +92,7 @@ class Corners(NamedTuple):
 
         *groups* has for each type its number in VTK, the cells (k,), and their points (k, v).
         """
-        parts: list[tuple[IntArray | FloatArray, ...]] = []
+        parts: list[tuple[Any, ...]] = []
         faces: list[IntArray] = []
         for number, cells, ids in groups:
             kind = KINDS[number]
@@ -117,14 +117,16 @@ class Corners(NamedTuple):
                 back = own[signs < 0.0, : len(face)][:, ::-1]
                 own[signs < 0.0, : len(face)] = back
                 faces.append(own)
-        each = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        corner, cell, sign, scale, volume = (
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
         together = np.concatenate(faces)
         _, first, times = np.unique(
             np.sort(together, axis=1), axis=0, return_index=True, return_counts=True
         )
         outer = together[np.sort(first[times == 1])]
         sizes = np.count_nonzero(outer >= 0, axis=1)
-        return cls(*each, sizes, outer[outer >= 0])  # type: ignore[arg-type]
+        return cls(corner, cell, sign, scale, volume, sizes, outer[outer >= 0])
 
     def scaled_jacobians(self, points: FloatArray, n_cells: int) -> FloatArray:
         """Return those of all cells at *points* (p, 3), (n_cells,); 1 for other cells."""

@@ -102,7 +102,7 @@ def inner_points(
     tell(progress, 1.0, "moved the inside")
     result = x + middle
     result[~free] = start[~free]
-    return result
+    return np.asarray(result)
 
 
 def _eps(d: FloatArray) -> float:

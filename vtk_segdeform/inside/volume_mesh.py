@@ -23,7 +23,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..checks import as_text, shown
+from ..checks import as_path, as_text, require, shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen
 from ..io import Surface, follow, polydata_of
@@ -120,7 +120,7 @@ class VolumeMesh:
         MissingDependencyError
             If meshio is not installed.
         """
-        found = volume_of(path)
+        found = volume_of(as_path(path))
         if found is None:
             raise MeshError(f"{path}: has no cells of a volume mesh")
         return found
@@ -210,6 +210,7 @@ class VolumeMesh:
         displacement : str, optional
             The name of a point array to add: how far each point has moved, (p, 3).
         """
+        require(pose, VolumePose, "pose")
         points = as_points(pose.points, "points of the pose", self.grid.n_points)
         moved = self.grid.copy()
         moved.points = points.copy()
@@ -238,7 +239,7 @@ class VolumeMesh:
 
         MeshError if the file cannot be written.
         """
-        write_volume_file(Path(path), self.moved(pose, **fields))
+        write_volume_file(as_path(path), self.moved(pose, **fields))
 
     @cached_property
     def _rest(self) -> FloatArray:
