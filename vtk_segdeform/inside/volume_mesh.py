@@ -23,7 +23,7 @@ import pyvista as pv
 from numpy.typing import ArrayLike
 
 from ..arrays import BoolArray, FloatArray, IntArray, as_points
-from ..checks import as_path, as_text, require, shown
+from ..checks import all_of, as_path, as_text, require, shown
 from ..errors import ArgumentError, MeshError
 from ..freezing import Frozen
 from ..io import Surface, follow, polydata_of
@@ -212,6 +212,7 @@ class VolumeMesh:
         """
         require(pose, VolumePose, "pose")
         points = as_points(pose.points, "points of the pose", self.grid.n_points)
+        turn, push = all_of(turn, str, "turn"), all_of(push, str, "push")
         moved = self.grid.copy()
         moved.points = points.copy()
         if turn or push:
