@@ -65,7 +65,7 @@ def test_deform_and_pull_give_back_the_kind_with_its_inside_moved(kind, tmp_path
     assert abs(solution.volume_change) < 1e-12
     assert_array_equal(solution.mesh.points, solution.inside.points)
     _, handle, targets = ends(rest, 40.0)
-    on_surface = np.isin(handle, before._corners.faces)
+    on_surface = np.isin(handle, before.corners.faces)
     assert_allclose(solution.mesh.points[handle[on_surface]], targets[on_surface], atol=1e-6)
     assert_array_equal(solution.mesh.point_data["height"], rest[:, 2])
     tip = int(rest[:, 2].argmax())

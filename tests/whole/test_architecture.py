@@ -83,6 +83,7 @@ GRANTED = {
     "widgets.web.access": {"aiohttp"},
     "widgets.web.serving": {"aiohttp"},
     "benchmarks.peers": {"igl"},
+    "benchmarks.solids": {"pyvista"},
     "cli.application": {"qtpy"},
     "cli.outputs": {"pyvista"},
 }

@@ -54,7 +54,7 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "constraints", "open", "mechanisms", "paper", "peers")
+EXPERIMENTS = ("drag", "constraints", "open", "mechanisms", "paper", "peers", "solids")
 
 _SELECTION = """\
 selections (SEL):

@@ -10,12 +10,15 @@ The files, in reading order:
     volume_files grids from and to files
 """
 
+from .cells import Corners, gradient_operator
 from .volume_files import require_volume_writable
 from .volume_mesh import VolumeMesh, VolumePose, volume_of
 
 __all__ = [
+    "Corners",
     "VolumeMesh",
     "VolumePose",
+    "gradient_operator",
     "require_volume_writable",
     "volume_of",
 ]

@@ -36,7 +36,7 @@ from scipy import sparse
 
 from ..arrays import BoolArray, FloatArray
 from ..progress import Progress, tell
-from .cells import Corners, cofactors, determinants, edges
+from .cells import Corners, cofactors, determinants, edges, gradient_operator
 
 _FLAT = 1e-9  # determinant, relative to the product of the lengths
 _STEPS, _HALVINGS = 60, 15
@@ -133,14 +133,9 @@ class _Energy:
         used = corners.signs * found > _FLAT * lengths.prod(axis=1)
         used &= (corners.volumes > 0.0) & free[corners.points].any(axis=1)
         ids = corners.points[used]
-        inverse = np.linalg.inv(spanned[used])
-        # J = D^-1 D': row j is the derivative by coordinate j at rest.
-        self._hats = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
+        self._hats, self._gradient = gradient_operator(rest, ids)
         self._ids, self._volumes = ids, corners.volumes[used]
         self._rest, self._free = rest, free
-        rows, columns = np.repeat(np.arange(3 * len(ids)), 4), np.repeat(ids, 3, axis=0).ravel()
-        shape = 3 * len(ids), len(rest)
-        self._gradient = sparse.csr_array((self._hats.ravel(), (rows, columns)), shape)
         self._back = self._gradient.T.tocsr()
 
     def harmonic(self, start: FloatArray) -> FloatArray:

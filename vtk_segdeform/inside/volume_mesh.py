@@ -98,8 +98,9 @@ class VolumeMesh:
         points = np.array(self.grid.points, dtype=np.float64)
         if not np.isfinite(points).all():
             raise MeshError("the mesh has points that are not finite")
-        self._corners = Corners.of(points, _groups(self.grid))
-        polydata = polydata_of(points, self._corners.sizes, self._corners.faces)
+        self.corners = Corners.of(points, _groups(self.grid))
+        """The corners of its cells, and its boundary."""
+        polydata = polydata_of(points, self.corners.sizes, self.corners.faces)
         polydata.GetPointData().ShallowCopy(self.grid.GetPointData())
         for name, ids in self.patches.items():
             if name not in polydata.point_data:
@@ -167,7 +168,7 @@ class VolumeMesh:
         """
         x = as_points(vertices, "vertices", self.surface.mesh.n_vertices)
         start = np.asarray(self.surface.moved(x).points, dtype=np.float64)
-        rest, corners = self._rest, self._corners
+        rest, corners = self._rest, self.corners
         points = inner_points(corners, rest, start, self._is_inner, progress=progress)
         before, after = (
             corners.scaled_jacobians(each, self.grid.n_cells) for each in (rest, points)
@@ -216,7 +217,7 @@ class VolumeMesh:
         moved = self.grid.copy()
         moved.points = points.copy()
         if turn or push:
-            corners = self._corners
+            corners = self.corners
             gradients = corners.gradients(self._rest, points, self.grid.n_cells)
             follow(moved, self.grid, turn=turn, push=push, gradients=gradients)
         names = {*turn, *push}
@@ -249,8 +250,8 @@ class VolumeMesh:
     @cached_property
     def _is_inner(self) -> BoolArray:
         inner = np.zeros(self.grid.n_points, dtype=bool)
-        inner[self._corners.points] = True
-        inner[self._corners.faces] = False
+        inner[self.corners.points] = True
+        inner[self.corners.faces] = False
         return inner
 
 
