@@ -61,6 +61,7 @@ if _TYPE_CHECKING:
     from .io import Surface, read_mesh, write_mesh
     from .mesh import Mesh, find_faults
     from .mesh_repair import repair
+    from .motions import Motion, write_motion
     from .regions import Regions
     from .session import Change, Options, Session, load_session, save_session
     from .solver import Solution, Status
@@ -74,6 +75,7 @@ _MODULE_OF = {
     "Deformed": "any_mesh",
     "Deformer": "deformer",
     "Mesh": "mesh",
+    "Motion": "motions",
     "Options": "session",
     "Regions": "regions",
     "Slide": "deformer",
@@ -96,6 +98,7 @@ _MODULE_OF = {
     "segment": "any_mesh",
     "volume_summary": "geometry",
     "write_mesh": "io",
+    "write_motion": "motions",
 }
 _SUBPACKAGES = {
     "cages", "deformer", "energy", "errors", "filters", "geometry", "inside", "io", "mesh",
@@ -109,6 +112,7 @@ __all__ = [
     "Deformed",
     "Deformer",
     "Mesh",
+    "Motion",
     "Options",
     "Regions",
     "Session",
@@ -133,6 +137,7 @@ __all__ = [
     "segment",
     "volume_summary",
     "write_mesh",
+    "write_motion",
 ]
 
 

@@ -201,6 +201,22 @@ def followers() -> None:
     write("followers", [body(mesh, x, colours) for x in poses], np.concatenate(poses))
 
 
+def derivatives() -> None:
+    """Draw how far the cactus of the example moves with each of two handles."""
+    sys.argv[1:] = []
+    names = runpy.run_path(str(EXAMPLES / "find_the_handles.py"))
+    mesh, deformer = names["mesh"], names["deformer"]
+    solution, drawings = deformer.solve(names["truth"]), []
+    for k in (0, 1):
+        along = np.zeros((3, 3))
+        along[k, 0] = 1.0
+        share = np.linalg.norm(deformer.jvp(solution, along), axis=1)
+        of_faces = share[mesh.faces].mean(axis=1)
+        colours = 255.0 * RISING(np.clip(of_faces, 0.0, 1.0))[:, :3]
+        drawings.append(body(mesh, solution.vertices, colours))
+    write("derivatives", drawings, solution.vertices)
+
+
 def ventricle() -> None:
     """Draw the ventricle of the example at rest and contracted, cut open."""
     sys.argv[1:] = []  # an example writes its pictures to the folder that is named there
@@ -250,6 +266,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "local_volume": (local_volume, 0),
     "pipeline": (pipeline, 3),
     "followers": (followers, 3),
+    "derivatives": (derivatives, 2),
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
     "solids": (solids, 0),

@@ -36,7 +36,12 @@ from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry.lids import lids_of
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.geometry.rotations import closest_rotations
-from vtk_segdeform.geometry.volume import signed_volume, volume_along, volume_gradient
+from vtk_segdeform.geometry.volume import (
+    area_gradient,
+    signed_volume,
+    volume_along,
+    volume_gradient,
+)
 from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import (
     triangles_of,
@@ -45,8 +50,8 @@ from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.solver.exact_volume import moved_along, slopes_along
-from vtk_segdeform.solver.other_measures import CentroidConstraint
+from vtk_segdeform.solver.exact_volume import moved_along, values_along
+from vtk_segdeform.solver.other_measures import CentroidConstraint, area_of
 from vtk_segdeform.solver.volume_constraints import region_volumes, violations
 from vtk_segdeform.subspace.subspace import Subspace, _add_product, _adjoint_product
 
@@ -285,16 +290,26 @@ def test_motions_along_directions_of_several_volumes_agree(twin, monkeypatch, rn
     assert len(constraints) == 3
     paths = np.hstack([mesh.vertices, rng.normal(size=(mesh.n_vertices, 9))])
     x = mesh.vertices + 0.01 * rng.normal(size=mesh.vertices.shape)
-    for call in (
-        partial(slopes_along, constraints, x, paths),
-        partial(moved_along, paths, np.array([0.3, -2.0, 0.7])),
-    ):
-        quick, plain = twin(call)
-        assert_allclose(quick, plain, rtol=1e-12, atol=1e-12)
-    step = 1e-6 * np.eye(3)
-    moved = [violations(constraints, x - paths[:, :3] + moved_along(paths, t)) for t in step]
-    slopes = (np.transpose(moved) - violations(constraints, x)[:, None]) / 1e-6
-    assert_allclose(slopes_along(constraints, x, paths), slopes, rtol=1e-4, atol=1e-4)
+    area = area_of(mesh.vertices, mesh.faces)
+    for some in (constraints, (area, *constraints), (area,)):
+        for call in (
+            lambda some=some: values_along(some, np.hstack([x, paths[:, 3:]]))[0],
+            lambda some=some: values_along(some, np.hstack([x, paths[:, 3:]]))[1],
+            partial(moved_along, paths, np.array([0.3, -2.0, 0.7])),
+        ):
+            quick, plain = twin(call)
+            assert_allclose(quick, plain, rtol=1e-11, atol=1e-12)
+        here, slopes = values_along(some, np.hstack([x, paths[:, 3:]]))
+        assert_allclose(here, violations(some, x), atol=1e-13)
+        steps = 1e-5 * np.eye(3)
+        there, back = (
+            [violations(some, x - paths[:, :3] + moved_along(paths, t)) for t in sign * steps]
+            for sign in (1.0, -1.0)
+        )
+        differences = (np.transpose(there) - np.transpose(back)) / 2e-5
+        assert_allclose(slopes, differences, rtol=1e-5, atol=1e-5)
+    quick, plain = twin(partial(area_gradient, x, mesh.faces))
+    assert_allclose(quick, plain, rtol=1e-11, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", OPEN)

@@ -530,6 +530,11 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "DeformEditor.run.name": lambda: "undo",
     "DeformEditor.path.value": lambda: Path("other.segdeform"),
     "Deformer.finish.solution": lambda: bound().copy().solve(mesh().vertices[_right()]),
+    "Deformer.jvp.solution": lambda: bound().copy().solve(mesh().vertices[_right()]),
+    "Deformer.jvp.volumes": dict,
+    "Deformer.vjp.solution": lambda: bound().copy().solve(mesh().vertices[_right()]),
+    "Deformer.vjp.cotangent": lambda: np.ones(mesh().vertices.shape),
+    "Deformer.vjp.volumes": tuple,
     "Film.save.path": lambda: Path("saved.gif"),
     "HandleDragger.handle.value": lambda: "handle 1",
     "HandleDragger.local.value": lambda: True,
@@ -589,6 +594,10 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "save_session.view": lambda: {"mode": "PULL"},
     "require_writable.path": lambda: Path("written.vtp"),
     "write.path": lambda: Path("written.ply"),
+    "write_motion.path": lambda: Path("written.glb"),
+    "write_motion.poses": lambda: [mesh().vertices + 0.1],
+    "write_motion.seconds": lambda: [1.0],
+    "write_motion.surface": mesh,
     "write_mesh.path": lambda: Path("written.ply"),
 }
 

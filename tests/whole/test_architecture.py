@@ -28,7 +28,8 @@ ROOMS = [
     "version", "importing", "errors", "interpreter", "sizes", "checks", "arrays", "progress",
     "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "finish", "deformer", "io", "inside", "any_mesh", "session", "models", "pictures", "filters",
+    "finish", "deformer", "autograd", "io", "inside", "any_mesh", "motions", "session", "models",
+    "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.films",
     "widgets.editor", "widgets.panel", "widgets.hosting",
@@ -36,7 +37,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 395  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 403  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
@@ -49,6 +50,7 @@ GRANTED = {
     "cages.contour": VTK,
     "subspace.gpu": {"cupy", "torch"},
     "models.implicit": VTK,
+    "autograd": {"torch"},
     "io": {"pyvista"},
     "io.array_names": VTK,
     "io.convert": VTK,

@@ -34,6 +34,10 @@ RIGHT = {
         and names["after"] > 1.2 * names["before"]
         and not len(names["solution"].crossings())
     ),
+    "find_the_handles": lambda names: names["off"] < 1e-3 and max(names["changes"]) < 1e-12,
+    "write_a_motion": lambda names: (
+        len(names["motion"].kept) < 20 and names["motion"].deviation < 0.002
+    ),
     "with_and_without_volume": lambda names: (
         abs(names["changes"][True]) < 1e-12 and abs(names["changes"][False]) > 1e-3
     ),

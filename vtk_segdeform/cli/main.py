@@ -48,6 +48,7 @@ COMMANDS = {
     "app": "application",
     "serve": "serving",
     "check": "checking",
+    "motion": "motions",
     "subdivide": "subdividing",
     "regions": "commands",
     "cages": "commands",
@@ -69,6 +70,7 @@ _EXAMPLES = """\
 examples:
   segdeform demo -o demo-output
   segdeform pull horse.ply -o pulled.ply --at 0.1,0,0.9 --to 0.2,0,1.1
+  segdeform motion rest.ply bent-1.ply bent-2.ply bent-3.ply -o bend.glb
   segdeform check scan.ply --repair -o closed.ply
   segdeform subdivide part.stl -o fine.stl
   segdeform edit horse.ply -o bent.ply
@@ -300,6 +302,19 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--repair", action="store_true", help=text)
     text = "fill holes of at most this many edges (default: 100)"
     sub.add_argument("--largest-hole", type=_count, default=100, metavar="EDGES", help=text)
+
+    sub = add_command("motion", "write poses of a mesh as morph targets or for ParaView")
+    sub.add_argument("input", type=Path, metavar="FILE", help="the mesh at rest")
+    text = "the same mesh in other poses, in their order"
+    sub.add_argument("poses", type=Path, nargs="+", metavar="POSE", help=text)
+    text = "a .glb or .gltf with morph targets, or a .pvd with all poses"
+    sub.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help=text)
+    text = "poses per second (default: 24)"
+    sub.add_argument("--fps", type=float, default=24.0, metavar="N", help=text)
+    text = (
+        "how far a blend may be from a pose that is left out, in %% of the diagonal (default: 0.2)"
+    )
+    sub.add_argument("--tolerance", type=float, default=0.2, metavar="PERCENT", help=text)
 
     sub = add_command("subdivide", "split long edges, so that large faces can be pulled")
     _input_output(sub, "the subdivided mesh, of triangles", required=True)

@@ -12,6 +12,7 @@ The files, in reading order:
     growth           the shape that has the volumes that are set
     constraints      fixed vertices, handles and volumes, made once for a set of them
     path             the last pose, and how the next one is reached from there
+    derivatives      derivatives of a pose, by targets, volumes and stiffness
     local            constraints that move the surface near a grabbed point only
     finishing        what a finish is given
     frame            the coordinates in which a mesh is deformed
@@ -44,6 +45,7 @@ from .as_printed import PaperDeformer, PaperSolution
 from .clamping import clamped
 from .deform import deform, finished, solved_along
 from .deformer import Deformer
+from .derivatives import Gradient
 from .enclosed_volume import changing_components
 from .finishing import on_volumes
 from .problem import Problem
@@ -60,6 +62,7 @@ __all__ = [
     "SPREAD",
     "Deformer",
     "Goals",
+    "Gradient",
     "Mirror",
     "PaperDeformer",
     "PaperSolution",

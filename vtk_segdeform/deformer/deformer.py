@@ -64,6 +64,7 @@ from .arguments import (
 )
 from .as_printed import PaperDeformer
 from .constraints import Constraints, HoldOptions
+from .derivatives import Gradient, Linearised
 from .enclosed_volume import EnclosedVolume
 from .finishing import VOLUME_MET, finish_of
 from .local import near_point
@@ -548,6 +549,72 @@ class Deformer:
         return self._far(goal, solution)
 
     @one_blas_thread()
+    def jvp(
+        self,
+        solution: Solution,
+        targets: ArrayLike | None = None,
+        *,
+        volumes: Mapping[str, float] | None = None,
+        stiffness: ArrayLike | None = None,
+    ) -> FloatArray:
+        """Return how the vertices of *solution* move, (n, 3), with a motion of what it depends on.
+
+        Exact to first order; see `derivatives`.
+
+        Parameters
+        ----------
+        solution : Solution
+            That of the last solve, converged.
+        targets : (k, 3) float, optional
+            Motion of the targets.
+        volumes : mapping of str to float, optional
+            Changes of goals of `volumes` that are equal to a volume, in the mesh's unit cubed; of
+            centroids in its unit.
+        stiffness : (n,) float, optional
+            Change of the stiffness.
+
+        Raises
+        ------
+        ArgumentError
+            If *solution* is finished or has not converged; if contact is avoided and active,
+            vertices slide along a surface, or an area is kept: there is no derivative then.  If a
+            goal, or the pull of a `local` deformer, is asked for whose volume is not set.
+        """
+        pose = self._linearised(solution)
+        return pose.motion(
+            None if targets is None else as_points(targets, "targets", len(self.handle)),
+            volumes={} if volumes is None else volumes,
+            stiffness=stiffness,
+            now=self._stiffness,
+        )
+
+    @one_blas_thread()
+    def vjp(
+        self, solution: Solution, cotangent: ArrayLike, *, volumes: Sequence[str] = ()
+    ) -> Gradient:
+        """Return the gradient of a function of the vertices of *solution*; see `jvp`.
+
+        *cotangent* (n, 3) is its gradient by the vertices.  Returned are that by the targets, and
+        those by the goals of *volumes* with these names.
+        """
+        pose = self._linearised(solution)
+        return pose.gradient(as_points(cotangent, "cotangent", self.mesh.n_vertices), volumes)
+
+    def _linearised(self, solution: Solution) -> Linearised:
+        """Return the pose of *solution* to first order, which has to be that of the last solve."""
+        self._require_last(solution)
+        return Linearised.of(solution, self._path, self._enclosed, self._options)
+
+    def _require_last(self, solution: Solution) -> None:
+        require(solution, Solution, "solution")
+        frame, cages = self._problem.frame, [each.shape for each in solution.cage_vertices]
+        if cages != [cage.vertices.shape for cage in self.cages] or not (
+            largest_length(np.concatenate(solution.cage_vertices) - frame.outward(self._path.p))
+            <= _SAME * frame.size
+        ):
+            raise ArgumentError("solution is not the pose of the last solve; resume it first")
+
+    @one_blas_thread()
     def finish(self, solution: Solution, *, progress: Progress | None = None) -> Solution:
         """Return the pose of the last solve, finished on the mesh itself; see `finish`.
 
@@ -581,13 +648,8 @@ class Deformer:
         ArgumentError
             If *solution* is not a pose of the last solve.
         """
-        require(solution, Solution, "solution")
-        frame, cages = self._problem.frame, [each.shape for each in solution.cage_vertices]
-        if cages != [cage.vertices.shape for cage in self.cages] or not (
-            largest_length(np.concatenate(solution.cage_vertices) - frame.outward(self._path.p))
-            <= _SAME * frame.size
-        ):
-            raise ArgumentError("solution is not the pose of the last solve; resume it first")
+        self._require_last(solution)
+        frame = self._problem.frame
         unfinished = solution.vertices if solution.unfinished is None else solution.unfinished
         pose = start = frame.about_origin(unfinished)
         if solution.is_finished:

@@ -97,7 +97,7 @@ class Path:
         to the exact ones.  If by more than `_SCALED`, they are taken again with the coarse volumes
         of the scaled mesh.
         """
-        steps = 0 if self.is_on_volumes else self._change_volumes(options)
+        steps = self.change_volumes(options)
         steps += self._follow_waypoints(goal, options)
         self.targets = goal
         contact = self.constraints.contact
@@ -154,8 +154,10 @@ class Path:
         x = self._problem.map(self.p)
         return [each.missed(x) > _MISSED for each in self.constraints.preserved.constraints]
 
-    def _change_volumes(self, options: SolverOptions) -> int:
+    def change_volumes(self, options: SolverOptions) -> int:
         """Change the volumes to their targets, in legs; return the number of steps."""
+        if self.is_on_volumes:
+            return 0
         preserved, volumes, *_ = self.constraints.preserved
         x = self._problem.map(self.p)
         missed = {k for k, each in enumerate(preserved) if each.missed(x) > _MISSED}

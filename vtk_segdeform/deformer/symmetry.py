@@ -132,12 +132,27 @@ class Mirror:
         """
         rest, given = mesh.vertices[ids], ids[: len(targets)]
         u = targets - rest[: len(targets)]
-        order = np.argsort(given)
-        mates = self.mates[given]
-        place = order[np.searchsorted(given, mates, sorter=order).clip(max=len(given) - 1)]
-        both = np.flatnonzero(given[place] == mates) if len(given) else order
-        u[both] = 0.5 * (u[both] + self.reflected(u[place[both]]))
+        both, mates = self._pairs(given)
+        u[both] = 0.5 * (u[both] + self.reflected(u[mates]))
         return np.asarray(rest + np.concatenate([u, self.reflected(u[sources])]))
+
+    def adjoint(self, ids: IntArray, sources: IntArray, slopes: FloatArray) -> FloatArray:
+        """Return the gradient (k, 3) by the targets of `moved`, from that by its result."""
+        count = len(ids) - len(sources)
+        found = slopes[:count].copy()
+        np.add.at(found, sources, self.reflected(slopes[count:]))
+        both, mates = self._pairs(ids[:count])
+        halves = 0.5 * found[both]
+        found[both] -= halves
+        np.add.at(found, mates, self.reflected(halves))
+        return found
+
+    def _pairs(self, ids: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the places in *ids* (k,) of vertices whose mates are there, too, and of these."""
+        order, mates = np.argsort(ids), self.mates[ids]
+        place = order[np.searchsorted(ids, mates, sorter=order).clip(max=len(ids) - 1)]
+        both = np.flatnonzero(ids[place] == mates) if len(ids) else order
+        return both, place[both]
 
     def term(self, subspace: Subspace, rest_cages: FloatArray, weight: float) -> MirrorTerm:
         """Return the term that keeps the cages symmetric, of this *weight* in all."""

@@ -54,15 +54,20 @@ from .ties import principal_axes, tie_breakers
 from .turned_over import turned_over
 from .up_axis import guess_up_axis
 from .volume import (
+    area,
+    area_gradient,
+    area_slopes_along,
     corner_and_edges,
     outer_components,
     signed_volume,
     signed_volumes,
+    slopes_of,
     step_to_volume,
     volume_along,
     volume_along_path,
     volume_gradient,
     volume_gradients,
+    volume_slopes_along,
 )
 
 __all__ = [
@@ -76,7 +81,10 @@ __all__ = [
     "LocalVolume",
     "NormalTransport",
     "VertexNormals",
+    "area",
+    "area_gradient",
     "area_gradients",
+    "area_slopes_along",
     "carriers",
     "chambers_of",
     "checked_attach",
@@ -104,6 +112,7 @@ __all__ = [
     "rigid_fit",
     "signed_volume",
     "signed_volumes",
+    "slopes_of",
     "step_to_volume",
     "tie_breakers",
     "towards",
@@ -114,6 +123,7 @@ __all__ = [
     "volume_along_path",
     "volume_gradient",
     "volume_gradients",
+    "volume_slopes_along",
     "volume_summary",
     "voronoi_cells",
     "with_least_areas",

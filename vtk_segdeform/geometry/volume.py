@@ -99,6 +99,60 @@ def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
     return np.array([c0, c1, c2, c3]) / 6.0
 
 
+def volume_slopes_along(paths: FloatArray, faces: IntArray) -> FloatArray:
+    """Return V, and its derivative along each direction of *paths*, (1 + d,).
+
+    *paths* (n, 3 + 3 d) has the vertices and their d directions side by side.
+    """
+    if kernels := compiled_kernels(len(faces) + paths.size // 3):
+        return _slopes(kernels.volume_slopes, paths, faces) / 6.0
+    x = paths[:, :3]
+    return np.array([signed_volume(x, faces), *slopes_of(volume_gradient(x, faces), paths)])
+
+
+def area(x: FloatArray, faces: IntArray) -> float:
+    """Return the area of *faces* (m, 3) of *x* (n, 3)."""
+    return float(area_slopes_along(x, faces)[0])
+
+
+def area_gradient(x: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the derivative of the area by each of *x* (n, 3), (n, 3)."""
+    found = np.zeros(x.shape)
+    if kernels := compiled_kernels(len(faces)):
+        kernels.area_gradient(*inputs(x, faces), found)
+        return found
+    _, e, f = corner_and_edges(x, faces)
+    normal = cross_rows(e, f)
+    lengths = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = 0.5 * normal / np.where(lengths > 0.0, lengths, np.inf)
+    of_j, of_k = cross_rows(f, normal), cross_rows(normal, e)
+    for corner, slope in zip(faces.T, (-of_j - of_k, of_j, of_k), strict=True):
+        for axis in range(3):
+            found[:, axis] += np.bincount(corner, slope[:, axis], minlength=len(x))
+    return found
+
+
+def area_slopes_along(paths: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the area, and its derivatives as `volume_slopes_along`, (1 + d,)."""
+    if kernels := compiled_kernels(len(faces) + paths.size // 3):
+        return _slopes(kernels.area_slopes, paths, faces) / 2.0
+    _, e, f = corner_and_edges(paths[:, :3], faces)
+    total = 0.5 * np.linalg.norm(cross_rows(e, f), axis=1).sum()
+    return np.array([total, *slopes_of(area_gradient(paths[:, :3], faces), paths)])
+
+
+def slopes_of(gradient: FloatArray, paths: FloatArray) -> FloatArray:
+    """Return the derivative (d,) along each direction of *paths*, from a *gradient* (n, 3)."""
+    directions = paths.reshape(len(gradient), -1, 3)[:, 1:]
+    return np.asarray(np.einsum("ia,ida->d", gradient, directions))
+
+
+def _slopes(kernel: Any, paths: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the sums of a *kernel* over all faces."""
+    out = np.empty((_blocks(faces), paths.shape[1] // 3))
+    return np.asarray(_by_blocks(kernel, inputs(paths, faces), out).sum(axis=0))
+
+
 def outer_components(x: FloatArray, component: IntArray, volumes: FloatArray) -> IntArray:
     """Return the component around each cavity, and of other components their own number, (c,) int.
 

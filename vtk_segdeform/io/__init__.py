@@ -41,6 +41,7 @@ from .convert import (
     write_mesh,
 )
 from .fields import follow
+from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
@@ -76,6 +77,7 @@ __all__ = [
     "volume_change",
     "with_vertices",
     "writable_suffixes",
+    "write_gltf_motion",
     "write_mesh",
     "write_project",
     "write_with_vtk",

@@ -18,6 +18,7 @@ The files, in reading order:
     contact                 parts of the surface that push each other apart
     waypoints               intermediate targets for large motions
     solution                `Solution` and `Status`
+    stationary              a minimum, to first order in its targets and volumes
 """
 
 from .anderson import Anderson
@@ -38,6 +39,7 @@ from .other_measures import CentroidConstraint, area_of, centroid_of
 from .position_constraints import Anchors, connected_sets, errors_at, position_term
 from .sliding import Sliding, Track
 from .solution import CONVERGED, HeldVolumes, Solution, Status
+from .stationary import StationaryPoint, curvature, half_gradient, off_volumes, rows_of
 from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
@@ -69,6 +71,7 @@ __all__ = [
     "Solution",
     "SolverOptions",
     "SolverResult",
+    "StationaryPoint",
     "Status",
     "Step",
     "Term",
@@ -80,12 +83,16 @@ __all__ = [
     "centroid_of",
     "connected_sets",
     "constrained_step",
+    "curvature",
     "errors_at",
     "gradients",
+    "half_gradient",
     "minimise",
     "moved_along",
+    "off_volumes",
     "position_term",
     "region_volumes",
+    "rows_of",
     "scale_to_volume",
     "steps_to_volume",
     "total_volume",

@@ -20,13 +20,14 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
-from .volume_constraints import VolumeConstraint, gradients, violations
+from .volume_constraints import VolumeConstraint, violations, with_points
 
 _log = logging.getLogger(__name__)
 _NEWTON_STEPS = 8
 _EXACT = 1e-15  # error of a volume, as a share of all
 _MET = 1e-13  # the same, for telling whether the directions were good enough
 _ROUNDING = 1e-12  # response of a volume to its direction, relative to the largest
+_RISE = 8.0  # of the rate at which errors fall: twice, with one Jacobian and quadratic terms alone
 _SMALL = 1e-6  # error below which the derivatives of the last step are near enough
 _CACHED = 1 << 14  # vertices moved together
 _SHARES = 4  # of a mesh that threads scale; smaller ones take less time than waking a thread
@@ -40,19 +41,24 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     """
     if len(constraints) == 1 and constraints[0].is_cubic:
         return np.array([constraints[0].exact_step(paths)])
+    all_cubic = all(each.is_cubic for each in constraints)
     t = np.zeros(len(constraints))
     units = _units(constraints)
-    here, before, inverse = np.ascontiguousarray(paths[:, :3]), np.inf, None
+    here, before, inverse = paths[:, :3], np.inf, None
     best, least = t.copy(), np.inf  # areas and centroids that cannot be met lead far away
     for _ in range(_NEWTON_STEPS):
-        g = violations(constraints, here)
+        if inverse is None:
+            g, jacobian = values_along(constraints, paths)
+        else:
+            g = violations(constraints, here)
         error = float(np.abs(g / units).max())
         if error < least:
             best, least = t.copy(), error
         if error <= _EXACT or (error <= _SMALL and error > 0.5 * before):
             break
         if inverse is None or error > _SMALL:
-            jacobian = slopes_along(constraints, here, paths)
+            if inverse is not None:
+                _, jacobian = values_along(constraints, np.hstack([here, paths[:, 3:]]))
             # A small or firmly held body hardly responds; scaled, all have ones on the diagonal.
             # One with a few coarse points may not respond at all but for rounding, and does not
             # take part.
@@ -61,8 +67,10 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
             both = scale[:, None] * scale
             inverse = np.linalg.pinv(jacobian / both, rcond=1e-12) / both
         t -= inverse @ g
+        if all_cubic and before < np.inf and _RISE * error * error <= _EXACT * before:
+            break  # the next error is less than that
         here, before = moved_along(paths, t), error
-    return t if all(each.is_cubic for each in constraints) else best
+    return t if all_cubic else best
 
 
 def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
@@ -95,18 +103,15 @@ def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
     return x
 
 
-def slopes_along(
-    constraints: Sequence[VolumeConstraint], x: FloatArray, paths: FloatArray
-) -> FloatArray:
-    """Return the derivative at *x* (n, 3) of each g along each direction of *paths*, (c, c)."""
-    rows = gradients(constraints, x)
-    if kernels := compiled_kernels(len(x)):
-        (read,), found = inputs(paths), np.zeros((len(rows), 1 + len(rows)))
-        for row, out in zip(rows, found, strict=True):
-            kernels.add_slopes(row, read, out)
-        return found[:, 1:]
-    along = paths.reshape(len(x), -1, 3)[:, 1:]
-    return np.asarray(np.tensordot(rows, along, ([1, 2], [0, 2])))
+def values_along(
+    constraints: Sequence[VolumeConstraint], paths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return g (c,) at *paths* (n, 3 + 3 d), and its derivative along each direction, (c, d)."""
+    found = np.empty((len(constraints), paths.shape[1] // 3))
+    for some, points in with_points(constraints, paths):
+        for k in some:
+            found[k] = constraints[k].along(points)
+    return found[:, 0] - [each.target for each in constraints], found[:, 1:]
 
 
 def scale_to_volume(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..geometry import corner_and_edges
+from ..geometry import area, area_gradient, area_slopes_along, corner_and_edges, slopes_of
 from ..kernels import compiled_kernels, inputs
 from .volume_constraints import VolumeConstraint
 
@@ -32,17 +32,15 @@ class AreaConstraint(VolumeConstraint):
 
     def value(self, points: FloatArray) -> float:
         """Return A."""
-        _, e, f = corner_and_edges(points, self.faces)
-        return 0.5 * float(np.linalg.norm(np.cross(e, f), axis=1).sum())
+        return area(points, self.faces)
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Return dA/dx, (n, 3)."""
-        _, e, f = corner_and_edges(points, self.faces)
-        normal = np.cross(e, f)
-        lengths = np.linalg.norm(normal, axis=1, keepdims=True)
-        normal = 0.5 * normal / np.where(lengths > 0.0, lengths, np.inf)
-        of_j, of_k = np.cross(f, normal), np.cross(normal, e)
-        return _summed(self.faces, (-of_j - of_k, of_j, of_k), len(points))
+        return area_gradient(points, self.faces)
+
+    def along(self, paths: FloatArray) -> FloatArray:
+        """Return A, and its derivative along each direction, (1 + d,)."""
+        return area_slopes_along(paths, self.faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +97,12 @@ class CentroidConstraint(VolumeConstraint):
         return _summed(
             self.faces, [away[:, None] * side / 6.0 + along for side in sides], len(points)
         )
+
+    def along(self, paths: FloatArray) -> FloatArray:
+        """Return C_a, and its derivative along each direction, (1 + d,)."""
+        points = np.ascontiguousarray(paths[:, :3])
+        slopes = slopes_of(self.slope(points), paths)
+        return np.array([self.value(points), *slopes])
 
     def second_derivatives(
         self, points: FloatArray, rows: FloatArray
@@ -159,8 +163,7 @@ class CentroidConstraint(VolumeConstraint):
 
 def area_of(x: FloatArray, faces: IntArray) -> AreaConstraint:
     """Return the constraint that *faces* (m, 3) of *x* (n, 3) keep their area."""
-    free = AreaConstraint(faces, 0.0)
-    return replace(free, target=free.value(x))
+    return AreaConstraint(faces, area(x, faces))
 
 
 def centroid_of(

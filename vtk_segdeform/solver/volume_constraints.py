@@ -30,6 +30,7 @@ from ..geometry import (
     step_to_volume,
     volume_along_path,
     volume_gradients,
+    volume_slopes_along,
 )
 from ..mesh import Mesh, edge_keys
 from ..subspace import Subspace
@@ -76,6 +77,13 @@ class VolumeConstraint:
     def slope(self, points: FloatArray) -> FloatArray:
         """Return dV/dx of all points, (n, 3)."""
         return volume_gradients(points, [self.faces])[0]
+
+    def along(self, paths: FloatArray) -> FloatArray:
+        """Return V, and its derivative along each direction of *paths* (n, 3 + 3 d), (1 + d,).
+
+        *paths* has all points, those of `extended`, and the d directions beside them.
+        """
+        return volume_slopes_along(paths, self.faces)
 
     def change(self, x: FloatArray) -> float:
         """Return by how much it differs from that at rest, as a share of it."""
@@ -174,7 +182,7 @@ def with_same_points(constraints: Sequence[VolumeConstraint]) -> tuple[VolumeCon
 def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
     """Return g(x) of all *constraints*, (c,), in units of volume."""
     found = np.empty(len(constraints))
-    for some, points in _with_points(constraints, x):
+    for some, points in with_points(constraints, x):
         cubic = [k for k in some if constraints[k].is_cubic]
         found[cubic] = signed_volumes(points, [constraints[k].faces for k in cubic])
         for k in set(some) - set(cubic):
@@ -185,7 +193,7 @@ def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatA
 def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
     """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
     found = [x] * len(constraints)
-    for some, points in _with_points(constraints, x):
+    for some, points in with_points(constraints, x):
         cubic = [k for k in some if constraints[k].is_cubic]
         slopes = volume_gradients(points, [constraints[k].faces for k in cubic])
         slopes += [constraints[k].slope(points) for k in some if k not in cubic]
@@ -195,10 +203,10 @@ def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[Fl
     return found
 
 
-def _with_points(
+def with_points(
     constraints: Sequence[VolumeConstraint], x: FloatArray
 ) -> Iterator[tuple[list[int], FloatArray]]:
-    """Yield the numbers of the constraints that share their points, and these points."""
+    """Yield the numbers of the constraints that share their points, and these, `extended`."""
     others = list(range(len(constraints)))
     while others:
         first = constraints[others[0]]

@@ -7,7 +7,7 @@
     accessors   accessors that get new numbers
     moved       a document that was read, with other positions
     plain       a new document from any surface
-    writing     `write_gltf`
+    writing     `write_gltf`, `write_gltf_motion`
 
 Why not pygltflib or trimesh: what was read is written again with changes of a few numbers, and
 everything else must remain as it is.  pygltflib drops fields that it does not know, and trimesh
@@ -16,6 +16,6 @@ file ends in any exception.  `buffers` checks them already, and JSON needs no cl
 """
 
 from .reading import read_gltf
-from .writing import write_gltf
+from .writing import write_gltf, write_gltf_motion
 
-__all__ = ["read_gltf", "write_gltf"]
+__all__ = ["read_gltf", "write_gltf", "write_gltf_motion"]

@@ -5,11 +5,13 @@ points      positions in single precision, relative to the middle of a surface t
             "RGB" or "RGBA", and arrays whose names begin with "_"
 corners     "TextureCorners" and "NormalCorners": points are doubled where these differ
 cells       triangles; those of one "Material" are one primitive
+motion      morph targets, and an animation of their weights: one of them after the other
 """
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,15 +32,20 @@ _TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 _LARGEST = 3e38
 
 
-def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON and the buffer of a document with one node that shows *surface*."""
+def plain_document(
+    surface: pv.PolyData, targets: Sequence[tuple[float, pv.PolyData]] = ()
+) -> tuple[dict[str, Any], bytes]:
+    """Return the JSON and the buffer of a document with one node that shows *surface*.
+
+    *targets* are poses of it, which follow each other from 0 seconds on, with the time of each.
+    """
     counts, corners = polygons_of(surface)
     points = np.asarray(surface.points, dtype=float)
     if not (np.abs(points) < _LARGEST).all():
         raise MeshError("has positions that glTF cannot store: NaN, infinite or over 3e38")
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": [DOCUMENT]}
     origin = _origin_of(points)
-    attributes, of_corner = _vertices(surface, counts, corners, points - origin, kept)
+    attributes, of_corner, sources = _vertices(surface, counts, corners, points - origin, kept)
     slots, polygon = cut_into_triangles(points[corners], counts, np.arange(len(corners)))
     if len(polygon) > len(counts):
         _log.warning("glTF has no polygons: they are cut into triangles")
@@ -49,12 +56,16 @@ def plain_document(surface: pv.PolyData) -> tuple[dict[str, Any], bytes]:
     numbers = material[cells_of(surface)][polygon] if names else np.zeros(len(slots), dtype=int)
     document = _Document()
     accessors = {name: document.vertices(name, values) for name, values in attributes.items()}
+    shifts = [document.shift(surface, pose, attributes, sources) for _, pose in targets]
     primitives = []
     for number in np.unique(numbers):
         faces = of_corner[slots[numbers == number]]
         primitive = {"attributes": accessors, "indices": document.indices(faces)}
+        primitive |= {"targets": shifts} if shifts else {}
         primitives.append(primitive | ({"material": int(number)} if names else {}))
     document.head["meshes"] = [{"primitives": primitives}]
+    if shifts:
+        document.animate([seconds for seconds, _ in targets])
     if origin.any():
         document.head["nodes"][0]["translation"] = origin.tolist()
     if names:
@@ -76,8 +87,8 @@ def _origin_of(points: Any) -> Any:
 
 def _vertices(
     surface: pv.PolyData, counts: IntArray, corners: IntArray, points: Any, kept: Any
-) -> tuple[dict[str, Any], IntArray]:
-    """Return the attributes of the vertices, by name, and the vertex of each corner."""
+) -> tuple[dict[str, Any], IntArray, IntArray]:
+    """Return the attributes of the vertices by name, the vertex of each corner, and the points."""
     attributes = {"POSITION": points.astype("f4"), **_point_arrays(surface, kept["point"])}
     rows = cells_of(surface)
     each = {}
@@ -88,14 +99,14 @@ def _vertices(
             each[name] = np.nan_to_num(values).astype("f4")
             kept["cell"].append(key)
     if not each:
-        return attributes, corners
+        return attributes, corners, np.arange(len(points))
     if "TEXCOORD_0" in each:
         each["TEXCOORD_0"][:, 1] = 1.0 - each["TEXCOORD_0"][:, 1]
     table = np.column_stack([corners, *each.values()])
     _, first, of_corner = np.unique(table, axis=0, return_index=True, return_inverse=True)
     attributes = {name: values[corners[first]] for name, values in attributes.items()}
     attributes |= {name: values[first] for name, values in each.items()}
-    return attributes, of_corner.ravel()
+    return attributes, of_corner.ravel(), corners[first]
 
 
 def _point_arrays(surface: pv.PolyData, kept: list[str]) -> dict[str, Any]:
@@ -176,6 +187,40 @@ class _Document:
         corners = faces.ravel().astype("<u4")
         accessor = {"componentType": _INDEX, "type": "SCALAR", "count": len(corners)}
         return self._add(accessor, {"target": 34963}, corners)
+
+    def shift(
+        self, rest: pv.PolyData, pose: pv.PolyData, attributes: dict[str, Any], sources: IntArray
+    ) -> dict[str, int]:
+        """Append what *attributes* change by in a *pose*; return the accessors, a morph target.
+
+        *sources* are the points of the vertices.
+        """
+        moved = np.asarray(pose.points, dtype=float) - np.asarray(rest.points, dtype=float)
+        found = {"POSITION": moved[sources].astype("f4")}
+        normals = _point_arrays(pose, []).get("NORMAL")
+        if normals is not None and "NORMAL" in attributes and CORNER_NORMALS not in rest.cell_data:
+            found["NORMAL"] = normals[sources] - attributes["NORMAL"]
+        return {
+            name: self.vertices("POSITION" if name == "POSITION" else "", values)
+            for name, values in found.items()
+        }
+
+    def animate(self, seconds: Sequence[float]) -> None:
+        """Let the morph targets follow each other, each alone at its time, from none at 0."""
+        count = len(seconds)
+        names = [f"{each:g} s" for each in seconds]
+        self.head["meshes"][0] |= {"weights": [0.0] * count, "extras": {"targetNames": names}}
+        times = np.array([0.0, *seconds], dtype="<f4")
+        weights = np.concatenate([np.zeros((1, count)), np.eye(count)]).astype("<f4").ravel()
+        accessor = {"componentType": _FLOAT, "type": "SCALAR"}
+        ends = {"min": [0.0], "max": [float(times[-1])]}
+        sampler = {
+            "input": self._add(accessor | ends | {"count": len(times)}, {}, times),
+            "output": self._add(accessor | {"count": len(weights)}, {}, weights),
+            "interpolation": "LINEAR",
+        }
+        channel = {"sampler": 0, "target": {"node": 0, "path": "weights"}}
+        self.head["animations"] = [{"samplers": [sampler], "channels": [channel]}]
 
     def _add(self, accessor: dict[str, Any], view: dict[str, Any], values: Any) -> int:
         view |= {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}

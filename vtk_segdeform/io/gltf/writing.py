@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +39,17 @@ def write_gltf(path: Path, surface: pv.PolyData) -> None:
                     "the surface has other points or faces than the glTF file from which it was "
                     "read: its materials, textures and nodes are left out"
                 )
-    if data is None:
-        data = glb_of(*plain_document(surface))
+    _write(path, glb_of(*plain_document(surface)) if data is None else data)
+
+
+def write_gltf_motion(
+    path: Path, surface: pv.PolyData, targets: Sequence[tuple[float, pv.PolyData]]
+) -> None:
+    """Write a new document of *surface* with morph targets: poses of it, with their times."""
+    _write(path, glb_of(*plain_document(surface, targets)))
+
+
+def _write(path: Path, data: bytes) -> None:
     if path.suffix.lower() != ".gltf":
         path.write_bytes(data)
         return

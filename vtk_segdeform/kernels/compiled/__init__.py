@@ -1,8 +1,7 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
     volumes         `volume.signed_volumes`, `volume.volume_along_path`, `volume.volume_gradients`,
-                    `exact_volume.moved_along`, `exact_volume.slopes_along`,
-                    `other_measures.CentroidConstraint`
+                    `volume.volume_slopes_along`, `exact_volume.moved_along`, `other_measures`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
     mean_value      `mean_value.mean_value_coordinates`
@@ -47,13 +46,15 @@ from .text import (
     rows_of_lists,
 )
 from .volumes import (
-    add_slopes,
+    area_gradient,
+    area_slopes,
     determinants,
     moment_gradient,
     moment_sums,
     move_along,
     volume_along_sums,
     volume_gradient,
+    volume_slopes,
     volume_sums,
 )
 
@@ -62,8 +63,9 @@ __all__ = [
     "add_interpolated",
     "add_interpolated_adjoint",
     "add_product",
-    "add_slopes",
     "add_upper",
+    "area_gradient",
+    "area_slopes",
     "border_half_edges",
     "cell_forces",
     "cell_sums",
@@ -101,6 +103,7 @@ __all__ = [
     "valid_collapses",
     "volume_along_sums",
     "volume_gradient",
+    "volume_slopes",
     "volume_sums",
     "weights",
 ]

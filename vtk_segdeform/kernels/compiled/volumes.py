@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from .kernels import kernel
 
 _compile = kernel()
@@ -130,16 +132,98 @@ def moment_gradient(x, faces, a, centre, out):
             out[k, c] += own
 
 
-@_compile_sums("f8[:,:], const f8[:,:], f8[:]")
-def add_slopes(gradient, paths, out):
-    """Add the product of *gradient* (n, 3) and each three columns of *paths* to *out*."""
-    for i in range(len(gradient)):
-        gx, gy, gz = gradient[i, 0], gradient[i, 1], gradient[i, 2]
-        if gx == 0.0 and gy == 0.0 and gz == 0.0:
-            continue  # most gradients are those of a part
-        row = paths[i]
-        for k in range(len(out)):
-            out[k] += gx * row[3 * k] + gy * row[3 * k + 1] + gz * row[3 * k + 2]
+@_compile_sums(
+    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
+)
+def volume_slopes(x, faces, out, size, first, last):
+    """Put six times the volume of each block, and its slopes along directions, into *out*.
+
+    These are the columns of *x* (n, 3 + 3 d) behind the first three; *out* is (blocks, 1 + d).
+    """
+    directions, ox, oy, oz = out.shape[1] - 1, x[0, 0], x[0, 1], x[0, 2]
+    for block in range(first, last):
+        for c in range(directions + 1):
+            out[block, c] = 0.0
+        total = 0.0
+        for f in range(block * size, min((block + 1) * size, len(faces))):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
+            ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+            nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
+            total += ax * nx + ay * ny + az * nz
+            u, v, w = x[i], x[j], x[k]
+            for c in range(directions):
+                d = 3 * c + 3
+                out[block, c + 1] += (
+                    nx * (u[d] + v[d] + w[d])
+                    + ny * (u[d + 1] + v[d + 1] + w[d + 1])
+                    + nz * (u[d + 2] + v[d + 2] + w[d + 2])
+                )
+        out[block, 0] = total
+
+
+@_compile_sums(
+    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
+)
+def area_slopes(x, faces, out, size, first, last):
+    """Put twice the area of each block, and its slopes, as `volume_slopes`."""
+    directions = out.shape[1] - 1
+    for block in range(first, last):
+        for c in range(directions + 1):
+            out[block, c] = 0.0
+        total = 0.0
+        for f in range(block * size, min((block + 1) * size, len(faces))):
+            i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+            ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+            gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+            nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
+            length = math.sqrt(nx * nx + ny * ny + nz * nz)
+            total += length
+            if directions == 0 or length == 0.0:
+                continue
+            nx, ny, nz = nx / length, ny / length, nz / length
+            px, py, pz = gy * nz - gz * ny, gz * nx - gx * nz, gx * ny - gy * nx  # by x_j
+            qx, qy, qz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex  # by x_k
+            u, v, w = x[i], x[j], x[k]
+            for c in range(directions):
+                d = 3 * c + 3
+                out[block, c + 1] += (
+                    px * (v[d] - u[d])
+                    + py * (v[d + 1] - u[d + 1])
+                    + pz * (v[d + 2] - u[d + 2])
+                    + qx * (w[d] - u[d])
+                    + qy * (w[d + 1] - u[d + 1])
+                    + qz * (w[d + 2] - u[d + 2])
+                )
+        out[block, 0] = total
+
+
+@_compile("const f8[:,:], const i8[:,:], f8[:,:]", "const f8[:,:], const i4[:,:], f8[:,:]")
+def area_gradient(x, faces, out):
+    """Add the derivative of the area to *out* (n, 3)."""
+    for f in range(len(faces)):
+        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
+        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
+        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
+        nx, ny, nz = ey * gz - ez * gy, ez * gx - ex * gz, ex * gy - ey * gx
+        length = 2.0 * math.sqrt(nx * nx + ny * ny + nz * nz)
+        if length == 0.0:
+            continue
+        nx, ny, nz = nx / length, ny / length, nz / length
+        px, py, pz = gy * nz - gz * ny, gz * nx - gx * nz, gx * ny - gy * nx
+        qx, qy, qz = ny * ez - nz * ey, nz * ex - nx * ez, nx * ey - ny * ex
+        out[i, 0] -= px + qx
+        out[i, 1] -= py + qy
+        out[i, 2] -= pz + qz
+        out[j, 0] += px
+        out[j, 1] += py
+        out[j, 2] += pz
+        out[k, 0] += qx
+        out[k, 1] += qy
+        out[k, 2] += qz
 
 
 @_compile("const f8[:,:], f8[:], f8[:,:], i8, i8")
