@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pyvista as pv
 
 from ..checks import as_path
 from ..errors import MeshError, MissingDependencyError
-from ..files import replacing, require_place
+from ..files import excess_of, replacing, require_place
 from ..importing import imported
 from ..io import read_data_sets, require_writable, write_with_vtk
 
@@ -23,7 +24,7 @@ _MESHIO = {".msh": "gmsh", ".mesh": "medit"}
 def read_volume_file(path: str | Path) -> Any:
     """Return what a file has: a ``meshio.Mesh``, or a grid; None if it is of another format.
 
-    Of .vtk and .vtu, None also if the file has no single unstructured grid.
+    Of .vtk and .vtu, None also if there is no file that has a single unstructured grid.
 
     Raises
     ------
@@ -34,13 +35,16 @@ def read_volume_file(path: str | Path) -> Any:
     """
     path = as_path(path)
     suffix = path.suffix.lower()
-    if suffix in _VTK and path.is_file():
+    size = os.path.getsize(path) if os.path.isfile(path) else 0
+    if suffix in _VTK and size and not excess_of(path.stat()):
         found = list(read_data_sets(path))
         return found[0] if len(found) == 1 and isinstance(found[0], pv.UnstructuredGrid) else None
     if suffix not in _MESHIO:
         return None
-    if not path.is_file():
-        raise MeshError(f"{path}: there is no such file")
+    if not size:
+        raise MeshError(f"{path}: there is no such file, or it is empty")
+    if what := excess_of(path.stat()):
+        raise MeshError(f"{path}: {what}")
     try:
         return _meshio(suffix).read(path)
     except MissingDependencyError:
