@@ -40,7 +40,7 @@ from .cells import Corners, cofactors, determinants, edges, gradient_operator
 
 _FLAT = 1e-9  # determinant, relative to the product of the lengths
 _STEPS, _HALVINGS = 60, 15
-_GAIN = 1e-4  # relative decrease of E below which the iteration ends
+_GAIN = 1e-5  # relative decrease of E below which the iteration ends
 _HARMONIC, _DIRECTION = 1e-4, 0.1  # residuals of conjugate gradients, relative
 _ROUNDS = 1000
 _SLOPE = 1e-4  # share of the predicted decrease that a step must reach
