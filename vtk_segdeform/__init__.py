@@ -40,6 +40,7 @@ if _TYPE_CHECKING:
         errors,
         filters,
         geometry,
+        inside,
         io,
         landmarks,
         mesh,
@@ -57,6 +58,7 @@ if _TYPE_CHECKING:
     from .deformer import Deformer, Slide
     from .errors import Cancelled
     from .geometry import local_volume_change, volume_summary
+    from .inside import VolumeMesh
     from .io import Surface, read_mesh, write_mesh
     from .landmarks import LandmarkFit, Landmarks, fit_landmarks, read_landmarks, write_landmarks
     from .mesh import Mesh, find_faults
@@ -85,6 +87,7 @@ _MODULE_OF = {
     "Solution": "solver",
     "Status": "solver",
     "Surface": "io",
+    "VolumeMesh": "inside",
     "deform": "any_mesh",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
@@ -105,7 +108,7 @@ _MODULE_OF = {
     "write_motion": "motions",
 }
 _SUBPACKAGES = {
-    "cages", "deformer", "energy", "errors", "filters", "geometry", "io", "landmarks", "mesh",
+    "cages", "deformer", "energy", "errors", "filters", "geometry", "inside", "io", "landmarks", "mesh",
     "mesh_repair", "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
 }  # fmt: skip
 
@@ -126,6 +129,7 @@ __all__ = [
     "Solution",
     "Status",
     "Surface",
+    "VolumeMesh",
     "deform",
     "edit",
     "errors",

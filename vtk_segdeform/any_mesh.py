@@ -1,4 +1,4 @@
-"""`deform`, `pull` and `segment` of whatever holds a surface.
+"""`deform`, `pull` and `segment` of whatever holds a surface, or an inside.
 
     solution = pull("horse.ply", vertex, to)     a path, or what any library calls a mesh
     solution.mesh                                the same, deformed
@@ -37,12 +37,14 @@ from .deformer import Slide
 from .errors import ConstraintError
 from .importing import imported
 from .mesh import Mesh
+from .progress import Progress, part
 from .regions import Regions
 from .solver import Solution
 
 if TYPE_CHECKING:
     import pyvista as pv
 
+    from .inside import VolumeMesh, VolumePose
     from .io import Surface
 
 
@@ -68,11 +70,15 @@ class LikeMeshio(Protocol):
 
 _P = ParamSpec("_P")
 _M = TypeVar("_M")
-_Same = TypeVar("_Same", bound="Mesh | pv.PolyData | LikeTrimesh | LikeMeshio")
-AsPolyData: TypeAlias = "str | os.PathLike[str] | Surface | pv.UnstructuredGrid | pv.MultiBlock"
+_Same = TypeVar(
+    "_Same", bound="Mesh | pv.PolyData | pv.UnstructuredGrid | LikeTrimesh | LikeMeshio"
+)
+AsPolyData: TypeAlias = "str | os.PathLike[str] | Surface | pv.MultiBlock"
 _NAMES = ("__name__", "__qualname__", "__doc__", "__annotations__")  # pickles need our own module
 Pair: TypeAlias = tuple[ArrayLike, ArrayLike]
-AnyMesh: TypeAlias = "Mesh | pv.PolyData | LikeTrimesh | LikeMeshio | AsPolyData | Pair"
+AnyMesh: TypeAlias = (
+    "Mesh | pv.PolyData | pv.UnstructuredGrid | LikeTrimesh | LikeMeshio | AsPolyData | Pair"
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -81,7 +87,10 @@ class Deformed(Solution, Generic[_M]):
 
     mesh: _M
     """What was given, deformed: of the same type, with the same arrays, in the same order.  It is a
-    PolyData if a path, a `Surface`, a grid or a MultiBlock was given."""
+    PolyData if a path, a `Surface`, a grid of surface cells or a MultiBlock was given; of a path of
+    a volume mesh it is a grid, or of .msh and .mesh a ``meshio.Mesh``."""
+    inside: VolumePose | None = None
+    """Of a volume mesh, how good its cells are; some may be inverted."""
 
 
 class _Solves(Protocol[_P]):
@@ -106,20 +115,38 @@ class _Segments(Protocol[_P]):
     ) -> Regions: ...
 
 
+_FOLLOWS = 0.8  # of the progress bar, where the surface is solved
+
+
 def _called(
     function: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
-) -> tuple[Any, Callable[[FloatArray], Any]]:
+) -> tuple[Any, Callable[[FloatArray], tuple[Any, VolumePose | None]]]:
     """Return the result of *function* for any mesh, and what gives that mesh other vertices."""
     arguments = inspect.signature(function).bind(*args, **kwargs).arguments
     mesh = arguments.pop("mesh")
     if isinstance(mesh, Mesh):
-        return function(mesh, **arguments), mesh.with_vertices
-    imported("vtk_segdeform.io")  # imports pyvista
+        return function(mesh, **arguments), lambda vertices: (mesh.with_vertices(vertices), None)
+    imported("vtk_segdeform.inside")  # imports pyvista
+    from .inside import volume_of
     from .io import of_its_kind, surface_of
 
-    surface = surface_of(mesh)
-    result = function(surface.mesh, **_by_vertices(surface, arguments))
-    return result, lambda vertices: of_its_kind(mesh, surface.moved(vertices))
+    volume = volume_of(mesh)
+    if volume is None:
+        surface = surface_of(mesh)
+        result = function(surface.mesh, **_by_vertices(surface, arguments))
+        return result, lambda vertices: (of_its_kind(mesh, surface.moved(vertices)), None)
+    progress = arguments.get("progress")
+    if progress is not None:
+        arguments["progress"] = part(progress, 0.0, _FOLLOWS)
+    result = function(volume.surface.mesh, **_by_vertices(volume.surface, arguments))
+    return result, functools.partial(_with_inside, volume, part(progress, _FOLLOWS, 1.0))
+
+
+def _with_inside(
+    volume: VolumeMesh, progress: Progress | None, vertices: FloatArray
+) -> tuple[Any, VolumePose]:
+    pose = volume.pose(vertices, progress=progress)
+    return volume.moved(pose), pose
 
 
 def _solving(function: Callable[Concatenate[Mesh, _P], Solution]) -> _Solves[_P]:
@@ -127,7 +154,8 @@ def _solving(function: Callable[Concatenate[Mesh, _P], Solution]) -> _Solves[_P]
     def solve(*args: Any, **kwargs: Any) -> Deformed[Any]:
         solution, moved = _called(function, args, kwargs)
         values = {each.name: getattr(solution, each.name) for each in fields(solution)}
-        return Deformed(**values, mesh=moved(solution.vertices))
+        mesh, inside = moved(solution.vertices)
+        return Deformed(**values, mesh=mesh, inside=inside)
 
     return solve
 

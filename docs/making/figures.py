@@ -8,8 +8,11 @@ narrow screen shows them below each other.
 from __future__ import annotations
 
 import runpy
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -225,6 +228,15 @@ def ventricle() -> None:
     write("ventricle", drawings, mesh.vertices)
 
 
+def solids() -> None:
+    """Draw the solid of the example at rest and bent, cut open."""
+    with tempfile.TemporaryDirectory() as folder:
+        sys.argv[1:] = [folder]
+        runpy.run_path(str(EXAMPLES / "bend_a_solid.py"))
+        FOLDER.mkdir(parents=True, exist_ok=True)
+        shutil.copy(Path(folder) / "solids.png", FOLDER / "solids.png")
+
+
 def organs() -> None:
     """Draw the parts of a label map at rest and bent, cut open."""
     mesh = label_map()
@@ -271,6 +283,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
     "landmarks": (landmarks, 0),
+    "solids": (solids, 0),
     "rigid": (rigid, 2),
     "slide": (slide, 2),
     "symmetry": (symmetry, 3),

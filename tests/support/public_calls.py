@@ -253,6 +253,12 @@ def given() -> sd.Surface:
 
 
 @functools.cache
+def volume() -> sd.VolumeMesh:
+    """Return a volume mesh of a few cells."""
+    return sd.VolumeMesh(pv.ImageData(dimensions=(4, 4, 4)).cast_to_unstructured_grid())
+
+
+@functools.cache
 def view() -> Any:
     from hands import plain_view
 
@@ -317,6 +323,7 @@ def instance(cls: type) -> Any:
         "Handles": lambda: session().handles,
         "Painting": lambda: session().painting,
         "Surface": given,
+        "VolumeMesh": volume,
         "Passengers": passengers,
         "Solution": solution,
         "Deformed": lambda: sd.Deformed(**vars_of(solution()), mesh=mesh()),
@@ -356,6 +363,7 @@ def _plotter() -> pv.Plotter:
 # Classes that callers construct; others are only returned.
 MADE_BY_HAND = {
     sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
+    sd.VolumeMesh,
 }  # fmt: skip
 EXTRA = {
     "Session.change_options": tuple(field.name for field in fields(sd.Options)),
@@ -368,6 +376,8 @@ def _file(name: str) -> Path:
     path = Path(name).absolute()
     if path.suffix == ".segdeform":
         sd.save_session(path, session())
+    elif path.suffix == ".vtu":
+        volume().grid.save(path)
     elif path.suffix == ".mlp":
         sd.io.write_project(path, mesh())
     else:
@@ -571,6 +581,12 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "Surface.vertices_at.points": lambda: [0, 5],
     "Surface.write.path": lambda: Path("written.vtp"),
     "Surface.write.vertices": lambda: given().mesh.vertices,
+    "VolumeMesh.mesh": lambda: volume().grid,
+    "VolumeMesh.moved.pose": lambda: volume().at_rest,
+    "VolumeMesh.pose.vertices": lambda: volume().surface.mesh.vertices,
+    "VolumeMesh.read.path": lambda: _file("cells.vtu"),
+    "VolumeMesh.write.path": lambda: Path("written.vtu"),
+    "VolumeMesh.write.pose": lambda: volume().at_rest,
     "SurfaceDisplay.instead.value": lambda: None,
     "SurfaceDisplay.style.value": lambda: SurfaceStyle.EDGES,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,

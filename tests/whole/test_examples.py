@@ -65,13 +65,19 @@ RIGHT = {
     ),
     "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
     "fit_an_atlas": lambda names: names["errors"]["fitted"] < 0.9 * names["errors"]["spline"],
+    "bend_a_solid": lambda names: (
+        not len(names["solution"].inside.inverted)
+        and abs(names["solution"].volume_change) < 1e-12
+        and names["bent"].cell_data["fibre"][-1] @ names["turn"].apply([0, 0, 1]) > 0.99
+    ),
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),
 }
 
 LEAVES = {
-    "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"]
+    "bend_a_solid": ["bent.vtu", "solids.png"],
+    "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"],
 }  # the others' pictures: `make docs`
 # In the campaign only.  Of the two editors, the one in a plotter runs always; test_numbers bends
 # the cactus.
@@ -80,7 +86,7 @@ LONG = {
     "one_cage_or_several", "with_and_without_volume",
 }  # fmt: skip
 FEW = {"cactus": 600, "dinosaur": 1000}  # vertices
-DRAW = {"carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
+DRAW = {"bend_a_solid", "carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
 ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
 
 

@@ -14,6 +14,7 @@ The files, in reading order:
     mechanisms    what each mechanism of the solver buys
     paper         tables 1 and 2 of the paper
     peers         the same poses by libigl
+    solids        volume meshes, beside radial basis functions and linear elasticity
 """
 
 from .measuring import in_own_process

@@ -30,6 +30,7 @@ from ..deformer import (
 )
 from ..errors import ArgumentError, ConstraintError, MeshError
 from ..geometry import checked_attach, lids_of
+from ..inside import VolumeMesh
 from ..io import Surface
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
@@ -51,6 +52,7 @@ from .outputs import (
     report_solution,
     report_surface,
     require_met,
+    surface_and_volume,
     written,
 )
 from .selection import Role, parse_selection
@@ -61,19 +63,18 @@ SESSION = ".segdeform"  # suffix of session files
 
 def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     """Move the handles of a surface and write it as it was given, apart from coordinates."""
-    io.require_writable(options.output)
     if options.picture is not None:
         require_picture(options.picture)
-    surface = Surface.read(options.input)
+    surface, volume = surface_and_volume(options)
     mesh = surface.mesh
-    report_surface(surface, say)
+    report_surface(surface, say, is_volume=volume is not None)
     if not mesh.is_closed:
         enclosed = lids_of(mesh, LIDS[options.lids])
         say(f"volume          {enclosed.summary(preserved=not options.no_volume)}")
     fixed = np.zeros(0, dtype=np.int64)
     if options.fixed is not None:
         fixed = _selected(options.fixed, surface, "fixed")
-    constraints = constraints_of(options, surface)
+    constraints = constraints_of(options, surface, volume)
     has_goals = bool(options.volume)
     handle, path = _handles(options.handles, surface, fixed, has_goals=has_goals)
     held = np.union1d(fixed, handle)
@@ -98,16 +99,16 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options)
+    stored, inside = written(surface, solution, options, volume=volume)
     report_solution(stored, seconds, say, has_handle=len(handle) > 0)
     report_goals(stored, surface, options.input, say)
-    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
     report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)
         say(f"written         {options.picture}")
-    require_met(solution, options.output, "a handle")
+    require_met(solution, options.output, "a handle", inside=inside)
     _require_turns(options, surface, fixed, solution.vertices)
     return True
 
@@ -223,7 +224,9 @@ def _selected(text: str, surface: Surface, role: Role) -> IntArray:
     return vertices
 
 
-def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
+def constraints_of(
+    options: Namespace, surface: Surface, volume: VolumeMesh | None = None
+) -> dict[str, Any]:
     """Return the options of the command line that `Deformer` has, as it takes them."""
     goals, parts = _named("--volume", options.volume), _named("--part", options.part)
     checked_goals(goals)
@@ -232,7 +235,10 @@ def constraints_of(options: Namespace, surface: Surface) -> dict[str, Any]:
         raise ConstraintError(f"--volume is given twice for the same volume: {', '.join(twice)}")
     goals = {names[name]: goal for name, goal in goals.items()}
     try:  # before the pose is solved, not when it is written
-        surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
+        if volume is None:
+            surface.moved(surface.mesh.vertices, turn=options.turn, push=options.push)
+        elif options.turn or options.push:
+            volume.moved(volume.at_rest, turn=options.turn, push=options.push)
     except ArgumentError as fault:
         raise ConstraintError(f"--turn or --push: {fault}") from None
     own = {name: getattr(options, name, None) for name in AS_IN_PYTHON}

@@ -56,7 +56,9 @@ COMMANDS = {
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
-EXPERIMENTS = ("drag", "constraints", "open", "landmarks", "mechanisms", "paper", "peers")
+EXPERIMENTS = (
+    "drag", "constraints", "open", "landmarks", "mechanisms", "paper", "peers", "solids",
+)  # fmt: skip
 
 _SELECTION = """\
 selections (SEL):
@@ -81,6 +83,7 @@ examples:
   segdeform deform a.off -o b.off --fixed a.sel --handle a.sel --matrix a.def --regions auto
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
+  segdeform deform part.vtu -o bent.vtu --fixed 'z<10%' --handle 'z>90%' --rotate y,45
   segdeform deform heart.ply -o pumped.ply --volume 'cavity=-40%' --volume wall=keep
   segdeform landmarks atlas.ply -o patient.ply --source atlas.fcsv --target patient.mrk.json
   segdeform regions horse.ply -o regions.vtp --regions 6

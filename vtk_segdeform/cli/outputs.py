@@ -21,7 +21,15 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..deformer import OTHER_MEASURE, is_centroid
 from ..errors import MeshError
-from ..io import Surface, polydata_of, stored_vertices, to_polydata, volume_change
+from ..inside import VolumeMesh, VolumePose, require_volume_writable, volume_of
+from ..io import (
+    Surface,
+    polydata_of,
+    require_writable,
+    stored_vertices,
+    to_polydata,
+    volume_change,
+)
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
 from ..regions import Regions
@@ -37,10 +45,11 @@ _ADVICE = "move less, or add cage vertices"
 _PALETTE = np.array([rgb(colour) for colour in COLOURS])
 
 
-def report_surface(surface: Surface, say: Say) -> None:
+def report_surface(surface: Surface, say: Say, *, is_volume: bool = False) -> None:
     """Print how the mesh of *surface* differs from it."""
     for workaround in surface.workarounds:
-        if workaround.kind is not Kind.HOLE:  # the line of the volume counts them
+        is_inside = is_volume and workaround.kind is Kind.UNREFERENCED
+        if workaround.kind is not Kind.HOLE and not is_inside:  # the line of the volume counts them
             say(f"input           {workaround}")
 
 
@@ -87,7 +96,14 @@ def report_goals(solution: Solution, surface: Surface, path: Path, say: Say) -> 
         say(f"{text:15} {value:.6g}{unit}, {100 * change:+.4g} % of the original")
 
 
-def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: bool = False) -> None:
+def report_pose(
+    solution: Solution,
+    mesh: Mesh,
+    say: Say,
+    *,
+    avoids_contact: bool = False,
+    inside: VolumePose | None = None,
+) -> None:
     """Print how near a pose is to its minimum and what is wrong with its surface.
 
     The latter are faces that cross others or are turned over, unlike at rest, and parts that
@@ -105,15 +121,21 @@ def report_pose(solution: Solution, mesh: Mesh, say: Say, *, avoids_contact: boo
     folded = f"{folds:,} turned-over face{plural}: {_ADVICE}" if folds else "none"
     say(f"crossings       {crossing}")
     say(f"folds           {folded}")
+    if inside is not None:
+        say(f"inside          {inside.summary()}")
     if len(solution.unmoved):
         say(f"parts           {solution.unmoved_summary(mesh)}")
 
 
-def require_met(solution: Solution, path: Path, what: str) -> None:
-    """Raise a MeshError if *what* is moved misses its target, or a volume its goal.
+def require_met(
+    solution: Solution, path: Path, what: str, *, inside: VolumePose | None = None
+) -> None:
+    """Raise a MeshError if *what* is moved misses its target, a volume its goal, or cells invert.
 
     *solution* is that in memory; the one in the file at *path* may be rounded.
     """
+    if inside is not None and len(inside.inverted):
+        raise MeshError(f"{path} was written, but {inside.summary()}")
     if solution.handle_error > HANDLE_TOLERANCE:
         raise MeshError(
             f"{path} was written, but {what} misses its target by "
@@ -132,8 +154,25 @@ def report_approximate(solution: Solution, options: Namespace, say: Say) -> None
         say("constraints     rigid parts, slides and symmetry are approximate: pose not finished")
 
 
-def written(surface: Surface, solution: Solution, options: Namespace) -> Solution:
+def surface_and_volume(options: Namespace) -> tuple[Surface, VolumeMesh | None]:
+    """Return the surface in the file of *options*, and the volume mesh if it has one.
+
+    The output must have a format for it.
+    """
+    volume = volume_of(options.input)
+    if volume is not None:
+        require_volume_writable(options.output)
+        return volume.surface, volume
+    require_writable(options.output)
+    return Surface.read(options.input), None
+
+
+def written(
+    surface: Surface, solution: Solution, options: Namespace, *, volume: VolumeMesh | None
+) -> tuple[Solution, VolumePose | None]:
     """Write *surface* in a pose, and return the pose as it is in the file of *options*.
+
+    Of a *volume* mesh all of it is written; the second result is the pose of its points.
 
     Raises
     ------
@@ -141,6 +180,11 @@ def written(surface: Surface, solution: Solution, options: Namespace) -> Solutio
         If the file cannot be written, or not be read again.
     """
     path, lids = options.output, LIDS[options.lids]
+    if volume is not None:
+        pose = volume.pose(solution.vertices)
+        fields = {name: getattr(options, name) for name in ("turn", "push", "displacement")}
+        volume.write(path, pose, **fields)
+        return solution, pose
     surface.write(
         path,
         solution.vertices,
@@ -151,9 +195,9 @@ def written(surface: Surface, solution: Solution, options: Namespace) -> Solutio
     with _without_warnings():
         x = stored_vertices(surface, solution.vertices, path)
     if np.array_equal(x, solution.vertices):
-        return solution
+        return solution, None
     change = volume_change(surface.mesh, x, lids)
-    return replace(solution, vertices=x, volume=lambda: change)
+    return replace(solution, vertices=x, volume=lambda: change), None
 
 
 @contextmanager

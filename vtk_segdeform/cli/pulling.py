@@ -5,13 +5,11 @@ from __future__ import annotations
 import time
 from argparse import Namespace
 
-from .. import io
 from ..arrays import FloatArray
 from ..deformer import checked_place, checked_radius, fault_of_grab, place_text
 from ..deformer import pull as pulled
 from ..errors import ConstraintError
 from ..geometry import lids_of
-from ..io import Surface
 from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
@@ -26,20 +24,20 @@ from .outputs import (
     report_surface,
     report_volume,
     require_met,
+    surface_and_volume,
     written,
 )
 
 
 def pull(options: Namespace, say: Say, progress: Progress) -> bool:
     """Pull one point of a surface and write it as it was given, apart from coordinates."""
-    io.require_writable(options.output)
     if options.picture is not None:
         require_picture(options.picture)
     at, to = parse_vector(options.at, "at"), parse_vector(options.to, "to")
     pins = [parse_vector(text, "pin") for text in options.pin]
-    surface = Surface.read(options.input)
+    surface, volume = surface_and_volume(options)
     mesh = surface.mesh
-    report_surface(surface, say)
+    report_surface(surface, say, is_volume=volume is not None)
     if not mesh.is_closed:
         say(f"volume          {lids_of(mesh, LIDS[options.lids]).summary(preserved=True)}")
     point, radius = checked_place(mesh, at, "--at"), checked_radius(mesh, options.radius)
@@ -55,18 +53,18 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         locality=options.local,
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
-        **constraints_of(options, surface),
+        **constraints_of(options, surface, volume),
         attach=dict(options.attach),
         refine=options.refine,
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    stored = written(surface, solution, options)
+    stored, inside = written(surface, solution, options, volume=volume)
     report_volume(stored.volume_change, say)
     report_goals(stored, surface, options.input, say)
     say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
-    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
     report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
@@ -74,7 +72,7 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
             options.picture, mesh, solution.vertices, fixed=pinned, handle=point.corners
         )
         say(f"written         {options.picture}")
-    require_met(solution, options.output, "the point")
+    require_met(solution, options.output, "the point", inside=inside)
     return True
 
 

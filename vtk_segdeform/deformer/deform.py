@@ -67,6 +67,7 @@ def deform(
         n vertices.  ``sd.deform`` takes any surface, with vertices numbered as in what is given: a
         PolyData or another surface of VTK, a ``trimesh.Trimesh``, a ``meshio.Mesh``, a pair
         (vertices, faces) or a path.  It returns a `Deformed`, whose `mesh` is the same, deformed.
+        Of a grid of tetrahedra, hexahedra, wedges or pyramids the inside follows; see `VolumeMesh`.
     fixed, handle : (k,) int or (n,) bool
         Vertices that stay in place, and vertices that follow *targets*.
     targets : (len(handle), 3) float

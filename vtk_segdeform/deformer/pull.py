@@ -65,6 +65,7 @@ def pull(
         n vertices.  ``sd.pull`` takes any surface, with vertices numbered as in what is given: a
         PolyData or another surface of VTK, a ``trimesh.Trimesh``, a ``meshio.Mesh``, a pair
         (vertices, faces) or a path.  It returns a `Deformed`, whose `mesh` is the same, deformed.
+        Of a grid of tetrahedra, hexahedra, wedges or pyramids the inside follows; see `VolumeMesh`.
     vertex : int, (3,) float or SurfacePoint
         The grabbed vertex, or another point of the surface, which the pull moves as exactly: if
         a position is given, the nearest one.

@@ -42,6 +42,7 @@ from .convert import (
     write_mesh,
     write_points,
 )
+from .fields import follow
 from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
@@ -50,17 +51,20 @@ from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
+from .vtk_formats import read_data_sets, write_with_vtk
 
 __all__ = [
     "IS_ROUNDING",
     "Surface",
     "as_polydata",
+    "follow",
     "from_meshset",
     "from_polydata",
     "is_mesh_file",
     "loss_of",
     "of_its_kind",
     "polydata_of",
+    "read_data_sets",
     "read_mesh",
     "read_points",
     "read_polydata",
@@ -80,4 +84,5 @@ __all__ = [
     "write_mesh",
     "write_points",
     "write_project",
+    "write_with_vtk",
 ]

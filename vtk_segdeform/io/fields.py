@@ -28,11 +28,17 @@ _UNIQUE = [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]
 
 
 def follow(
-    moved: pv.PolyData, rest: pv.PolyData, *, turn: Sequence[str] = (), push: Sequence[str] = ()
+    moved: Any,
+    rest: Any,
+    *,
+    turn: Sequence[str] = (),
+    push: Sequence[str] = (),
+    gradients: tuple[FloatArray, FloatArray] | None = None,
 ) -> None:
     """Let the arrays *turn* and *push* of *moved* follow its deformation from *rest*.
 
     They are point or cell arrays of vectors or tensors; where both have the name, both follow.
+    Without *gradients* of the points (p, 3, 3) and the cells (c, 3, 3) both are surfaces.
 
     Raises
     ------
@@ -43,7 +49,10 @@ def follow(
     names = {**dict.fromkeys(turned, True), **dict.fromkeys(pushed, False)}
     if not names:
         return
-    change = _Change.of(rest, np.asarray(moved.points, dtype=np.float64))
+    if gradients is not None:
+        change = _Change(*gradients)
+    else:
+        change = _Change.of(rest, np.asarray(moved.points, dtype=np.float64))
     for name, turns in names.items():
         places = [
             (of_points, data)
@@ -55,9 +64,9 @@ def follow(
             raise ArgumentError(f"{option}: there is no array {name!r} of vectors or tensors")
         for of_points, data in places:
             by = change.at_points if of_points else change.at_cells
-            gradients = closest_rotations(np.swapaxes(by, 1, 2)) if turns else by
+            matrices = closest_rotations(np.swapaxes(by, 1, 2)) if turns else by
             values = np.array(data[name])
-            data[name] = _moved(values.astype(np.float64), gradients).astype(
+            data[name] = _moved(values.astype(np.float64), matrices).astype(
                 values.dtype if values.dtype.kind == "f" else np.float64
             )
 

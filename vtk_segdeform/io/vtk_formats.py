@@ -21,7 +21,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pyvista as pv
-from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
 from vtkmodules.vtkIOHDF import vtkHDFWriter
 from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
@@ -63,13 +63,7 @@ _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy fil
 def read_with_vtk(path: Path) -> pv.PolyData:
     """Read a surface by one of VTK's readers, in a confined process."""
     suffix = path.suffix.lower()
-    with path.open("rb") as file:
-        begin = file.read(1000)
-    if not _BEGINS[suffix].match(begin):
-        raise MeshError(
-            f"does not begin as a {suffix} file does; it is damaged, or of another format: "
-            "give it the suffix of its format"
-        )
+    begin = _begin(path, suffix)
     try:
         surfaces = [_surface(each, suffix) for each in data_sets(read_confined("vtk", path))]
     except MeshError as error:
@@ -84,6 +78,30 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     elif suffix == ".vtk":
         _set_title(surface, begin)
     return surface
+
+
+def read_data_sets(path: Path) -> list[pv.PolyData | pv.UnstructuredGrid]:
+    """Read all data sets of a file as they are, in a confined process; MeshError if it cannot."""
+    suffix = path.suffix.lower()
+    try:
+        _begin(path, suffix)
+        return list(data_sets(read_confined("vtk", path)))
+    except (MeshError, OSError) as error:
+        raise MeshError(
+            f"{path}: is not a readable {suffix} file ({_first_message(error)})"
+        ) from None
+
+
+def _begin(path: Path, suffix: str) -> bytes:
+    """Return the first bytes of a file; MeshError if its format begins in another way."""
+    with path.open("rb") as file:
+        begin = file.read(1000)
+    if not _BEGINS[suffix].match(begin):
+        raise MeshError(
+            f"does not begin as a {suffix} file does; it is damaged, or of another format: "
+            "give it the suffix of its format"
+        )
+    return begin
 
 
 def _set_title(surface: pv.PolyData, begin: bytes) -> None:
@@ -118,21 +136,22 @@ def _first_message(error: Exception) -> str:
     return _PREFIX.sub("", messages[0]) if messages else type(error).__name__
 
 
-def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
-    """Write a surface by one of VTK's writers; OSError if the file is incomplete.
+def write_with_vtk(path: Path, surface: pv.PolyData | pv.UnstructuredGrid) -> None:
+    """Write a surface, or a grid to .vtu or .vtk; OSError if the file is incomplete.
 
     On a full disk VTK's XML writer aborts the process, and its HDF writer leaves an incomplete file
     without an error.  So the former writes to memory, and the output of the latter is read back.
     """
     suffix = path.suffix.lower()
     plain, title = _with_plain_names(surface, suffix), ""
+    is_cells = isinstance(surface, pv.UnstructuredGrid)
     if suffix == ".vtk":
         title = _title_of(surface)
         if title:
             plain.GetFieldData().RemoveArray(HEADER)
     if suffix in _XML:
         writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(_without_types(plain) if suffix == ".vtp" else grid_of(plain))
+        writer.SetInputData(_as_written(plain, is_grid=suffix == ".vtu"))
         writer.SetDataModeToBinary()
         writer.WriteToOutputStringOn()
         writer.Write()
@@ -140,9 +159,9 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         return
     try:
         with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            is_legacy_grid = suffix == ".vtk" and is_grid(surface)
+            is_legacy_grid = is_cells or (suffix == ".vtk" and is_grid(surface))
             writer = vtkUnstructuredGridWriter() if is_legacy_grid else _WRITERS[suffix]()
-            writer.SetInputData(grid_of(plain) if is_legacy_grid else _without_types(plain))
+            writer.SetInputData(_as_written(plain, is_grid=is_legacy_grid))
             again = surface
             if title:
                 writer.SetHeader(title)
@@ -163,7 +182,7 @@ def write_with_vtk(path: Path, surface: pv.PolyData) -> None:
         raise OSError("the file is incomplete")
 
 
-def _title_of(surface: pv.PolyData) -> str:
+def _title_of(surface: Any) -> str:
     """Return the title by which a legacy file stores the field array `HEADER`.
 
     That is "" unless a reader finds the same text there; then it remains a field array.
@@ -173,14 +192,21 @@ def _title_of(surface: pv.PolyData) -> str:
     return title if is_plain and len(title.encode()) <= _LONGEST_TITLE else ""
 
 
+def _as_written(plain: Any, *, is_grid: bool) -> Any:
+    """Return what VTK's writer of surfaces, or of grids, takes."""
+    if plain.IsA("vtkUnstructuredGrid"):
+        return plain
+    return grid_of(plain) if is_grid else _without_types(plain)
+
+
 def _without_types(surface: Any) -> Any:
     surface.GetFieldData().RemoveArray(CELL_TYPES)
     return surface
 
 
-def _with_plain_names(surface: pv.PolyData, suffix: str) -> Any:
-    """Return a vtkPolyData whose arrays have names that the format can store."""
-    copy = vtkPolyData()
+def _with_plain_names(surface: Any, suffix: str) -> Any:
+    """Return a shallow copy whose arrays have names that the format can store."""
+    copy = vtkUnstructuredGrid() if surface.IsA("vtkUnstructuredGrid") else vtkPolyData()
     copy.ShallowCopy(surface)
     for sort in ("Point", "Cell", "Field"):
         attributes = getattr(copy, f"Get{sort}Data")()
