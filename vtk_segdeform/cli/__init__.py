@@ -7,8 +7,6 @@ The files, in reading order:
     commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
     checking        ``segdeform check``
     subdividing     ``segdeform subdivide``
-    selection       point selections such as ``z>80%``
-    motion          motions such as ``--rotate z,60``
     turns           how far a handle has turned in a pose
     outputs         printed lines and written surfaces
     demo            ``segdeform demo``
