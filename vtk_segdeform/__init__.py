@@ -52,6 +52,7 @@ if _TYPE_CHECKING:
         widgets,
     )
     from .any_mesh import Deformed, deform, pull, segment
+    from .batches import PoseStore, batch, random_poses
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, Slide
     from .errors import Cancelled
@@ -73,12 +74,14 @@ _MODULE_OF = {
     "Deformer": "deformer",
     "Mesh": "mesh",
     "Options": "session",
+    "PoseStore": "batches",
     "Regions": "regions",
     "Slide": "deformer",
     "Session": "session",
     "Solution": "solver",
     "Status": "solver",
     "Surface": "io",
+    "batch": "batches",
     "deform": "any_mesh",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
@@ -87,6 +90,7 @@ _MODULE_OF = {
     "local_volume_change": "geometry",
     "mean_value_coordinates": "cages",
     "pull": "any_mesh",
+    "random_poses": "batches",
     "read_mesh": "io",
     "repair": "mesh_repair",
     "save_session": "session",
@@ -107,12 +111,14 @@ __all__ = [
     "Deformer",
     "Mesh",
     "Options",
+    "PoseStore",
     "Regions",
     "Session",
     "Slide",
     "Solution",
     "Status",
     "Surface",
+    "batch",
     "deform",
     "edit",
     "errors",
@@ -123,6 +129,7 @@ __all__ = [
     "mean_value_coordinates",
     "models",
     "pull",
+    "random_poses",
     "read_mesh",
     "repair",
     "save_session",
