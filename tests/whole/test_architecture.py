@@ -84,6 +84,7 @@ GRANTED = {
     "widgets.web.serving": {"aiohttp"},
     "benchmarks.peers": {"igl"},
     "cli.application": {"qtpy"},
+    "cli.batching": {"distributed"},
     "cli.outputs": {"pyvista"},
 }
 

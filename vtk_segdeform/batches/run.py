@@ -146,6 +146,7 @@ def batch(
 
 def _run_here(run: _Run, count: int, settings: Settings) -> None:
     """Run all tasks in *count* processes, which are started anew when one of them has died."""
+    tries = 0
     while run.is_left():
         wait_until_compiled()
         with spawning() as context:
@@ -153,17 +154,18 @@ def _run_here(run: _Run, count: int, settings: Settings) -> None:
                 count, context, initializer=begin, initargs=(settings.memory,)
             )
             started = [pool.submit(ready) for _ in range(count)]
-            try:
-                for each in started:
-                    each.result()
-            except BrokenExecutor:
-                raise MissingDependencyError(
-                    "the processes of the batch end at once. A program must call batch under "
-                    "'if __name__ == \"__main__\":', as each process imports it; or the plan's "
-                    "'memory' is too little"
-                ) from None
+            wait(started)
         with pool:
-            run.on(partial(pool.submit, compute_alone), _AHEAD * count, is_own=True)
+            if not any(each.exception() for each in started):
+                run.on(partial(pool.submit, compute_alone), _AHEAD * count, is_own=True)
+                continue
+        tries += 1
+        if tries == _MOST_TRIES:
+            raise MissingDependencyError(
+                "the processes of the batch end at once. A program must call batch under "
+                "'if __name__ == \"__main__\":', as each process imports it; or the plan's "
+                "'memory' is too little"
+            )
 
 
 class _Run:

@@ -60,7 +60,8 @@ class Row(NamedTuple):
     crossings: int | None = None
     folds: int | None = None
     steps: int | None = None
-    draws: int = 1
+    draws: int | None = None
+    """How often a random pose was drawn."""
     seconds: float = 0.0
     refined: bool = False
     data: bytes = b""
@@ -202,8 +203,8 @@ def _row(deformer: Deformer, pose: Mapping[str, Any], settings: Settings) -> Row
 
 def _solved(
     deformer: Deformer, pose: Mapping[str, Any], settings: Settings, progress: Progress
-) -> tuple[Solution, int]:
-    """Return a pose, and how often it was drawn."""
+) -> tuple[Solution, int | None]:
+    """Return a pose; and how often it was drawn, if it is random."""
     if settings.avoid_contact:
         deformer = deformer.hold(avoid_contact=True)
     if "number" in pose:
@@ -219,7 +220,7 @@ def _solved(
         own = deformer.hold(fixed=fixed, handle=handle, volumes=pose.get("volumes"))
         path = pose.get("targets", [np.empty((0, 3))])
     solution = solved_along(own, path, progress=progress)
-    return (own.finish(solution, progress=progress) if settings.refine else solution), 1
+    return (own.finish(solution, progress=progress) if settings.refine else solution), None
 
 
 @functools.lru_cache(maxsize=2)

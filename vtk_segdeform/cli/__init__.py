@@ -7,6 +7,7 @@ The files, in reading order:
     commands        ``segdeform deform``, ``edit``, ``regions`` and ``cages``
     checking        ``segdeform check``
     subdividing     ``segdeform subdivide``
+    batching        ``segdeform batch`` and ``segdeform pose``
     turns           how far a handle has turned in a pose
     outputs         printed lines and written surfaces
     demo            ``segdeform demo``
