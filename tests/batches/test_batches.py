@@ -77,8 +77,8 @@ def reference(plan, tmp_path_factory):
 
 def test_the_bytes_are_the_same_on_one_and_two_processes_and_here(plan, reference, tmp_path):
     assert set(reference.table()["status"]) == {"converged"}
-    for workers in (1, 2):
-        store = sd.batch(plan, tmp_path / str(workers), workers=workers)
+    for count in (1, 2):
+        store = sd.batch(plan, tmp_path / str(count), n_workers=count)
         assert store.digest() == reference.digest()
 
 
@@ -145,7 +145,7 @@ def test_a_batch_continues_with_what_is_missing(plan, reference, tmp_path):
 
     first, second, third = Here(), Here(), Here()
     with pytest.raises(sd.Cancelled, match="enough"):
-        sd.batch(plan, tmp_path / "out", executor=first, workers=1, progress=stop)
+        sd.batch(plan, tmp_path / "out", executor=first, n_workers=1, progress=stop)
     done = sum(first.tasks)
     assert 0 < done < 10
     store = sd.batch(plan, tmp_path / "out", executor=second)
@@ -196,7 +196,7 @@ def test_a_bad_mesh_or_selection_does_not_stop_the_others(meshes, tmp_path):
 
 def test_a_task_that_takes_too_long_ends_its_process_and_is_set_aside(meshes, tmp_path):
     plan = {"meshes": meshes[:1], "poses": [BEND], "seconds": 0.01}
-    table = sd.batch(plan, tmp_path / "out", workers=1).table()
+    table = sd.batch(plan, tmp_path / "out", n_workers=1).table()
     assert table["status"] == ["set aside"]
     assert "process died" in table["message"][0]
 
@@ -215,7 +215,7 @@ def test_a_killed_process_costs_no_pose(plan, reference, tmp_path):
             killed.append(multiprocessing.active_children()[0])
             killed[0].kill()
 
-    store = sd.batch(plan, tmp_path / "out", workers=2, progress=kill)
+    store = sd.batch(plan, tmp_path / "out", n_workers=2, progress=kill)
     assert killed
     assert store.digest() == reference.digest()
 
@@ -233,7 +233,7 @@ if __name__ == "__main__":
     bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
     meshes = [random_limbs(600, 1), random_limbs(700, 2)]
     plan = {"meshes": meshes, "poses": [bend, random], "block": 2}
-    sd.batch(plan, sys.argv[1], workers=2, progress=tell)
+    sd.batch(plan, sys.argv[1], n_workers=2, progress=tell)
 """
 
 
@@ -275,7 +275,7 @@ def test_a_killed_worker_of_a_cluster_costs_no_pose(plan, reference, tmp_path):
             log.append(text)
 
         executor = client.get_executor()
-        store = sd.batch(plan, tmp_path / "out", executor=executor, workers=2, progress=kill)
+        store = sd.batch(plan, tmp_path / "out", executor=executor, n_workers=2, progress=kill)
     print("\n".join(map(str, log)))
     assert log[-1] == "10 of 10 poses"
     assert store.digest() == reference.digest()
@@ -298,7 +298,7 @@ def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
             threading.Thread(target=work).start()
             return future
 
-    sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), workers=1)
+    sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), n_workers=1)
     assert Slow.most == _AHEAD
 
 

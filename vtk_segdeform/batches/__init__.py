@@ -13,5 +13,6 @@ from .plan import Plan
 from .random_poses import RandomPoses, random_poses
 from .run import batch
 from .store import PoseStore
+from .tasks import Row
 
-__all__ = ["Plan", "PoseStore", "RandomPoses", "batch", "random_poses"]
+__all__ = ["Plan", "PoseStore", "RandomPoses", "Row", "batch", "random_poses"]

@@ -64,7 +64,7 @@ def batch(
     output: str | os.PathLike[str],
     *,
     executor: Executor | None = None,
-    workers: int | None = None,
+    n_workers: int | None = None,
     retry: bool = False,
     progress: Progress | None = None,
 ) -> PoseStore:
@@ -96,7 +96,7 @@ def batch(
         A folder, which is created, for ``poses.segposes`` and a table.
     executor : concurrent.futures.Executor, optional
         Runs the tasks; by default processes of this machine, of one thread each.
-    workers : int, optional
+    n_workers : int, optional
         Number of processes; by default that of the cores.  With *executor*, the number of its
         workers, so that each has a task and another one waiting.
     retry : bool
@@ -123,9 +123,9 @@ def batch(
     folder = as_path(output, "output")
     if executor is not None:
         require(executor, Executor, "executor")
-    if workers is not None and not is_whole(workers, 1):
-        raise ArgumentError(f"workers must be a whole number, 1 or more; got {shown(workers)}")
-    count = int(workers or n_threads())
+    if n_workers is not None and not is_whole(n_workers, 1):
+        raise ArgumentError(f"n_workers must be a whole number, 1 or more; got {shown(n_workers)}")
+    count = int(n_workers or n_threads())
     try:
         store = Writer(folder)
     except OSError as fault:
@@ -134,7 +134,7 @@ def batch(
         run = _Run(found, store, as_flag(retry, "retry"), progress)
         if executor is None:
             _run_here(run, count, found.settings)
-        elif not run.on(partial(executor.submit, compute), _AHEAD * count):
+        elif not run.on(lambda *task: executor.submit(compute, *task), _AHEAD * count):
             raise Cancelled(f"the executor has broken; {_CONTINUE}")
         store.end(len(found.meshes) * len(found.poses))
     finally:
@@ -146,7 +146,7 @@ def batch(
 
 def _run_here(run: _Run, count: int, settings: Settings) -> None:
     """Run all tasks in *count* processes, which are started anew when one of them has died."""
-    tries = 0
+    tries, most = 0, _AHEAD * count
     while run.is_left():
         wait_until_compiled()
         with spawning() as context:
@@ -157,7 +157,7 @@ def _run_here(run: _Run, count: int, settings: Settings) -> None:
             wait(started)
         with pool:
             if not any(each.exception() for each in started):
-                run.on(partial(pool.submit, compute_alone), _AHEAD * count, is_own=True)
+                run.on(partial(_submitted, pool), most, is_own=True)
                 continue
         tries += 1
         if tries == _MOST_TRIES:
@@ -308,6 +308,10 @@ class _Run:
             if len(each) > 1 and known is None:
                 each = [replace(task, poses={}, later=tuple(each))]
             yield from each
+
+
+def _submitted(pool: Executor, *task: Any) -> Future[Any]:
+    return pool.submit(compute_alone, *task)
 
 
 def _raised(fault: Exception, _: object) -> Any:

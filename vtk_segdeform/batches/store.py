@@ -119,7 +119,7 @@ class PoseStore(Described):
         imported("vtk_segdeform.io")  # imports pyvista
         from ..io import write_mesh
 
-        write_mesh(path, self.mesh(number).with_vertices(self.vertices(number)))
+        write_mesh(as_path(path), self.mesh(number).with_vertices(self.vertices(number)))
 
     def table(self) -> dict[str, list[Any]]:
         """Return a column for each of number, mesh, pose, status, message and so on, by name."""

@@ -243,6 +243,6 @@ def _pulling(deformer: Deformer, pose: Mapping[str, Any]) -> tuple[Deformer, lis
     return own, [checked_point(pose["to"])[None] - point.at(mesh.vertices) + mesh.vertices[handle]]
 
 
-def _small(faces: Any) -> tuple[bytes, list[Row]]:
+def _small(faces: Any) -> Any:
     """Return *faces* as int32, half the bytes, if that is enough."""
     return faces.astype(np.int32) if faces.max(initial=0) < 1 << 31 else faces

@@ -11,6 +11,7 @@ The files, in reading order:
     constrained   the same drag with rigid parts, slides, symmetry, volumes and followers
     opening       from opening a file to a surface that follows the pointer
     mechanisms    what each mechanism of the solver buys
+    batching      batches by one process and by two
     paper         tables 1 and 2 of the paper
     peers         the same poses by libigl
 """

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import Cancelled, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import constrained, felt, mechanisms, opening, paper, peers
+from . import batching, constrained, felt, mechanisms, opening, paper, peers
 from .measuring import conditions
 from .results import Scale, Section
 from .tasks import warm_up
@@ -21,6 +21,7 @@ EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "constraints": constrained.run,
     "open": opening.run,
     "mechanisms": mechanisms.run,
+    "batch": batching.run,
     "paper": paper.run,
     "peers": peers.run,
 }

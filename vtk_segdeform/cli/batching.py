@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Iterator
@@ -23,7 +22,7 @@ def batch(options: Namespace, say: Say, progress: Progress) -> bool:
     """Compute all poses of a plan; False if some have no vertices."""
     with _cluster(options.scheduler) as (executor, count):
         store = computed(
-            options.plan, options.output, executor=executor, workers=options.workers or count,
+            options.plan, options.output, executor=executor, n_workers=options.workers or count,
             retry=options.retry, progress=progress,
         )  # fmt: skip
     table = store.table()
@@ -61,5 +60,5 @@ def _cluster(address: str | None) -> Iterator[tuple[Executor | None, int | None]
         raise MissingDependencyError(
             "--scheduler requires Dask; pip install 'vtk-segdeform[dask]'"
         ) from None
-    with Client(os.fspath(address)) as client:
+    with Client(address) as client:  # type: ignore[no-untyped-call]
         yield client.get_executor(), sum(client.ncores().values()) or None
