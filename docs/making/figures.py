@@ -227,6 +227,15 @@ def organs() -> None:
     write("organs", [cut(x), cut(bent)], np.concatenate([x, bent]))
 
 
+def batch() -> None:
+    """Draw a body with limbs and three random poses of it."""
+    mesh = sd.models.random_limbs(5430, seed=3)
+    colours = region_colours(mesh, sd.segment(mesh).weights)
+    poses = [pose.vertices for pose in sd.random_poses(mesh, 3, seed=8).poses]
+    drawings = [body(mesh, x, colours) for x in (mesh.vertices, *poses)]
+    write("batch", drawings, np.concatenate([mesh.vertices, *poses]))
+
+
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -240,6 +249,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "followers": (followers, 3),
     "ventricle": (ventricle, 2),
     "organs": (organs, 2),
+    "batch": (batch, 4),
     "rigid": (rigid, 2),
     "slide": (slide, 2),
     "symmetry": (symmetry, 3),

@@ -354,7 +354,7 @@ def test_a_packed_mesh_is_the_same_to_the_bit(meshes):
         ({"poses": [{"handel": [1]}]}, "handel"),
         ({"poses": [{"handle": [1]}]}, "'targets' together"),
         ({"poses": [{"vertex": 1}]}, "'to' together"),
-        ({"poses": [{"random": 0}]}, "1 or more random"),
+        ({"poses": [{"random": 0}]}, "1 to 1,000,000 random"),
         ({"poses": [{"handles": [{"rotate": "y,3"}]}]}, "must have 'select'"),
         ({"seconds": 0.0}, "seconds"),
         ({"block": 0}, "block"),

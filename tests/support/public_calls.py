@@ -12,7 +12,9 @@ import enum
 import functools
 import importlib
 import inspect
+import tempfile
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -105,6 +107,7 @@ def expensive(call: Call) -> bool:
     """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.pull", "PolyDataTools.regions",
+        "batch", "random_poses",
         "cactus", "deform", "dinosaur", "edit", "fit_cages", "film", "picture_before_after",
         "picture_distortion", "picture_regions_and_cages", "picture_volume_change", "pull",
     }  # fmt: skip
@@ -318,6 +321,7 @@ def instance(cls: type) -> Any:
         "Surface": given,
         "Passengers": passengers,
         "Solution": solution,
+        "PoseStore": pose_store,
         "Deformed": lambda: sd.Deformed(**vars_of(solution()), mesh=mesh()),
         "Options": sd.Options,
         "LocalVolume": lambda: sd.geometry.LocalVolume(mesh()),
@@ -327,6 +331,24 @@ def instance(cls: type) -> Any:
         "Film": _film,
     }
     return made[name]() if name in made else _widget(cls)
+
+
+@functools.cache
+def _poses() -> Path:
+    """Return a folder with the poses of a batch."""
+    folder = Path(tempfile.mkdtemp())
+    with ThreadPoolExecutor(1) as executor:
+        sd.batch(_plan(), folder, executor=executor)
+    return folder
+
+
+def pose_store() -> sd.PoseStore:
+    return sd.PoseStore(_poses())
+
+
+def _plan() -> dict[str, Any]:
+    pose = {"fixed": _left(), "handle": _right(), "targets": _targets()}
+    return {"meshes": [mesh()], "poses": [pose], "n_regions": 1}
 
 
 def _film() -> Film:
@@ -343,6 +365,7 @@ def _plotter() -> pv.Plotter:
 # Classes that callers construct; others are only returned.
 MADE_BY_HAND = {
     sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
+    sd.PoseStore,
 }  # fmt: skip
 EXTRA = {
     "Session.change_options": tuple(field.name for field in fields(sd.Options)),
@@ -363,6 +386,12 @@ def _file(name: str) -> Path:
 
 
 ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "executor": lambda: ThreadPoolExecutor(1),
+    "n": lambda: 1,
+    "n_workers": lambda: 1,
+    "number": lambda: 0,
+    "output": lambda: Path("poses"),
+    "plan": _plan,
     "along": lambda: "plane",
     "arrays": lambda: (),
     "attach": dict,
@@ -574,6 +603,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "require_writable.path": lambda: Path("written.vtp"),
     "write.path": lambda: Path("written.ply"),
     "write_mesh.path": lambda: Path("written.ply"),
+    "PoseStore.path": _poses,
+    "PoseStore.write_mesh.path": lambda: Path("written.ply"),
 }
 
 # The words for an argument in messages, where they are clearer than its name.

@@ -60,6 +60,9 @@ RIGHT = {
         names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
     ),
     "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
+    "many_poses": lambda names: (
+        len(names["changes"]) == 18 and max(names["changes"]) < 1e-12 and names["moved"] > 0.02
+    ),
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),

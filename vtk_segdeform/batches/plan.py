@@ -37,6 +37,7 @@ _KEYS = {
     "vertex": {"vertex", "to", "radius", "pins", "locality", "volumes"},
     "handle": {"fixed", "handles", "handle", "targets", "volumes"},
 }
+_MOST = 1_000_000  # random poses of an entry
 _HANDLE = {"select", "matrix", "rotate", "pivot", "translate"}
 DEGREES = 60.0
 """Largest angle by which a random pose bends a limb, by default."""
@@ -89,7 +90,7 @@ class Plan:
             seconds=_positive(plan, "seconds", Settings().seconds),
             memory=_positive(plan, "memory", Settings().memory),
         )
-        return cls(tuple(meshes), tuple(poses), settings, _whole(plan, "block", 1, 25) or 1)
+        return cls(tuple(meshes), tuple(poses), settings, _whole(plan, "block", 1, 10) or 1)
 
     def mesh_key(self, mesh: Mesh) -> str:
         """Return a hash of a mesh and of all that its regions and cages depend on."""
@@ -218,9 +219,9 @@ def _counted(pose: Any, number: int) -> Iterator[Mapping[str, Any]]:
     if kind == "random":
         count, seed = pose["random"], pose.get("seed", 0)
         degrees = pose.get("degrees", DEGREES)
-        if not (is_whole(count, 1) and is_whole(seed, 0) and is_number(degrees, 0.0)):
+        if not (is_whole(count, 1, _MOST) and is_whole(seed, 0) and is_number(degrees, 0.0)):
             raise ArgumentError(
-                f"{name} must have 1 or more random poses, a seed of 0 or more and degrees of 0 or "
+                f"{name} must have 1 to {_MOST:,} random poses, a seed of 0 or more and degrees of 0 or "
                 f"more; got {shown(dict(pose))}"
             )
         for k in range(int(count)):

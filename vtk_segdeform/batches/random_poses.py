@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import BoolArray, FloatArray, IntArray, is_number, is_whole
 from ..cages import fit_cages, suggested_size
-from ..checks import shown
+from ..checks import as_flag, shown
 from ..deformer import Deformer
 from ..errors import ArgumentError, ConstraintError
 from ..files import cache_folder
@@ -36,7 +36,7 @@ from ..solver import Solution, Status
 from .plan import DEGREES, Given
 
 _TIP, _CORE = 0.7, 0.5  # of the distance from the necks, from which a part is a handle, or fixed
-_MOST_DRAWS = 20  # of a pose
+_MOST, _MOST_DRAWS = 100_000, 20  # poses, which are all in memory; and draws of each
 _EXACT = 1e-9  # relative error of the volume
 
 
@@ -210,10 +210,11 @@ def random_poses(
     >>> len(poses), max(abs(pose.volume_change) for pose in poses) < 1e-12
     (2, True)
     """
-    if not (is_whole(n, 1) and is_whole(seed, 0)):
+    if not (is_whole(n, 1, _MOST) and is_whole(seed, 0)):
         raise ArgumentError(
-            f"n must be 1 or more, and seed 0 or more; got {shown(n)} and {shown(seed)}"
+            f"n must be 1 to {_MOST:,}, and seed 0 or more; got {shown(n)} and {shown(seed)}"
         )
+    as_flag(refine, "refine")
     if not (is_number(degrees, 0.0)):
         raise ArgumentError(f"degrees must be a number, 0 or more; got {shown(degrees)}")
     own = Given(mesh, 0).mesh

@@ -30,7 +30,7 @@ from itertools import islice
 from typing import Any, TypeAlias
 
 from ..arrays import is_whole
-from ..checks import as_flag, as_path, require, shown
+from ..checks import as_callable, as_flag, as_path, require, shown
 from ..errors import ArgumentError, Cancelled, MissingDependencyError, SegDeformError
 from ..interpreter import spawning
 from ..kernels import n_threads, wait_until_compiled
@@ -39,7 +39,7 @@ from .plan import Given, Plan, Settings, digest
 from .store import PoseStore, Writer
 from .tasks import FAILED, SET_ASIDE, Row, begin, compute, compute_alone, packed, ready
 
-_MOST_TRIES = 2
+_MOST_TRIES, _MOST_WORKERS = 2, 100_000
 _AHEAD = 2  # tasks for each worker, so that none waits for the next
 _PERIOD = 0.5  # seconds between reports
 _CONTINUE = "what is done is stored: call batch again to continue"
@@ -91,7 +91,7 @@ def batch(
 
         Of all poses: ``refine`` (False: cages are stored; True: finished vertices),
         ``avoid_contact`` (False), ``n_regions``, ``n_cage_vertices`` (automatic); ``block``, poses
-        of a task (25); ``seconds``, for a pose (120), and ``memory``, for a process, in GB (4).
+        of a task (10); ``seconds``, for a pose (120), and ``memory``, for a process, in GB (4).
     output : path
         A folder, which is created, for ``poses.segposes`` and a table.
     executor : concurrent.futures.Executor, optional
@@ -123,8 +123,10 @@ def batch(
     folder = as_path(output, "output")
     if executor is not None:
         require(executor, Executor, "executor")
-    if n_workers is not None and not is_whole(n_workers, 1):
-        raise ArgumentError(f"n_workers must be a whole number, 1 or more; got {shown(n_workers)}")
+    if n_workers is not None and not is_whole(n_workers, 1, _MOST_WORKERS):
+        raise ArgumentError(f"n_workers must be 1 to {_MOST_WORKERS:,}; got {shown(n_workers)}")
+    if progress is not None:
+        as_callable(progress, "progress")
     count = int(n_workers or n_threads())
     try:
         store = Writer(folder)

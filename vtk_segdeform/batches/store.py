@@ -60,8 +60,8 @@ class PoseStore(Described):
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         place = as_path(path)
-        self.path = place / NAME if place.is_dir() else place
-        if not self.path.is_file():
+        self.path = place / NAME if os.path.isdir(place) else place
+        if not os.path.isfile(self.path):
             raise ArgumentError(f"path must have poses of a batch; there is no file {self.path}")
         with self._open() as database:
             count = database.execute("SELECT count(*) FROM plan").fetchone()[0]

@@ -80,7 +80,7 @@ class _Sleeping(Executor):
     """Sends tasks to one process, which sleeps instead of computing poses."""
 
     def __init__(self, pool: ProcessPoolExecutor) -> None:
-        self._pool, self.began = pool, 0.0
+        self._pool, self.began, self.ended = pool, 0.0, 0.0
 
     def submit(self, fn: Callable[..., Any], /, *task: Any, **_: Any) -> Future[Any]:
         """Submit a task; meshes are prepared as always, and the clock starts after the last."""
@@ -89,7 +89,12 @@ class _Sleeping(Executor):
             done.result()
             self.began = time.perf_counter()
             return done
-        return self._pool.submit(_slept, *task)
+        future = self._pool.submit(_slept, *task)
+        future.add_done_callback(self._ended)
+        return future
+
+    def _ended(self, _: Future[Any]) -> None:
+        self.ended = time.perf_counter()
 
 
 def _slept(data: bytes, poses: list[Any], _: Any) -> tuple[bytes, list[Row]]:
@@ -106,7 +111,7 @@ def _overhead(plan: dict[str, Any], folder: Path) -> float:
     with pool:
         executor = _Sleeping(pool)
         batch(tasks, folder, executor=executor, n_workers=1)
-        return (time.perf_counter() - executor.began) / (_TASKS * _SLEEP) - 1.0
+    return (executor.ended - executor.began) / (_TASKS * _SLEEP) - 1.0
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:
