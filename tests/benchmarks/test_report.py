@@ -174,6 +174,7 @@ def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
     assert still.distortion < 1e-6
 
 
+@pytest.mark.campaign
 def test_batches_are_measured(monkeypatch):
     monkeypatch.setenv("SEGDEFORM_CACHE", "")  # restored, since it changes
     monkeypatch.setattr(batching, "_LARGE", 700)

@@ -23,11 +23,13 @@ PAGES = [
     ROOT / "README.md",
     *(
         ROOT / "docs" / f"{name}.rst"
-        for name in ("comparison", "constraints", "mathematics", "speed", "volumes")
+        for name in ("batch", "comparison", "constraints", "mathematics", "speed", "volumes")
     ),
 ]
 # The percentages of the others are choices and goals.
-MEASURING = [page for page in PAGES if page.stem not in ("constraints", "mathematics", "volumes")]
+MEASURING = [
+    page for page in PAGES if page.stem not in ("batch", "constraints", "mathematics", "volumes")
+]
 MARK = re.compile(
     r"(?m)^\s*(?:<!--|\.\.) printed by(?P<long>, in the campaign)?: (?P<command>.+?)"
     r"(?: => (?P<printed>.+?))?(?: -->)?$"

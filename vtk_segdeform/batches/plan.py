@@ -221,7 +221,7 @@ def _counted(pose: Any, number: int) -> Iterator[Mapping[str, Any]]:
         degrees = pose.get("degrees", DEGREES)
         if not (is_whole(count, 1, _MOST) and is_whole(seed, 0) and is_number(degrees, 0.0)):
             raise ArgumentError(
-                f"{name} must have 1 to {_MOST:,} random poses, a seed of 0 or more and degrees of 0 or "
+                f"{name} must have 1 to {_MOST:,} random poses, and a seed and degrees of 0 or "
                 f"more; got {shown(dict(pose))}"
             )
         for k in range(int(count)):
