@@ -36,7 +36,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 400  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 401  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}

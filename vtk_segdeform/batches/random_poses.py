@@ -194,7 +194,7 @@ def random_poses(
     Returns
     -------
     RandomPoses
-        A sequence of n `Solution`, with the share of drawn poses that were `refused`.
+        With n `poses`, each a `Solution`, and the share of drawn poses that were `refused`.
 
     Raises
     ------
@@ -206,7 +206,7 @@ def random_poses(
     Examples
     --------
     >>> import vtk_segdeform as sd
-    >>> poses = sd.random_poses(sd.models.random_limbs(600, 1), 2, seed=5)
+    >>> poses = sd.random_poses(sd.models.random_limbs(600, 1), 2, seed=5).poses
     >>> len(poses), max(abs(pose.volume_change) for pose in poses) < 1e-12
     (2, True)
     """

@@ -11,6 +11,7 @@ import statistics
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -50,7 +51,7 @@ def measured(n_meshes: int, n_poses: int, size: int) -> list[tuple[Cell, ...]]:
         stores, seconds = [], []
         for count in (1, 2):
             os.environ["SEGDEFORM_CACHE"] = str(folder / f"cache {count}")
-            store, each = _timed(lambda n=count: batch(plan, folder / f"{n}", n_workers=n))
+            store, each = _timed(partial(batch, plan, folder / f"{count}", n_workers=count))
             stores.append(store)
             seconds.append(each)
         table, poses = stores[0].table(), n_meshes * n_poses
@@ -58,7 +59,7 @@ def measured(n_meshes: int, n_poses: int, size: int) -> list[tuple[Cell, ...]]:
         large = {"meshes": [random_limbs(_LARGE, 1)], "poses": [{"random": 10, "seed": 1}]}
         store = batch(large, folder / "large", n_workers=1)
         store.vertices(0)
-        reads = [_timed(lambda n=number: store.vertices(n))[1] for number in range(1, 10)]
+        reads = [_timed(partial(store.vertices, number))[1] for number in range(1, 10)]
         return [
             ("one process, s", seconds[0]),
             ("two processes, s", seconds[1]),
