@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -82,19 +82,16 @@ def test_the_bytes_are_the_same_on_one_and_two_processes_and_here(plan, referenc
         assert store.digest() == reference.digest()
 
 
-def test_the_order_of_the_poses_makes_no_difference(plan, reference, tmp_path):
-    turned = {**plan, "poses": [RANDOM, BEND], "block": 3}
-    store = sd.batch(turned, tmp_path / "out", executor=Here())
-    before, after = reference.table(), store.table()
-    kinds = [[each.partition(" ")[0] for each in table["pose"]] for table in (before, after)]
-    assert kinds[0] != kinds[1]
-    assert poses_of(reference)["mesh 0", "pose 0"].tobytes() in {
-        np.concatenate(store.cage_vertices(k)).tobytes() for k in range(len(store))
-    }
-    assert (
-        poses_of(reference)["mesh 1", "random 3"].tobytes()
-        == poses_of(store)["mesh 1", "random 3"].tobytes()
-    )
+def test_poses_start_from_rest_so_their_order_makes_no_difference(meshes, tmp_path):
+    other = {**BEND, "handles": [{"select": "z>90%", "rotate": "y,-30"}]}
+    poses, found = [BEND, other, RANDOM], []
+    for name in ("forward", "backward"):
+        plan = {"meshes": meshes[:1], "poses": poses}
+        store = sd.batch(plan, tmp_path / name, executor=Here())
+        found.append({np.concatenate(store.cage_vertices(k)).tobytes() for k in range(6)})
+        poses = poses[::-1]
+    assert len(found[0]) == 6
+    assert found[0] == found[1]
 
 
 def test_a_pose_is_that_of_a_deformer_at_rest(meshes, tmp_path):
@@ -129,9 +126,10 @@ def test_a_pose_is_that_of_a_deformer_at_rest(meshes, tmp_path):
 def test_a_refined_pose_is_stored_with_all_its_vertices(meshes, tmp_path):
     plan = {"meshes": meshes[:1], "poses": [BEND]}
     cages = sd.batch(plan, tmp_path / "cages", executor=Here())
-    store = sd.batch({**plan, "refine": True}, tmp_path / "refined", executor=Here())
+    before = cages.vertices(0)
+    store = sd.batch({**plan, "refine": True}, tmp_path / "cages", executor=Here())
     x = store.vertices(0)
-    assert np.abs(x - cages.vertices(0)).max() > 1e-6
+    assert np.abs(x - before).max() > 1e-6
     assert store.cage_vertices(0) == ()
     store.write_mesh(0, tmp_path / "pose.ply")
     written = sd.read_mesh(tmp_path / "pose.ply")
@@ -245,12 +243,17 @@ def test_a_killed_client_continues(number, plan, reference, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     command = [sys.executable, str(program), str(tmp_path / "out")]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as client:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
+    with subprocess.Popen(command, **pipes) as client:
         for line in client.stdout:
             if float(line) > 0.1:
-                client.send_signal(number)
+                if number == signal.SIGINT:  # as a terminal sends it, to all processes
+                    os.killpg(client.pid, number)
+                else:
+                    client.kill()
                 break
-        client.communicate(timeout=60)
+        _, errors = client.communicate(timeout=60)
+    assert errors.count(b"Traceback") == (number == signal.SIGINT), errors.decode()
     assert client.returncode != 0
     left = Here()
     store = sd.batch(plan, tmp_path / "out", executor=left)
@@ -300,6 +303,26 @@ def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
 
     sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), n_workers=1)
     assert Slow.most == _AHEAD
+
+
+def test_what_is_under_way_is_stored_when_the_batch_is_cancelled(plan, tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+
+        class Threads(Here):
+            def submit(self, fn, /, *task):
+                self.tasks.append(len(task[1]))
+                return pool.submit(fn, *task)
+
+        def stop(fraction, text):
+            if fraction > 0.0:
+                raise sd.Cancelled("enough")
+
+        first, left = Threads(), Here()
+        with pytest.raises(sd.Cancelled):
+            sd.batch(plan, tmp_path, executor=first, n_workers=2, progress=stop)
+    sd.batch(plan, tmp_path, executor=left)
+    assert sum(first.tasks) > 2
+    assert sum(left.tasks) == 10 - sum(first.tasks)
 
 
 def test_one_batch_at_a_time_writes_a_store(plan, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 import vtk_segdeform as sd
 from vtk_segdeform.batches.random_poses import Skeleton
+from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh import new_crossings
 from vtk_segdeform.models import random_limbs
@@ -29,6 +30,8 @@ def test_random_poses_are_valid_and_differ(body):
     found = sd.random_poses(body, 4, 1)
     assert 0.0 <= found.refused < 0.9
     volume = signed_volume(body.vertices, body.faces)
+    distinct = {pose.vertices.tobytes() for pose in found.poses}
+    assert len(distinct) == 4
     for pose in found.poses:
         x = pose.vertices
         assert signed_volume(x, body.faces) == pytest.approx(volume, rel=1e-12)
@@ -48,6 +51,13 @@ def test_refused_poses_are_counted(body, monkeypatch):
     found = sd.random_poses(body, 2, 1, degrees=20.0)
     assert len(calls) == 4
     assert found.refused == 0.5
+    regions = sd.segment(body)
+    cages = sd.fit_cages(body, regions, suggested_size(regions))
+    skeleton = Skeleton.of(body, regions.labels)
+    targets = skeleton.targets(body.vertices, np.random.default_rng([1, 0, 1]), np.radians(20.0))
+    ends = {"fixed": skeleton.fixed, "handle": skeleton.handle}
+    from_rest = sd.Deformer(body, regions, cages, **ends).solve(targets)
+    np.testing.assert_allclose(found.poses[0].vertices, from_rest.vertices, atol=1e-10)
 
 
 def test_limbs_turn_about_their_necks_by_at_most_the_given_angle(body):
