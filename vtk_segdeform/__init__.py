@@ -54,6 +54,7 @@ if _TYPE_CHECKING:
         widgets,
     )
     from .any_mesh import Deformed, deform, pull, segment
+    from .batches import PoseStore, batch, random_poses
     from .cages import Cage, fit_cages, mean_value_coordinates
     from .deformer import Deformer, Slide
     from .errors import Cancelled
@@ -81,6 +82,7 @@ _MODULE_OF = {
     "Mesh": "mesh",
     "Motion": "motions",
     "Options": "session",
+    "PoseStore": "batches",
     "Regions": "regions",
     "Slide": "deformer",
     "Session": "session",
@@ -88,6 +90,7 @@ _MODULE_OF = {
     "Status": "solver",
     "Surface": "io",
     "VolumeMesh": "inside",
+    "batch": "batches",
     "deform": "any_mesh",
     "edit": "widgets.plugin",
     "find_faults": "mesh",
@@ -98,6 +101,7 @@ _MODULE_OF = {
     "mean_value_coordinates": "cages",
     "pull": "any_mesh",
     "read_landmarks": "landmarks",
+    "random_poses": "batches",
     "read_mesh": "io",
     "repair": "mesh_repair",
     "save_session": "session",
@@ -108,8 +112,9 @@ _MODULE_OF = {
     "write_motion": "motions",
 }
 _SUBPACKAGES = {
-    "cages", "deformer", "energy", "errors", "filters", "geometry", "inside", "io", "landmarks", "mesh",
-    "mesh_repair", "models", "pictures", "regions", "session", "solver", "subspace", "widgets",
+    "cages", "deformer", "energy", "errors", "filters", "geometry", "inside", "io", "landmarks",
+    "mesh", "mesh_repair", "models", "pictures", "regions", "session", "solver", "subspace",
+    "widgets",
 }  # fmt: skip
 
 __all__ = [
@@ -123,6 +128,7 @@ __all__ = [
     "Mesh",
     "Motion",
     "Options",
+    "PoseStore",
     "Regions",
     "Session",
     "Slide",
@@ -130,6 +136,7 @@ __all__ = [
     "Status",
     "Surface",
     "VolumeMesh",
+    "batch",
     "deform",
     "edit",
     "errors",
@@ -141,6 +148,7 @@ __all__ = [
     "mean_value_coordinates",
     "models",
     "pull",
+    "random_poses",
     "read_landmarks",
     "read_mesh",
     "repair",

@@ -268,6 +268,15 @@ def landmarks() -> None:
     )
 
 
+def batch() -> None:
+    """Draw a body with limbs and three random poses of it."""
+    mesh = sd.models.random_limbs(5430, seed=3)
+    colours = region_colours(mesh, sd.segment(mesh).weights)
+    poses = [pose.vertices for pose in sd.random_poses(mesh, 3, seed=8).poses]
+    drawings = [body(mesh, x, colours) for x in (mesh.vertices, *poses)]
+    write("batch", drawings, np.concatenate([mesh.vertices, *poses]))
+
+
 FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "front": (front, 3),
     "regions": (regions, 3),
@@ -284,6 +293,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "organs": (organs, 2),
     "landmarks": (landmarks, 0),
     "solids": (solids, 0),
+    "batch": (batch, 4),
     "rigid": (rigid, 2),
     "slide": (slide, 2),
     "symmetry": (symmetry, 3),

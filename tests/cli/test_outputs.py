@@ -12,11 +12,11 @@ from vtk_segdeform import models, read_mesh
 from vtk_segdeform.cli import commands
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.cli.outputs import report_pose
-from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.io import convert
 from vtk_segdeform.io import surface as surface_module
 from vtk_segdeform.io.array_names import set_names
+from vtk_segdeform.mesh.selection import parse_selection
 from vtk_segdeform.pictures import canvas
 from vtk_segdeform.solver import Solution, Status
 

@@ -12,9 +12,9 @@ from campaign import every
 
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
-from vtk_segdeform.cli.motion import rotation, transform
 from vtk_segdeform.cli.turns import turns_off
 from vtk_segdeform.deformer import deform
+from vtk_segdeform.geometry.motion import rotation, transform
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io import read_mesh, write_mesh
 from vtk_segdeform.mesh import Mesh

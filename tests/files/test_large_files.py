@@ -14,12 +14,12 @@ from solids import OCTAHEDRON
 import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.cli.main import main
-from vtk_segdeform.cli.motion import read_matrix
-from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ArgumentError, SegDeformError
 from vtk_segdeform.files import open_regular, read_regular
+from vtk_segdeform.geometry.motion import read_matrix
 from vtk_segdeform.io import meshlab, read_polydata, write_mesh
 from vtk_segdeform.io.meshlab_project import read_project
+from vtk_segdeform.mesh.selection import parse_selection
 from vtk_segdeform.session.store import saved_view
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sparse files, pipes")

@@ -22,11 +22,11 @@ import pyvista as pv
 from solids import OCTAHEDRON
 
 import vtk_segdeform as sd
-from vtk_segdeform.cli.motion import read_matrix
-from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import SegDeformError
+from vtk_segdeform.geometry.motion import read_matrix
 from vtk_segdeform.io.convert import read_polydata
 from vtk_segdeform.io.meshlab_project import read_project
+from vtk_segdeform.mesh.selection import parse_selection
 
 SECONDS, MEMORY = 60, 2 << 30  # for each file, in addition to the memory in use
 MESH = sd.Mesh(*OCTAHEDRON)

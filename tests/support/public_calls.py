@@ -12,7 +12,9 @@ import enum
 import functools
 import importlib
 import inspect
+import tempfile
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -105,6 +107,7 @@ def expensive(call: Call) -> bool:
     """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
         "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.pull", "PolyDataTools.regions",
+        "batch", "random_poses",
         "cactus", "deform", "dinosaur", "edit", "fit_cages", "fit_landmarks", "film",
         "picture_before_after", "picture_distortion", "picture_landmarks",
         "picture_regions_and_cages", "picture_volume_change", "pull",
@@ -326,6 +329,7 @@ def instance(cls: type) -> Any:
         "VolumeMesh": volume,
         "Passengers": passengers,
         "Solution": solution,
+        "PoseStore": pose_store,
         "Deformed": lambda: sd.Deformed(**vars_of(solution()), mesh=mesh()),
         "Options": sd.Options,
         "LocalVolume": lambda: sd.geometry.LocalVolume(mesh()),
@@ -349,6 +353,23 @@ def _fit() -> sd.LandmarkFit:
     return sd.fit_landmarks(mesh(), x, x + 0.1, n_regions=1, n_cage_vertices=24)
 
 
+def _poses() -> Path:
+    """Return a folder with the poses of a batch."""
+    folder = Path(tempfile.mkdtemp())
+    with ThreadPoolExecutor(1) as executor:
+        sd.batch(_plan(), folder, executor=executor)
+    return folder
+
+
+def pose_store() -> sd.PoseStore:
+    return sd.PoseStore(_poses())
+
+
+def _plan() -> dict[str, Any]:
+    pose = {"fixed": _left(), "handle": _right(), "targets": _targets()}
+    return {"meshes": [mesh()], "poses": [pose], "n_regions": 1}
+
+
 def _film() -> Film:
     film = Film(view())
     film.snap()
@@ -364,6 +385,7 @@ def _plotter() -> pv.Plotter:
 MADE_BY_HAND = {
     sd.Mesh, sd.Surface, sd.Regions, sd.Cage, sd.Deformer, sd.Session, sd.Options, sd.Slide,
     sd.VolumeMesh,
+    sd.PoseStore,
 }  # fmt: skip
 EXTRA = {
     "Session.change_options": tuple(field.name for field in fields(sd.Options)),
@@ -386,6 +408,12 @@ def _file(name: str) -> Path:
 
 
 ARGUMENTS: dict[str, Callable[[], Any]] = {
+    "executor": lambda: ThreadPoolExecutor(1),
+    "n": lambda: 1,
+    "n_workers": lambda: 1,
+    "number": lambda: 0,
+    "output": lambda: Path("poses"),
+    "plan": _plan,
     "along": lambda: "plane",
     "arrays": lambda: (),
     "attach": dict,
@@ -623,6 +651,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "write_motion.seconds": lambda: [1.0],
     "write_motion.surface": mesh,
     "write_mesh.path": lambda: Path("written.ply"),
+    "PoseStore.path": _poses,
+    "PoseStore.write_mesh.path": lambda: Path("written.ply"),
 }
 
 # The words for an argument in messages, where they are clearer than its name.

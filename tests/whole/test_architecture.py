@@ -28,7 +28,7 @@ ROOMS = [
     "version", "importing", "errors", "interpreter", "sizes", "checks", "arrays", "progress",
     "freezing", "files", "kernels",
     "mesh", "mesh_repair", "geometry", "regions", "cages", "subspace", "energy", "solver",
-    "finish", "deformer", "autograd", "io", "landmarks", "inside", "any_mesh", "motions",
+    "finish", "deformer", "autograd", "io", "landmarks", "inside", "any_mesh", "motions", "batches",
     "session", "models", "pictures", "filters",
     "widgets.scene", "widgets.picking", "widgets.region_selector", "widgets.cage_display",
     "widgets.handle_dragger", "widgets.puller", "widgets.volume_overlay", "widgets.films",
@@ -37,7 +37,7 @@ ROOMS = [
     "widgets", "widgets.plugin", "widgets.qt", "widgets.app", "benchmarks", "cli", "__main__",
 ]  # fmt: skip
 MOST_FLOORS = 26  # two of them for the page in the browser
-MOST_IMPORTS = 422  # pairs of rooms of which one imports from the other
+MOST_IMPORTS = 440  # pairs of rooms of which one imports from the other
 MOST_FILES = 24  # in one folder
 
 NUMERIC = {"numpy", "scipy"}
@@ -62,6 +62,7 @@ GRANTED = {
     "io.vtk_formats": VTK,
     "inside": {"pyvista"},
     "any_mesh": {"pyvista"},
+    "batches.store": {"pyarrow"},
     "session.output": {"pyvista"},
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
@@ -87,6 +88,7 @@ GRANTED = {
     "benchmarks.peers": {"igl"},
     "benchmarks.solids": {"pyvista"},
     "cli.application": {"qtpy"},
+    "cli.batching": {"distributed"},
     "cli.outputs": {"pyvista"},
 }
 
@@ -435,8 +437,9 @@ def test_python_processes_are_started_in_one_way():
 
 
 WRITERS = re.findall(r"(?m)^from \.(\w+) import .*\bwrite_", FILES["io.convert"].read_text())
-# They write to a draft from their caller.
+# They write to a draft from their caller, or to memory.
 WRITE_DIRECTLY = {
+    "batches.tasks",
     *(f"io.{name}" for name in WRITERS),
     "io.gltf.writing",
     "io.reading_child",

@@ -70,6 +70,9 @@ RIGHT = {
         and abs(names["solution"].volume_change) < 1e-12
         and names["bent"].cell_data["fibre"][-1] @ names["turn"].apply([0, 0, 1]) > 0.99
     ),
+    "many_poses": lambda names: (
+        len(names["changes"]) == 18 and max(names["changes"]) < 1e-12 and names["moved"] > 0.02
+    ),
     "film_a_drag": lambda names: (
         len(names["changes"]) > 14 and max(map(abs, names["changes"])) < 1e-12
     ),

@@ -23,9 +23,11 @@ PAGES = [
     ROOT / "README.md",
     *(
         ROOT / "docs" / f"{name}.rst"
-        for name in ("comparison", "constraints", "landmarks", "mathematics", "speed", "volumes")
+        for name in (
+            "batch", "comparison", "constraints", "landmarks", "mathematics", "speed", "volumes",
+        )
     ),
-]
+]  # fmt: skip
 # The percentages of the others are choices and goals.
 MEASURING = [page for page in PAGES if page.stem in ("README", "comparison", "speed")]
 MARK = re.compile(

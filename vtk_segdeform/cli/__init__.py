@@ -9,8 +9,7 @@ The files, in reading order:
     checking        ``segdeform check``
     subdividing     ``segdeform subdivide``
     motions         ``segdeform motion``
-    selection       point selections such as ``z>80%``
-    motion          motions such as ``--rotate z,60``
+    batching        ``segdeform batch`` and ``segdeform pose``
     turns           how far a handle has turned in a pose
     outputs         printed lines and written surfaces
     demo            ``segdeform demo``

@@ -29,14 +29,14 @@ from ..deformer import (
     solved_along,
 )
 from ..errors import ArgumentError, ConstraintError, MeshError
-from ..geometry import checked_attach, lids_of
+from ..geometry import checked_attach, lids_of, moved_handles, parse_rotation, total_legs
 from ..inside import VolumeMesh
 from ..io import Surface
+from ..mesh import Role, parse_selection
 from ..pictures import picture_before_after, require_picture, require_screen
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..session import Session, load_session
-from . import motion
 from .main import AS_IN_PYTHON
 from .outputs import (
     LIDS,
@@ -55,7 +55,6 @@ from .outputs import (
     surface_and_volume,
     written,
 )
-from .selection import Role, parse_selection
 from .turns import turns_off
 
 SESSION = ".segdeform"  # suffix of session files
@@ -314,45 +313,18 @@ def _handles(
     handles: list[dict[str, str]], surface: Surface, fixed: IntArray, *, has_goals: bool
 ) -> tuple[IntArray, list[FloatArray]]:
     """Return the vertices (k,) of all handles, and their targets (k, 3): on the way, and last."""
-    ids, mesh = [], surface.mesh
-    for handle in handles:
-        if len(handle) == 1:
-            raise ConstraintError(
-                f"handle {handle['select']!r} does not move; add --translate, --rotate or --matrix "
-                "after it"
-            )
-        ids.append(_selected(handle["select"], surface, "handle"))
-    if not ids:
-        if not has_goals:
-            raise ConstraintError("nothing would move: add --handle SEL with a motion, or --volume")
-        return np.zeros(0, dtype=np.int64), [np.empty((0, 3))]
-    together = np.concatenate(ids)
-    if len(np.unique(together)) < len(together):
-        raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
-    at_rest, centre = (
-        [mesh.vertices[own] for own in ids],
-        mesh.vertices[fixed if len(fixed) else slice(None)].mean(axis=0),
+    if not (handles or has_goals):
+        raise ConstraintError("nothing would move: add --handle SEL with a motion, or --volume")
+    return moved_handles(
+        handles, lambda text: _selected(text, surface, "handle"), surface.mesh.vertices, fixed
     )
-    pairs = list(zip(at_rest, handles, strict=True))
-    return together, [
-        np.concatenate([_moved(points, handle, centre, share) for points, handle in pairs])
-        for share in _shares(handles)
-    ]
-
-
-def _shares(handles: list[dict[str, str]]) -> list[float]:
-    """Return the shares of the rotations at which the handles stop on the way; the last is 1."""
-    turned = [handle for handle in handles if "rotate" in handle]
-    count = motion.legs([motion.parse_rotation(handle["rotate"])[1] for handle in turned])
-    begins = [0.0] if any("matrix" in handle for handle in turned) else []
-    return [*begins, *((k + 1) / count for k in range(count))]
 
 
 def _require_turns(options: Namespace, surface: Surface, fixed: IntArray, x: FloatArray) -> None:
     """Raise a MeshError if the pose *x* (n, 3) has lost turns of a handle."""
     for handle in options.handles:
-        axis, angle = motion.parse_rotation(handle.get("rotate", "z,0"))
-        if motion.legs([angle]) > 1 and "matrix" not in handle:
+        axis, angle = parse_rotation(handle.get("rotate", "z,0"))
+        if total_legs([angle]) > 1 and "matrix" not in handle:
             own = _selected(handle["select"], surface, "handle")
             if off := turns_off(surface.mesh, x, axis, angle, fixed=fixed, handle=own):
                 asked = math.degrees(angle)
@@ -361,23 +333,3 @@ def _require_turns(options: Namespace, surface: Surface, fixed: IntArray, x: Flo
                     f"degrees: it has snapped back to {asked + 360.0 * off:.4g}; turn less, or "
                     f"leave more room between handle and fixed vertices"
                 )
-
-
-def _moved(
-    points: FloatArray, handle: dict[str, str], fixed_centre: FloatArray, share: float = 1.0
-) -> FloatArray:
-    """Apply the matrix, and a *share* of the rotation and of the translation, in this order.
-
-    *fixed_centre* (3,) is the mean of the fixed vertices.
-    """
-    if "matrix" in handle:
-        points = motion.transform(points, motion.read_matrix(handle["matrix"]))
-    if "rotate" in handle:
-        axis, angle = motion.parse_rotation(handle["rotate"])
-        pivot = handle.get("pivot", "handle")
-        centres = {"handle": points.mean(axis=0), "fixed": fixed_centre}
-        centre = centres[pivot] if pivot in centres else motion.parse_vector(pivot, "pivot")
-        points = motion.transform(points, motion.rotation(axis, share * angle, centre))
-    if "translate" in handle:
-        points = points + share * motion.parse_vector(handle["translate"], "translate")
-    return points

@@ -18,8 +18,8 @@ from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages
 from ..deformer import Deformer, finished
 from ..errors import ConstraintError, MissingDependencyError
-from ..geometry import local_volume_change
-from ..mesh import Mesh
+from ..geometry import local_volume_change, rotation, transform
+from ..mesh import Mesh, parse_selection
 from ..models import cactus
 from ..pictures import (
     picture_before_after,
@@ -28,7 +28,6 @@ from ..pictures import (
 )
 from ..progress import Progress, part
 from ..regions import segment
-from . import motion
 from .outputs import (
     HANDLE_TOLERANCE,
     Say,
@@ -39,7 +38,6 @@ from .outputs import (
     report_regions,
     report_solution,
 )
-from .selection import parse_selection
 
 FIXED, HANDLE = "z<8%", "z>92%"
 _PIVOT_HEIGHT = 0.4  # as a fraction of the height
@@ -78,7 +76,7 @@ def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -
     pivot = 0.5 * (low + high)
     pivot[2] = low[2] + pivot_height * (high[2] - low[2])
     handle = parse_selection(HANDLE, mesh.vertices)
-    turned = motion.transform(mesh.vertices[handle], motion.rotation([0, 1, 0], angle, pivot))
+    turned = transform(mesh.vertices[handle], rotation([0, 1, 0], angle, pivot))
     return Pose(parse_selection(FIXED, mesh.vertices), handle, turned)
 
 

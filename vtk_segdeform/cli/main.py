@@ -53,11 +53,13 @@ COMMANDS = {
     "subdivide": "subdividing",
     "regions": "commands",
     "cages": "commands",
+    "batch": "batching",
+    "pose": "batching",
     "bench": "bench",
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
 EXPERIMENTS = (
-    "drag", "constraints", "open", "landmarks", "mechanisms", "paper", "peers", "solids",
+    "drag", "constraints", "open", "landmarks", "mechanisms", "batch", "paper", "peers", "solids",
 )  # fmt: skip
 
 _SELECTION = """\
@@ -84,6 +86,7 @@ examples:
   segdeform deform in.vtp -o out.vtp --fixed 'z<5%' \\
       --handle left.txt --translate 0,0,0.2   --handle right.txt --rotate x,30 --pivot 0,0,1
   segdeform deform part.vtu -o bent.vtu --fixed 'z<10%' --handle 'z>90%' --rotate y,45
+  segdeform batch plan.json -o poses
   segdeform deform heart.ply -o pumped.ply --volume 'cavity=-40%' --volume wall=keep
   segdeform landmarks atlas.ply -o patient.ply --source atlas.fcsv --target patient.mrk.json
   segdeform regions horse.ply -o regions.vtp --regions 6
@@ -337,8 +340,26 @@ def _parser() -> argparse.ArgumentParser:
     _input_output(sub, "all cages as one coloured surface")
     _cages(sub)
 
+    _batch(add_command("batch", "compute many poses of many meshes"))
+
+    sub = add_command("pose", "write one pose of a batch as a mesh")
+    _input_output(sub, "the mesh in this pose", required=True)
+    text = "number of the pose, from 0, as in the table"
+    sub.add_argument("number", type=_count, metavar="NUMBER", help=text)
+
     _bench(add_command("bench", "run the benchmarks and write a report"))
     return parser
+
+
+def _batch(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("plan", type=Path, metavar="PLAN", help="JSON file with meshes and poses")
+    add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="output folder")
+    text = "number of processes, or of the cluster's threads (default: all)"
+    add("--workers", type=_count, default=None, metavar="N", help=text)
+    text = "address of the scheduler of a Dask cluster, such as tcp://10.0.0.1:8786"
+    add("--scheduler", default=None, metavar="ADDRESS", help=text)
+    add("--retry", action="store_true", help="try poses again that have failed before")
 
 
 def _serve(parser: argparse.ArgumentParser) -> None:

@@ -9,12 +9,11 @@ from ..arrays import FloatArray
 from ..deformer import checked_place, checked_radius, fault_of_grab, place_text
 from ..deformer import pull as pulled
 from ..errors import ConstraintError
-from ..geometry import lids_of
+from ..geometry import lids_of, parse_vector
 from ..mesh import Mesh, SurfacePoint
 from ..pictures import picture_before_after, require_picture
 from ..progress import Progress
 from .commands import constraints_of
-from .motion import parse_vector
 from .outputs import (
     LIDS,
     Say,

@@ -19,6 +19,7 @@ The files, in reading order:
     distortion      stretch and shear of each triangle
     turned_over     folds: triangles that a pose turned over
     local_volume    volume change below the surface at each vertex
+    motion          motions of handles as texts such as ``z,60``
     up_axis         a guess of the axis that points up
 """
 
@@ -46,6 +47,15 @@ from .intrinsic import IntrinsicTriangulation
 from .kmeans import cluster_positions, cluster_within_parts
 from .lids import Lids, lids_of, volume_summary
 from .local_volume import LocalVolume, inner_balls, local_volume_change
+from .motion import (
+    moved_handles,
+    parse_rotation,
+    parse_vector,
+    read_matrix,
+    rotation,
+    total_legs,
+    transform,
+)
 from .normal_transport import NormalTransport
 from .normals import VertexNormals
 from .rotations import closest_rotations, rigid_fit
@@ -105,17 +115,24 @@ __all__ = [
     "lids_of",
     "local_volume_change",
     "mixed_voronoi_areas",
+    "moved_handles",
     "nearest_pairs",
     "nearest_source",
     "outer_components",
+    "parse_rotation",
+    "parse_vector",
     "principal_axes",
+    "read_matrix",
     "rigid_fit",
+    "rotation",
     "signed_volume",
     "signed_volumes",
     "slopes_of",
     "step_to_volume",
     "tie_breakers",
+    "total_legs",
     "towards",
+    "transform",
     "triangle_distortion",
     "turned_over",
     "unique_edges",

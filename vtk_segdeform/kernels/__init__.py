@@ -26,6 +26,7 @@ from .threads import (
     n_threads,
     nearest,
     one_blas_thread,
+    one_thread,
     quick_turns,
 )
 
@@ -43,6 +44,7 @@ __all__ = [
     "n_threads",
     "nearest",
     "one_blas_thread",
+    "one_thread",
     "quick_turns",
     "wait_until_compiled",
     "writable",

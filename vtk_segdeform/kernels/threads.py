@@ -2,6 +2,7 @@
 
     in_parallel(work, n, size)        calls work(start, stop) for tasks of about *size* rows
     nearest(tree, points)             queries a k-d tree
+    one_thread()                      a task among many works in its own thread only
     quick_turns()                     lets the main thread in, while another one works in Python
 
 numpy and the compiled kernels release the GIL, so ordinary threads suffice.  There are two thread
@@ -37,6 +38,7 @@ ROWS_AT_ONCE = 1 << 15
 
 _TURN = 1e-4  # seconds
 _finding = threading.Lock()
+_own = threading.local()  # is_alone: whether this thread uses no others
 _turns_lock = threading.Lock()
 _turns: list[float] = []  # the interval before, and that of each thread with quick turns
 
@@ -157,6 +159,20 @@ def one_blas_thread() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let `in_parallel` work in the calling thread, in a ``with`` block, and BLAS in one thread.
+
+    For one of many tasks that run side by side, each on a core of its own.
+    """
+    before, _own.is_alone = getattr(_own, "is_alone", False), True
+    try:
+        with one_blas_thread():
+            yield
+    finally:
+        _own.is_alone = before
+
+
+@contextlib.contextmanager
 def quick_turns() -> Iterator[None]:
     """Let threads take turns in Python more often, in a ``with`` block of a background thread.
 
@@ -266,9 +282,13 @@ def _found_blas_limit() -> _BlasLimit | None:
     return _BlasLimit(library.ThreadpoolController())
 
 
-@functools.cache
 def n_threads() -> int:
     """Return the number of threads: ``SEGDEFORM_THREADS``, or the cores of this process."""
+    return 1 if getattr(_own, "is_alone", False) else _all_threads()
+
+
+@functools.cache
+def _all_threads() -> int:
     wanted = os.environ.get("SEGDEFORM_THREADS", "")
     if wanted.isdigit() and int(wanted) > 0:
         return int(wanted)

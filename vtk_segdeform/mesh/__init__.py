@@ -17,6 +17,7 @@ The files, in reading order:
     near_faces       pairs of triangles that may do so: a tree of boxes
     intersections    pairs of triangles that cross or touch
     triangles        angles and normals of triangles
+    selection        points selected by a text such as ``z>80%``
     grouping         connected components, equal rows and ragged ranges in linear time
 """
 
@@ -39,6 +40,7 @@ from .intersections import (
 )
 from .mesh import Mesh, conversion_of, require_mesh
 from .report import Kind, MeshReport, counted
+from .selection import Role, parse_selection
 from .shells import misoriented_shells
 from .soup import Soup, Workaround, mesh_of
 from .surface_point import SurfacePoint, nearest_on_triangles
@@ -52,6 +54,7 @@ __all__ = [
     "Kind",
     "Mesh",
     "MeshReport",
+    "Role",
     "Soup",
     "SurfacePoint",
     "Workaround",
@@ -80,6 +83,7 @@ __all__ = [
     "new_crossings",
     "next_half_edge",
     "normals",
+    "parse_selection",
     "ragged_arange",
     "repeats_vertex",
     "require_mesh",

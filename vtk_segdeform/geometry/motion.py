@@ -1,12 +1,12 @@
-"""Motions of handles as options: ``--rotate z,60 --translate 0,0,1``.
+"""Motions of handles as texts: rotate "z,60", translate "0,0,1".
 
 A motion is a (4, 4) matrix M that maps rest positions x to targets, in homogeneous coordinates.
-The order of its parts is fixed, independent of the order of the options:
+The order of its parts is fixed, independent of the order in which they are given:
 
     M = T(translation) T(pivot) R(axis, angle) T(-pivot) M_file
 
 that is, a matrix from a file first, then a rotation about the pivot, then a translation.
-Angles are in degrees in the options, and in radians everywhere else.
+Angles are in degrees in the texts, and in radians everywhere else.
 
 M does not tell how many turns the rotation has, and the solver turns a handle the shorter way.  So
 where a rotation has half a turn or more, or follows a matrix, the handles go through targets on the
@@ -16,14 +16,14 @@ way, in which the shares s = 1/n, 2/n, ... of their rotations and translations a
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from ..arrays import FloatArray, as_points
+from ..arrays import FloatArray, IntArray, as_points
 from ..errors import ConstraintError
 from ..files import open_regular
 
@@ -75,14 +75,57 @@ def parse_rotation(text: str) -> tuple[FloatArray, float]:
     return axis / length, math.radians(numbers[0])
 
 
-def legs(angles: Sequence[float]) -> int:
+def total_legs(angles: Sequence[float]) -> int:
     """Return the number of equal legs of rotations by *angles*, each the shorter way.
 
-    >>> legs([1.0, 3.1]), legs([-math.pi]), legs([1.0, 1.5 * math.pi]), legs([])
-    (1, 2, 3, 1)
+    >>> [total_legs(each) for each in ([1.0, 3.1], [-math.pi], [1.0, 1.5 * math.pi], [])]
+    [1, 2, 3, 1]
     """
     largest = max(map(abs, angles), default=0.0)
     return math.ceil(largest / _LEG - 1e-9) if largest > math.pi * (1.0 - 1e-9) else 1
+
+
+def moved_handles(
+    handles: Sequence[Mapping[str, str]],
+    select: Callable[[str], IntArray],
+    vertices: FloatArray,
+    fixed: IntArray,
+) -> tuple[IntArray, list[FloatArray]]:
+    """Return the vertices (k,) of all handles, and their targets (k, 3): on the way, and last.
+
+    Parameters
+    ----------
+    handles : sequence of mappings of str to str
+        Each has a selection under "select", and at least one of "matrix" (a file), "rotate" and
+        "translate".  The "pivot" is a point, or the centre of "fixed" or of the "handle".
+    select : callable
+        Returns the vertices (k,) of a selection.
+    vertices : (n, 3) float
+        The mesh at rest.
+    fixed : (f,) int
+        Vertices whose centre is the pivot "fixed"; without any it is that of the mesh.
+
+    Raises
+    ------
+    ConstraintError
+        If a handle has no motion, two handles share a vertex, or a text is invalid.
+    """
+    for handle in handles:
+        if not {"matrix", "rotate", "translate"} & handle.keys():
+            raise ConstraintError(
+                f"handle {handle['select']!r} does not move; add a translation, a rotation or a "
+                "matrix to it"
+            )
+    ids = [select(handle["select"]) for handle in handles]
+    together = np.concatenate([np.zeros(0, dtype=np.int64), *ids])
+    if len(np.unique(together)) < len(together):
+        raise ConstraintError("two handles share vertices; each vertex can be in only one handle")
+    centre = vertices[fixed if len(fixed) else slice(None)].mean(axis=0)
+    pairs = [(vertices[own], handle) for own, handle in zip(ids, handles, strict=True)]
+    return together, [
+        np.concatenate([np.empty((0, 3)), *(_moved(*pair, centre, share) for pair in pairs)])
+        for share in _shares(handles)
+    ]
 
 
 def read_matrix(path: str | Path) -> FloatArray:
@@ -146,3 +189,31 @@ def _numbers(text: str, name: str, form: str) -> FloatArray:
     if not np.isfinite(numbers).all():
         raise ConstraintError(f"{name} must be finite; got {text!r}")
     return numbers
+
+
+def _shares(handles: Sequence[Mapping[str, str]]) -> list[float]:
+    """Return the shares of the rotations at which the handles stop on the way; the last is 1."""
+    turned = [handle for handle in handles if "rotate" in handle]
+    count = total_legs([parse_rotation(handle["rotate"])[1] for handle in turned])
+    begins = [0.0] if any("matrix" in handle for handle in turned) else []
+    return [*begins, *((k + 1) / count for k in range(count))]
+
+
+def _moved(
+    points: FloatArray, handle: Mapping[str, str], fixed_centre: FloatArray, share: float = 1.0
+) -> FloatArray:
+    """Apply the matrix, and a *share* of the rotation and of the translation, in this order.
+
+    *fixed_centre* (3,) is the mean of the fixed vertices.
+    """
+    if "matrix" in handle:
+        points = transform(points, read_matrix(handle["matrix"]))
+    if "rotate" in handle:
+        axis, angle = parse_rotation(handle["rotate"])
+        pivot = handle.get("pivot", "handle")
+        centres = {"handle": points.mean(axis=0), "fixed": fixed_centre}
+        centre = centres[pivot] if pivot in centres else parse_vector(pivot, "pivot")
+        points = transform(points, rotation(axis, share * angle, centre))
+    if "translate" in handle:
+        points = points + share * parse_vector(handle["translate"], "translate")
+    return points

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from solids import rotation as turn
 from solids import somewhere
 
-from vtk_segdeform.cli import motion
 from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.geometry import motion
 
 
 @pytest.mark.parametrize("axis", [[1.0, 0, 0], [0, 0, -3.0], [1.0, 2.0, 3.0]])

@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_array_equal
 from solids import icosphere, rotation
 
-from vtk_segdeform.cli.selection import parse_selection
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.mesh.mesh import Mesh
+from vtk_segdeform.mesh.selection import parse_selection
 
 
 @pytest.fixture(scope="module")

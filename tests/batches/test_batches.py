@@ -1,0 +1,400 @@
+"""Batches: the same bytes whatever the workers, and nothing lost or repeated by a kill."""
+
+from __future__ import annotations
+
+import csv
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import vtk_segdeform as sd
+from vtk_segdeform.batches.run import _AHEAD
+from vtk_segdeform.batches.store import Writer
+from vtk_segdeform.batches.tasks import deformer_of, packed, unpacked
+from vtk_segdeform.cages import suggested_size
+from vtk_segdeform.errors import ArgumentError, ConstraintError, SegDeformError
+from vtk_segdeform.models import random_limbs
+
+BEND = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
+RANDOM = {"random": 4, "seed": 7, "degrees": 40.0}
+
+
+class Here(Executor):
+    """Computes each task at once; *fails* tells which poses raise an error."""
+
+    def __init__(self, fails=lambda pose: False):
+        self.tasks, self._fails = [], fails
+
+    def submit(self, fn, /, data, poses, settings):
+        self.tasks.append(len(poses))
+        future = Future()
+        if any(map(self._fails, poses)):
+            future.set_exception(OSError("no luck"))
+        else:
+            future.set_result(fn(data, poses, settings))
+        return future
+
+
+@pytest.fixture(scope="module")
+def meshes():
+    return [random_limbs(600, 1), random_limbs(700, 2)]
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path / "cache"))
+    deformer_of.cache_clear()
+
+
+def poses_of(store):
+    """Return the cage vertices by mesh and pose."""
+    table = store.table()
+    names = zip(table["mesh"], table["pose"], strict=True)
+    return {name: np.concatenate(store.cage_vertices(k)) for k, name in enumerate(names)}
+
+
+@pytest.fixture(scope="module")
+def plan(meshes):
+    return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2}
+
+
+@pytest.fixture(scope="module")
+def reference(plan, tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("reference")
+        patch.setenv("SEGDEFORM_CACHE", str(folder / "cache"))
+        return sd.batch(plan, folder, executor=Here())
+
+
+def test_the_bytes_are_the_same_on_one_and_two_processes_and_here(plan, reference, tmp_path):
+    assert set(reference.table()["status"]) == {"converged"}
+    for count in (1, 2):
+        store = sd.batch(plan, tmp_path / str(count), n_workers=count)
+        assert store.digest() == reference.digest()
+
+
+def test_poses_start_from_rest_so_their_order_makes_no_difference(meshes, tmp_path):
+    other = {**BEND, "handles": [{"select": "z>90%", "rotate": "y,-30"}]}
+    poses, found = [BEND, other, RANDOM], []
+    for name in ("forward", "backward"):
+        plan = {"meshes": meshes[:1], "poses": poses}
+        store = sd.batch(plan, tmp_path / name, executor=Here())
+        found.append({np.concatenate(store.cage_vertices(k)).tobytes() for k in range(6)})
+        poses = poses[::-1]
+    assert len(found[0]) == 6
+    assert found[0] == found[1]
+
+
+def test_a_pose_is_that_of_a_deformer_at_rest(meshes, tmp_path):
+    mesh = meshes[0]
+    x = mesh.vertices
+    tip = np.flatnonzero(x[:, 2] > 0.9 * np.ptp(x[:, 2]) + x[:, 2].min())
+    foot = np.flatnonzero(x[:, 2] < 0.1 * np.ptp(x[:, 2]) + x[:, 2].min())
+    plan = {
+        "meshes": [mesh],
+        "poses": [
+            {"fixed": "z<10%", "handles": [{"select": "z>90%", "translate": "0.1,0,0"}]},
+            {"fixed": foot, "handle": tip, "targets": x[tip] + [0.1, 0.0, 0.0]},
+            {"vertex": int(tip[0]), "to": x[tip[0]] + [0.1, 0.0, 0.0], "pins": foot},
+            {"fixed": foot, "volumes": {"whole": "+10%"}},
+        ],
+    }  # fmt: skip
+    store = sd.batch(plan, tmp_path / "out", executor=Here())
+    poses = [store.vertices(k) for k in range(4)]
+    regions = sd.segment(mesh)
+    cages = sd.fit_cages(mesh, regions, suggested_size(regions))
+    deformer = sd.Deformer(mesh, regions, cages, fixed=foot, handle=tip)
+    expected = deformer.solve(x[tip] + [0.1, 0.0, 0.0])
+    for pose in poses[:2]:
+        np.testing.assert_allclose(pose, expected.vertices, atol=1e-12)
+    pulled = sd.pull(mesh, int(tip[0]), x[tip[0]] + [0.1, 0.0, 0.0], pins=foot)
+    np.testing.assert_allclose(poses[2], pulled.vertices, atol=1e-12)
+    changes = [deformer.volume("whole", pose)[1] for pose in poses]
+    np.testing.assert_allclose(changes, [0.0, 0.0, 0.0, 0.1], atol=1e-12)
+    np.testing.assert_allclose(store.table()["volume_change"], changes, atol=1e-13)
+
+
+def test_a_refined_pose_is_stored_with_all_its_vertices(meshes, tmp_path):
+    plan = {"meshes": meshes[:1], "poses": [BEND]}
+    cages = sd.batch(plan, tmp_path / "cages", executor=Here())
+    before = cages.vertices(0)
+    store = sd.batch({**plan, "refine": True}, tmp_path / "cages", executor=Here())
+    x = store.vertices(0)
+    assert np.abs(x - before).max() > 1e-6
+    assert store.cage_vertices(0) == ()
+    store.write_mesh(0, tmp_path / "pose.ply")
+    written = sd.read_mesh(tmp_path / "pose.ply")
+    np.testing.assert_allclose(written.vertices, x, atol=1e-12)
+
+
+def test_a_batch_continues_with_what_is_missing(plan, reference, tmp_path):
+    def stop(fraction, text):
+        if fraction > 0.3:
+            raise sd.Cancelled("enough")
+
+    first, second, third = Here(), Here(), Here()
+    with pytest.raises(sd.Cancelled, match="enough"):
+        sd.batch(plan, tmp_path / "out", executor=first, n_workers=1, progress=stop)
+    done = sum(first.tasks)
+    assert 0 < done < 10
+    store = sd.batch(plan, tmp_path / "out", executor=second)
+    assert sum(second.tasks) == 10 - done
+    assert store.digest() == reference.digest()
+    more = {**plan, "poses": [*plan["poses"], {**RANDOM, "random": 1, "seed": 8}]}
+    store = sd.batch(more, tmp_path / "out", executor=third)
+    assert sum(third.tasks) == 2
+    assert len(store) == 12
+    assert len(sd.batch(plan, tmp_path / "out", executor=Here())) == 10
+
+
+def test_a_poisonous_pose_is_set_aside_after_two_tries(plan, tmp_path):
+    tries = []
+
+    def fails(pose):
+        is_poison = pose.get("number") == 2
+        tries.append(is_poison)
+        return is_poison
+
+    store = sd.batch(plan, tmp_path / "out", executor=Here(fails))
+    table = store.table()
+    bad = [k for k, status in enumerate(table["status"]) if status == "set aside"]
+    assert [table["pose"][k] for k in bad] == ["random 2", "random 2"]
+    assert table["message"][bad[0]] == "tried 2 times: OSError: no luck"
+    assert sum(tries) == 4
+    assert table["status"].count("converged") == 8
+    with pytest.raises(ArgumentError, match=f"number {bad[0]} .* set aside"):
+        store.vertices(bad[0])
+    again, retried = Here(), Here()
+    sd.batch(plan, tmp_path / "out", executor=again)
+    assert again.tasks == []
+    store = sd.batch(plan, tmp_path / "out", executor=retried, retry=True)
+    assert sum(retried.tasks) == 2
+    assert set(store.table()["status"]) == {"converged"}
+
+
+def test_a_bad_mesh_or_selection_does_not_stop_the_others(meshes, tmp_path):
+    path = tmp_path / "bad.ply"
+    path.write_bytes(b"no mesh")
+    nothing = {"fixed": "z<-9", "handles": BEND["handles"]}
+    plan = {"meshes": [path, meshes[0]], "poses": [BEND, nothing]}
+    table = sd.batch(plan, tmp_path / "out", executor=Here()).table()
+    assert table["status"] == ["failed", "failed", "converged", "failed"]
+    assert "bad.ply" in table["message"][0]
+    assert "selects none" in table["message"][3]
+
+
+def test_a_task_that_takes_too_long_ends_its_process_and_is_set_aside(meshes, tmp_path):
+    plan = {"meshes": meshes[:1], "poses": [BEND], "seconds": 0.01}
+    table = sd.batch(plan, tmp_path / "out", n_workers=1).table()
+    assert table["status"] == ["set aside"]
+    assert "process died" in table["message"][0]
+
+
+def test_a_pose_that_takes_too_long_is_stopped(meshes, tmp_path):
+    plan = {"meshes": meshes[:1], "poses": [BEND, RANDOM], "seconds": 1e-9}
+    table = sd.batch(plan, tmp_path / "out", executor=Here()).table()
+    assert set(table["status"]) == {"too long"}
+
+
+def test_a_killed_process_costs_no_pose(plan, reference, tmp_path):
+    killed = []
+
+    def kill(fraction, text):
+        if fraction > 0.1 and not killed:
+            killed.append(multiprocessing.active_children()[0])
+            killed[0].kill()
+
+    store = sd.batch(plan, tmp_path / "out", n_workers=2, progress=kill)
+    assert killed
+    assert store.digest() == reference.digest()
+
+
+PROGRAM = """
+import sys
+import vtk_segdeform as sd
+from vtk_segdeform.models import random_limbs
+
+def tell(fraction, text):
+    print(f"{fraction:.3f}", flush=True)
+
+if __name__ == "__main__":
+    random = {"random": 4, "seed": 7, "degrees": 40.0}
+    bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
+    meshes = [random_limbs(600, 1), random_limbs(700, 2)]
+    plan = {"meshes": meshes, "poses": [bend, random], "block": 2}
+    sd.batch(plan, sys.argv[1], n_workers=2, progress=tell)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals")
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.campaign)]
+)
+def test_a_killed_client_continues(number, plan, reference, tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    command = [sys.executable, str(program), str(tmp_path / "out")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
+    with subprocess.Popen(command, **pipes) as client:
+        for line in client.stdout:
+            if float(line) > 0.1:
+                if number == signal.SIGINT:  # as a terminal sends it, to all processes
+                    os.killpg(client.pid, number)
+                else:
+                    client.kill()
+                break
+        _, errors = client.communicate(timeout=60)
+    assert errors.count(b"Traceback") == (number == signal.SIGINT), errors.decode()
+    assert client.returncode != 0
+    left = Here()
+    store = sd.batch(plan, tmp_path / "out", executor=left)
+    assert 0 < sum(left.tasks) < 10
+    assert store.digest() == reference.digest()
+
+
+def test_a_killed_worker_of_a_cluster_costs_no_pose(plan, reference, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    log = []
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+
+        def kill(fraction, text):
+            if fraction > 0.1 and not log:
+                log.append(next(each.pid for each in cluster.workers.values()))
+                os.kill(log[0], signal.SIGKILL)
+            log.append(text)
+
+        executor = client.get_executor()
+        store = sd.batch(plan, tmp_path / "out", executor=executor, n_workers=2, progress=kill)
+    print("\n".join(map(str, log)))
+    assert log[-1] == "10 of 10 poses"
+    assert store.digest() == reference.digest()
+
+
+def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
+    class Slow(Here):
+        waiting = most = 0
+
+        def submit(self, fn, /, *task):
+            future = Future()
+            type(self).waiting += 1
+            type(self).most = max(self.most, self.waiting)
+
+            def work():
+                time.sleep(0.05)
+                type(self).waiting -= 1
+                future.set_result(fn(*task))
+
+            threading.Thread(target=work).start()
+            return future
+
+    sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), n_workers=1)
+    assert Slow.most == _AHEAD
+
+
+def test_what_is_under_way_is_stored_when_the_batch_is_cancelled(plan, tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+
+        class Threads(Here):
+            def submit(self, fn, /, *task):
+                self.tasks.append(len(task[1]))
+                return pool.submit(fn, *task)
+
+        def stop(fraction, text):
+            if fraction > 0.0:
+                raise sd.Cancelled("enough")
+
+        first, left = Threads(), Here()
+        with pytest.raises(sd.Cancelled):
+            sd.batch(plan, tmp_path, executor=first, n_workers=2, progress=stop)
+    sd.batch(plan, tmp_path, executor=left)
+    assert sum(first.tasks) > 2
+    assert sum(left.tasks) == 10 - sum(first.tasks)
+
+
+def test_one_batch_at_a_time_writes_a_store(plan, tmp_path):
+    writer = Writer(tmp_path)
+    writer.name([(0, "a", "b", "c", "d")])
+    with pytest.raises(ArgumentError, match="written by another"):
+        sd.batch(plan, tmp_path, executor=Here())
+    writer.close()
+    (tmp_path / "poses.segposes").write_bytes(b"no poses" * 100)
+    for call in (lambda: sd.PoseStore(tmp_path), lambda: sd.batch(plan, tmp_path, executor=Here())):
+        with pytest.raises(ArgumentError, match=r"poses\.segposes"):
+            call()
+    with pytest.raises(ArgumentError, match="no file"):
+        sd.PoseStore(tmp_path / "elsewhere")
+
+
+def test_the_table_is_written_with_and_without_pyarrow(reference, monkeypatch):
+    columns = reference.table()
+    assert columns["number"] == list(range(10))
+    assert max(map(abs, columns["volume_change"])) < 1e-12
+    assert columns["crossings"] == columns["folds"] == [0] * 10
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    path = reference.write_table()
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["pose"] for row in rows] == columns["pose"]
+    assert [float(row["seconds"]) for row in rows] == columns["seconds"]
+    monkeypatch.undo()
+    pyarrow = pytest.importorskip("pyarrow.parquet")
+    table = pyarrow.read_table(reference.write_table())
+    assert table.to_pydict() == columns
+
+
+def test_a_packed_mesh_is_the_same_to_the_bit(meshes):
+    mesh = meshes[0]
+    regions = sd.segment(mesh)
+    cages = sd.fit_cages(mesh, regions)
+    again, same, boxes = unpacked(packed(mesh, regions, cages))
+    assert same is not None
+    for a, b in [(again.vertices, mesh.vertices), (again.faces, mesh.faces)]:
+        assert a.tobytes() == b.tobytes()
+    assert same.weights.tobytes() == regions.weights.tobytes()
+    assert [b.vertices.tobytes() for b in boxes] == [c.vertices.tobytes() for c in cages]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"meshes": []}, "at least one mesh"),
+        ({"meshes": ["nothing*.ply"]}, "none called"),
+        ({"poses": [{}]}, "must have handles"),
+        ({"poses": [{"handel": [1]}]}, "handel"),
+        ({"poses": [{"handle": [1]}]}, "'targets' together"),
+        ({"poses": [{"vertex": 1}]}, "'to' together"),
+        ({"poses": [{"random": 0}]}, "1 to 1,000,000 random"),
+        ({"poses": [{"handles": [{"rotate": "y,3"}]}]}, "must have 'select'"),
+        ({"seconds": 0.0}, "seconds"),
+        ({"block": 0}, "block"),
+        ({"memory": "much"}, "memory"),
+        ({"pose": []}, "it may have"),
+    ],
+)
+def test_a_bad_plan_is_refused_before_anything_is_computed(plan, change, text, tmp_path):
+    with pytest.raises((ArgumentError, ConstraintError), match=text):
+        sd.batch({**plan, **change}, tmp_path / "out", executor=Here())
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bad_plan_file_names_itself(tmp_path):
+    path = tmp_path / "plan.json"
+    for text in ("{", "[]"):
+        path.write_text(text)
+        with pytest.raises(SegDeformError, match=r"plan\.json"):
+            sd.batch(path, tmp_path / "out")
+    assert not Path(tmp_path / "out").exists()
