@@ -48,11 +48,16 @@ HELD = {
 }
 
 
-@pytest.mark.parametrize("name", HELD)
-def test_remainders_are_of_second_order(name, rng):
+def held(name: str) -> tuple[sd.Deformer, dict]:
+    """Return a deformer of `HELD`, and its options."""
     n_vertices, n_regions, options = HELD[name]
     base = bound(n_vertices, n_regions)
-    deformer = base.hold(fixed=base.fixed, handle=base.handle, **options)
+    return base.hold(fixed=base.fixed, handle=base.handle, **options), options
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_remainders_are_of_second_order(name, rng):
+    deformer, _ = held(name)
     targets, solution = bent(deformer)
     tangent = rng.normal(size=3) + 0.05 * rng.normal(size=targets.shape)
     tangent *= deformer.mesh.diagonal
@@ -67,9 +72,7 @@ def test_remainders_are_of_second_order(name, rng):
 
 @pytest.mark.parametrize("name", HELD)
 def test_vjp_is_the_adjoint_of_jvp(name, rng):
-    n_vertices, n_regions, options = HELD[name]
-    base = bound(n_vertices, n_regions)
-    deformer = base.hold(fixed=base.fixed, handle=base.handle, **options)
+    deformer, options = held(name)
     targets, solution = bent(deformer)
     tangent, cotangent = rng.normal(size=targets.shape), rng.normal(size=solution.vertices.shape)
     goals = [name for name, goal in options.get("volumes", {}).items() if "at" not in goal]

@@ -147,7 +147,7 @@ def batch(
 
 
 def _run_here(run: _Run, count: int, settings: Settings) -> None:
-    """Run all tasks in *count* processes, which are started anew when one of them has died."""
+    """Run all tasks in *count* processes, and restart these after one of them has died."""
     tries, most = 0, _AHEAD * count
     while run.is_left():
         wait_until_compiled()
