@@ -77,7 +77,7 @@ def batch(
     Parameters
     ----------
     plan : mapping, or path of a JSON file
-        ``meshes``: paths, patterns such as "limbs/*.ply", or whatever ``sd.deform`` takes.
+        ``meshes``: paths, patterns such as ``limbs/*.ply``, or whatever ``sd.deform`` takes.
         ``poses``: each a mapping of one of these kinds:
 
         - ``fixed``, and ``handles``, each with a selection under ``select`` and ``rotate``,
