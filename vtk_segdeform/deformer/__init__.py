@@ -33,6 +33,7 @@ from .arguments import (
     SPREAD,
     automatic_locality,
     checked_constraints,
+    checked_limb,
     checked_locality,
     checked_place,
     checked_point,
@@ -49,6 +50,7 @@ from .deformer import Deformer
 from .derivatives import Gradient
 from .enclosed_volume import changing_components
 from .finishing import on_volumes
+from .locality import Limb
 from .problem import Problem
 from .pull import pull
 from .slides import Slide, checked_slides
@@ -65,6 +67,7 @@ __all__ = [
     "Deformer",
     "Goals",
     "Gradient",
+    "Limb",
     "Mirror",
     "PaperDeformer",
     "PaperSolution",
@@ -77,6 +80,7 @@ __all__ = [
     "changing_components",
     "checked_constraints",
     "checked_goals",
+    "checked_limb",
     "checked_locality",
     "checked_place",
     "checked_point",

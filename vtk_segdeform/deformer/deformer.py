@@ -54,6 +54,7 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_limb,
     checked_locality,
     checked_parts,
     checked_place,
@@ -68,6 +69,7 @@ from .derivatives import Gradient, Linearised
 from .enclosed_volume import EnclosedVolume
 from .finishing import VOLUME_MET, finish_of
 from .local import near_point
+from .locality import Limb, Reach
 from .path import Path, Pose
 from .problem import Problem
 from .slides import Slide, checked_slides
@@ -300,7 +302,13 @@ class Deformer:
 
     @one_blas_thread()
     def local(
-        self, vertex: int | SurfacePoint, reach: float, spread: float, *, follows: float = 0.0
+        self,
+        vertex: int | SurfacePoint,
+        reach: float,
+        spread: float,
+        *,
+        follows: float = 0.0,
+        depth: float = 0.0,
     ) -> Deformer:
         """Return a deformer in the same pose that deforms the surface near *vertex* only.
 
@@ -327,6 +335,9 @@ class Deformer:
         follows : float
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
+        depth : float
+            Of the joint of the limb that is pulled, see `limbs`: it is free, and the reach begins
+            at its joint.  0: it begins at the point.
         """
         point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
@@ -336,36 +347,56 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
+        if not is_number(depth, 0.0):
+            raise ConstraintError(f"depth must be 0 or a positive number; got {shown(depth)}")
         path = self._path
         if not path.is_solved:
             path = path.copy()
             path.solve(path.targets, self._limits)
-        near = near_point(
-            path, point, reach=float(reach), spread=float(spread), follows=float(follows)
-        )
+        lengths = {"reach": float(reach), "spread": float(spread), "depth": float(depth)}
+        near = near_point(path, point, follows=float(follows), **lengths)
         other = self._shared()
         other._path = Path.begin(near, path.p, path.targets)
         return other
 
+    def limbs(self, vertex: int | SurfacePoint) -> tuple[Limb, ...]:
+        """Return the limbs on which *vertex*, or another point, is: finger, hand, arm.
+
+        Each ends where the surface widens into a larger part of the body; see `locality`.
+        """
+        samples, size = self._problem.samples, self._problem.frame.size
+        return tuple(
+            Limb(size * each.depth, size * each.length, samples.smooth_at_vertices(each.share))
+            for each in samples.limbs(checked_place(self.mesh, vertex))
+        )
+
     def reach_of_pull(
-        self, vertex: int | SurfacePoint, radius: float, locality: float
-    ) -> tuple[float, float]:
-        """Return *reach* and *follows* of `local` for a pull of *vertex*, or another point.
+        self, vertex: int | SurfacePoint, radius: float, locality: float, limb: int | None = None
+    ) -> Reach:
+        """Return *reach*, *follows* and *depth* of `local` for a pull of *vertex*, or a point.
 
         The reach is ``radius / sqrt(locality)``, with a *locality* from 0 to 1.  From the default
-        locality on it ends with the limb of the point if that is shorter; limbs within the spread
-        do not count.
+        locality on it is the smallest limb of the point that is longer than the spread, if its
+        joint is within that reach.  *limb* is the number of another one of `limbs`; what is larger
+        than the last of them is all of the surface.
         """
         point = checked_place(self.mesh, vertex)
         radius, share = checked_radius(self.mesh, radius), checked_locality(locality) or 0.0
-        if not share:
-            return math.inf, 1.0
-        reach = radius / math.sqrt(share)
-        if share >= LOCALITY:
-            size = self._problem.frame.size
-            limb = self._problem.samples.limb(point, SPREAD * radius / size, reach / size)
-            reach = size * limb
-        return reach, 1.0 - share
+        reach = radius / math.sqrt(share) if share else math.inf
+        size, found = self._problem.frame.size, self._problem.samples.limbs(point)
+        if checked_limb(limb) is not None and found:
+            if limb >= len(found):
+                return Reach(math.inf, 1.0, 0.0)
+            found, share = found[limb : limb + 1], share or LOCALITY
+        elif share >= LOCALITY:
+            least = SPREAD * radius / size
+            found = tuple(each for each in found if each.length >= least)[:1]
+            found = tuple(each for each in found if size * each.depth <= reach)
+        else:
+            found = ()
+        if found:
+            return Reach(size * found[0].length, 1.0 - share, size * found[0].depth)
+        return Reach(reach, 1.0 - share, 0.0)
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""

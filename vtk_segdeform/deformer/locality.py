@@ -10,10 +10,20 @@ Where this is compensated depends on the ratios of the weights.  With equal weig
 reach, a thousand times the weight moves the far surface as much; weights that grow with the
 distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
-The reach of a pull ends where the limb does that is grabbed: who turns a head does not mean the
-shoulders.  The points at a distance d from the grabbed one lie on a front.  Its length is constant
-along a limb and at most proportional to d on a flat or rounded surface around the point.  Where a
-limb ends in a body it grows faster: it doubles until 1.5 d, or more.
+The reach of a pull ends with the limb that is grabbed: a head is turned without the shoulders.
+With the distance f from q, the point farthest from the grabbed one p, the limbs of p are the sets
+
+    C(t) = the connected part of {f > t} with p in it,    t < f(p)
+
+which are the same for the crown and the chin of a head.  The border of C(t) is a front across the
+limb.  With the extent L = max_C(t) f - t, its length is constant along a limb and at most
+proportional to L on a flat or rounded surface.  Where a limb ends in a body it grows faster.  Among
+the fronts that grow by a factor of 1.75 until 1.5 L, the joint is the last one that is about as
+narrow, relative to L, as the narrowest.  All of the limb is free, L is the reach, and d is L + the
+distance from the limb.
+
+A limb may have branches, such as fingers, which C(t) gains as a whole.  With the largest minimum of
+f along a path from p to x, which is that along the maximum spanning tree, C(t) = {x: m(x) > t}.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
@@ -50,21 +60,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import faces_between, joints
 from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
-_RATIO, _WIDTH, _AHEAD = 1.06, 5, 7  # of distances; steps across a front, and to the next one
-_END = 4  # steps from the inner edge of a front to the end of a limb, if the next is the longest
-_WIDENS = 2.0  # growth from one to the other where a limb ends; 1.5 on a disc
+_WIDENS, _AHEAD = 1.75, 0.5  # growth of a front until 1.5 L where a limb ends; 1.5 on a disc
+_NARROW = 1.25  # times the narrowest front
+_STEP, _ACROSS = 0.5, 2.0  # mean edges: between fronts, and the width of one
+_FADES = 0.25  # of the length of a limb, beyond its joint
 _FEWEST = 4  # points of a ring, its own included
 _SHORTEST = 1e-12  # reach; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
@@ -108,6 +120,43 @@ class Ring:
         offsets = combinations @ x[vertices]
         weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
         return cls(vertices, combinations, offsets, weights, edge)
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """A part of the surface that bends at a joint, on which a point is grabbed.
+
+    Lengths are in the mesh's unit, along the surface at rest.
+    """
+
+    depth: float
+    """From the grabbed point to the joint."""
+    length: float
+    """From the joint to the tip of the limb."""
+    share: FloatArray
+    """1 on the limb, falling to 0 beyond its joint: of each vertex, (n,)."""
+
+    def axis(self, mesh: Mesh, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the centre of the joint and the direction of the limb, (3,) each.
+
+        Of *mesh* in the pose *x* (n, 3); the direction has length 1 and leads away from the body.
+        """
+        joint, limb = (
+            weights @ x / weights.sum()
+            for weights in (
+                mesh.vertex_areas * self.share * (1.0 - self.share),
+                mesh.vertex_areas * self.share,
+            )
+        )
+        return joint, (limb - joint) / max(float(np.linalg.norm(limb - joint)), _SHORTEST)
+
+
+class Reach(NamedTuple):
+    """How far the surface around a grabbed point is free; see `Deformer.local`."""
+
+    reach: float
+    follows: float
+    depth: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,37 +293,74 @@ class SurfaceSamples:
             found += np.linalg.norm(x[corners] - point.at(x), axis=1)[:, None]
         return np.asarray(found.min(axis=0), dtype=np.float64)
 
-    def limb(self, point: SurfacePoint, least: float, most: float) -> float:
-        """Return how far the limb of *point* extends; *most* if it is longer, or there is none.
+    def limbs(self, point: SurfacePoint) -> tuple[Limb, ...]:
+        """Return the limbs on which *point* is, the smallest first, with shares of samples (s,)."""
+        inner, f, start = self._towards_the_body(point)
+        faces = self.faces[np.isfinite(inner[self.faces[:, 0]])]
+        level, a, b, c = f[faces], *self.points[faces.T]
+        low, high = level.min(axis=1), level.max(axis=1)
+        top = faces[np.arange(len(faces)), level.argmax(axis=1)]
+        ends = np.maximum(np.minimum(high, inner[top]), low)
+        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        edge = float(self.edges.data.mean()) if self.edges.nnz else _SHORTEST
+        levels = np.arange(start - 0.5 * _ACROSS * edge, edge, -_STEP * edge)
+        fronts = _lengths(levels, low, ends, areas / np.maximum(high - low, _SHORTEST), edge)
+        order = np.argsort(-inner)
+        count = np.searchsorted(-inner[order], -levels)
+        extents = np.maximum.accumulate(f[order])[np.maximum(count - 1, 0)] - levels
+        ahead = levels >= (levels - _AHEAD * extents)[:, None]
+        widest = np.where(np.triu(ahead), fronts, 0.0).max(axis=1, initial=0.0)
+        fast, found = widest > _WIDENS * fronts, []
+        for first in np.flatnonzero(fast & ~np.insert(fast[:-1], 0, False)):
+            last = first + int(np.append(~fast[first:], True).argmax())
+            widths = fronts[first:last] / extents[first:last]
+            k = first + int(np.flatnonzero(widths <= _NARROW * widths.min())[-1])
+            beyond = self._beyond(inner > levels[k])
+            share = np.clip(1.0 - beyond / (_FADES * extents[k]), 0.0, 1.0)
+            found.append(Limb(float(start - levels[k]), float(extents[k]), share))
+        return tuple(found)
 
-        Limbs shorter than *least* do not count, nor do other components.
-        """
-        count = math.ceil(math.log(most / least, _RATIO)) + _WIDTH + _AHEAD
-        radii = least * _RATIO ** (np.arange(count) - _END)
-        of_face = self._component[self.faces[:, 0]]
-        faces = self.faces[of_face == self._component[self.cells[point.vertex]]]
-        nearest, _, farthest = np.sort(self.distances(point)[faces], axis=1).T
-        a, b, c = self.points[faces.T]
-        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        widths = np.maximum(farthest - nearest, _SHORTEST)
-        within = np.array([np.clip((d - nearest) / widths, 0.0, 1.0) @ areas for d in radii])
-        fronts = (within[_WIDTH:] - within[:-_WIDTH]) / (radii[_WIDTH:] - radii[:-_WIDTH])
-        growth = fronts[_AHEAD:] / np.maximum(fronts[:-_AHEAD], _SHORTEST)
-        fast = np.append(growth > _WIDENS, False)
-        if not fast.any():
-            return most
-        first = int(fast.argmax())
-        last = first + int((~fast[first:]).argmax())
-        return min(float(radii[first + growth[first:last].argmax() + _END]), most)
+    def _towards_the_body(self, point: SurfacePoint) -> tuple[FloatArray, FloatArray, float]:
+        """Return m and f of the samples, (s,) each, and f of *point*; m is -inf elsewhere."""
+        graph, p = self._joined, int(self.cells[point.vertex])
+        away = csgraph.dijkstra(graph, directed=False, indices=p)
+        q = int(np.where(np.isfinite(away), away, -1.0).argmax())
+        f = np.asarray(csgraph.dijkstra(graph, directed=False, indices=q))
+        i, j = graph.nonzero()
+        lower = np.minimum(f[i], f[j])
+        costs = np.where(np.isfinite(lower), 2.0 * away[q] + 1.0 - lower, 0.0)
+        tree = csgraph.minimum_spanning_tree(sparse.csr_array((costs, (i, j)), graph.shape))
+        order, before = csgraph.breadth_first_order(tree, p, directed=False)
+        inner = np.full(len(f), -np.inf).tolist()
+        inner[p] = f[p]
+        for x, last in zip(order[1:].tolist(), before[order[1:]].tolist(), strict=True):
+            inner[x] = min(inner[last], f[x])
+        return np.array(inner), f, float(f[p])
 
-    def weights(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
+    def _beyond(self, inside: BoolArray) -> FloatArray:
+        """Return the distance of each sample from those *inside*, (s,)."""
+        found = csgraph.dijkstra(
+            self._joined, directed=False, indices=np.flatnonzero(inside), min_only=True
+        )
+        return np.asarray(found, dtype=np.float64)
+
+    def weights(
+        self, points: Sequence[SurfacePoint], reach: float, follows: float, depth: float = 0.0
+    ) -> FloatArray:
         """Return w_s / a_s for kappa = 1, (s,), around several *points*.
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
+        With the *depth* of a joint, the limbs of the points are free, and the reach begins there.
         """
         if np.isinf(reach):
             return np.zeros(len(self.points))
-        away = np.min([self.distances(each) for each in points], axis=0) / max(reach, _SHORTEST)
+        if depth:
+            found = [self._towards_the_body(each) for each in points]
+            limbs = np.any([inner > start - depth for inner, _, start in found], axis=0)
+            away = 1.0 + self._beyond(limbs) / max(reach, _SHORTEST)
+        else:
+            away = np.min([self.distances(each) for each in points], axis=0)
+            away /= max(reach, _SHORTEST)
         nearer = np.clip(away, 1.0, 1e2)
         weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
@@ -284,9 +370,11 @@ class SurfaceSamples:
             weights[far[(size < follows * size.max())[part]]] = 0.0
         return np.asarray(weights)
 
-    def quadratic(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
+    def quadratic(
+        self, points: Sequence[SurfacePoint], reach: float, follows: float, depth: float = 0.0
+    ) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
-        weights = self.areas * self.weights(points, reach, follows)
+        weights = self.areas * self.weights(points, reach, follows, depth)
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)
@@ -302,3 +390,20 @@ class SurfaceSamples:
         for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
+
+
+def _lengths(
+    levels: FloatArray, low: FloatArray, ends: FloatArray, rates: FloatArray, edge: float
+) -> FloatArray:
+    """Return the lengths of fronts at *levels* (k,): areas of strips, over their width.
+
+    A face has fronts from *low* to *ends* with its *rates*, the area for a step of the level.
+    """
+    where = np.concatenate([low, ends])
+    order = np.argsort(where)
+    slope = np.cumsum(np.concatenate([rates, -rates])[order])
+    where = where[order]
+    area = np.concatenate([[0.0], np.cumsum(slope[:-1] * np.diff(where))])
+    half = 0.5 * _ACROSS * edge
+    upper, lower = (np.interp(levels + side, where, area) for side in (half, -half))
+    return np.asarray((upper - lower) / (2.0 * half))
