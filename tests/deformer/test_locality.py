@@ -425,6 +425,8 @@ def test_a_limb_ends_where_the_surface_widens_wherever_it_is_grabbed(neck, angle
     assert limb.length - 0.35 * angle - 0.15 < limb.depth <= limb.length
     assert (limb.share[z > 1.2] == 1.0).all()
     assert (limb.share[z < 0.4] == 0.0).all()
+    weights = samples_of(mesh).weights([on_head(mesh, angle)], limb.length, 0.8, limb.depth)
+    assert ((weights == 0.0) == (limb.share == 1.0)).all()  # so both sides of the body are held
     joint, axis = limb.axis(mesh, mesh.vertices + 3.0)
     assert np.linalg.norm(joint - [3.0, 3.0, 3.9]) < 0.3
     assert axis == pytest.approx([0.0, 0.0, 1.0], abs=0.15)
@@ -472,8 +474,11 @@ def test_the_limb_decides_the_reach():
     assert session.accept(session.preparation())
     session.bind()
     deformer, side = session.deformer, on_head(mesh, 1.6)
-    (limb,) = deformer.limbs(side)
+    limb, whole = deformer.limbs(side)
+    assert whole.is_whole
+    assert (whole.share == 1.0).all()
     assert np.ptp(limb.share) == 1.0
+    assert deformer.limbs(int(mesh.vertices[:, 2].argmin())) == ()
     expected = limb.length, 0.8, limb.depth
     assert deformer.reach_of_pull(side, 0.9, 0.2) == pytest.approx(expected)
     assert deformer.reach_of_pull(side, 0.1, 0.2) == pytest.approx((0.1 / 0.2**0.5, 0.8, 0.0))

@@ -68,8 +68,9 @@ from .constraints import Constraints, HoldOptions
 from .derivatives import Gradient, Linearised
 from .enclosed_volume import EnclosedVolume
 from .finishing import VOLUME_MET, finish_of
+from .limbs import Limb
 from .local import near_point
-from .locality import Limb, Reach
+from .locality import Reach
 from .path import Path, Pose
 from .problem import Problem
 from .slides import Slide, checked_slides
@@ -360,15 +361,20 @@ class Deformer:
         return other
 
     def limbs(self, vertex: int | SurfacePoint) -> tuple[Limb, ...]:
-        """Return the limbs on which *vertex*, or another point, is: finger, hand, arm.
+        """Return the limbs on which *vertex*, or another point, is: finger, hand, arm, body.
 
-        Each ends where the surface widens into a larger part of the body; see `locality`.
+        The last one is the whole body, and each of the others ends where the surface widens into a
+        larger part of it; see `limbs`.  None on a body without any limb there.
         """
-        samples, size = self._problem.samples, self._problem.frame.size
-        return tuple(
-            Limb(size * each.depth, size * each.length, samples.smooth_at_vertices(each.share))
-            for each in samples.limbs(checked_place(self.mesh, vertex))
-        )
+        found = self._problem.samples.limbs(checked_place(self.mesh, vertex))
+        return (*map(self._at_vertices, found), self._whole) if found else ()
+
+    def limb_of_pull(
+        self, vertex: int | SurfacePoint, radius: float, locality: float, limb: int | None = None
+    ) -> Limb | None:
+        """Return the limb that a pull moves; None if it has none.  See `reach_of_pull`."""
+        found = self._limb_of_pull(checked_place(self.mesh, vertex), radius, locality, limb)
+        return found if found is None or found.is_whole else self._at_vertices(found)
 
     def reach_of_pull(
         self, vertex: int | SurfacePoint, radius: float, locality: float, limb: int | None = None
@@ -377,26 +383,43 @@ class Deformer:
 
         The reach is ``radius / sqrt(locality)``, with a *locality* from 0 to 1.  From the default
         locality on it is the smallest limb of the point that is longer than the spread, if its
-        joint is within that reach.  *limb* is the number of another one of `limbs`; what is larger
-        than the last of them is all of the surface.
+        joint is within that reach.  *limb* is the number of another one of `limbs`, or of the last
+        one if it is larger.
         """
-        point = checked_place(self.mesh, vertex)
-        radius, share = checked_radius(self.mesh, radius), checked_locality(locality) or 0.0
-        reach = radius / math.sqrt(share) if share else math.inf
-        size, found = self._problem.frame.size, self._problem.samples.limbs(point)
-        if checked_limb(limb) is not None and found:
-            if limb >= len(found):
-                return Reach(math.inf, 1.0, 0.0)
-            found, share = found[limb : limb + 1], share or LOCALITY
-        elif share >= LOCALITY:
-            least = SPREAD * radius / size
-            found = tuple(each for each in found if each.length >= least)[:1]
-            found = tuple(each for each in found if size * each.depth <= reach)
-        else:
-            found = ()
-        if found:
-            return Reach(size * found[0].length, 1.0 - share, size * found[0].depth)
-        return Reach(reach, 1.0 - share, 0.0)
+        point, share = checked_place(self.mesh, vertex), checked_locality(locality) or 0.0
+        found = self._limb_of_pull(point, radius, share, limb)
+        if found is not None and found.is_whole:
+            return Reach(math.inf, 1.0, 0.0)
+        if found is not None:
+            size = self._problem.frame.size
+            return Reach(size * found.length, 1.0 - (share or LOCALITY), size * found.depth)
+        radius = checked_radius(self.mesh, radius)
+        return Reach(radius / math.sqrt(share) if share else math.inf, 1.0 - share, 0.0)
+
+    def _limb_of_pull(
+        self, point: SurfacePoint, radius: float, locality: float, limb: int | None
+    ) -> Limb | None:
+        """Return the limb that a pull moves, in the frame and with shares of samples."""
+        radius = checked_radius(self.mesh, radius) / self._problem.frame.size
+        share = checked_locality(locality) or 0.0
+        if checked_limb(limb) is None and share < LOCALITY:
+            return None
+        found = self._problem.samples.limbs(point)
+        if limb is not None:
+            return (*found, self._whole)[min(limb, len(found))] if found else None
+        first = next((each for each in found if each.length >= SPREAD * radius), None)
+        is_near = first is not None and first.depth <= radius / math.sqrt(share)
+        return first if is_near else None
+
+    def _at_vertices(self, limb: Limb) -> Limb:
+        """Return *limb* in the mesh's unit, with shares of the vertices."""
+        size, samples = self._problem.frame.size, self._problem.samples
+        share = samples.smooth_at_vertices(limb.share)
+        return Limb(size * limb.depth, size * limb.length, share)
+
+    @property
+    def _whole(self) -> Limb:
+        return Limb(math.inf, math.inf, np.ones(self.mesh.n_vertices))
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""

@@ -11,19 +11,8 @@ reach, a thousand times the weight moves the far surface as much; weights that g
 distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
 The reach of a pull ends with the limb that is grabbed: a head is turned without the shoulders.
-With the distance f from q, the point farthest from the grabbed one p, the limbs of p are the sets
-
-    C(t) = the connected part of {f > t} with p in it,    t < f(p)
-
-which are the same for the crown and the chin of a head.  The border of C(t) is a front across the
-limb.  With the extent L = max_C(t) f - t, its length is constant along a limb and at most
-proportional to L on a flat or rounded surface.  Where a limb ends in a body it grows faster.  Among
-the fronts that grow by a factor of 1.75 until 1.5 L, the joint is the last one that is about as
-narrow, relative to L, as the narrowest.  All of the limb is free, L is the reach, and d is L + the
-distance from the limb.
-
-A limb may have branches, such as fingers, which C(t) gains as a whole.  With the largest minimum of
-f along a path from p to x, which is that along the maximum spanning tree, C(t) = {x: m(x) > t}.
+All of the limb is free, its extent L is the reach, and d is L + the distance from the limb; see
+`limbs`.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
@@ -71,11 +60,9 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import faces_between, joints
 from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
+from .limbs import Levels, Limb
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
-_WIDENS, _AHEAD = 1.75, 0.5  # growth of a front until 1.5 L where a limb ends; 1.5 on a disc
-_NARROW = 1.25  # times the narrowest front
-_STEP, _ACROSS = 0.5, 2.0  # mean edges: between fronts, and the width of one
 _FADES = 0.25  # of the length of a limb, beyond its joint
 _FEWEST = 4  # points of a ring, its own included
 _SHORTEST = 1e-12  # reach; the mesh has size 1
@@ -120,35 +107,6 @@ class Ring:
         offsets = combinations @ x[vertices]
         weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
         return cls(vertices, combinations, offsets, weights, edge)
-
-
-@dataclass(frozen=True, eq=False)
-class Limb:
-    """A part of the surface that bends at a joint, on which a point is grabbed.
-
-    Lengths are in the mesh's unit, along the surface at rest.
-    """
-
-    depth: float
-    """From the grabbed point to the joint."""
-    length: float
-    """From the joint to the tip of the limb."""
-    share: FloatArray
-    """1 on the limb, falling to 0 beyond its joint: of each vertex, (n,)."""
-
-    def axis(self, mesh: Mesh, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the centre of the joint and the direction of the limb, (3,) each.
-
-        Of *mesh* in the pose *x* (n, 3); the direction has length 1 and leads away from the body.
-        """
-        joint, limb = (
-            weights @ x / weights.sum()
-            for weights in (
-                mesh.vertex_areas * self.share * (1.0 - self.share),
-                mesh.vertex_areas * self.share,
-            )
-        )
-        return joint, (limb - joint) / max(float(np.linalg.norm(limb - joint)), _SHORTEST)
 
 
 class Reach(NamedTuple):
@@ -295,47 +253,14 @@ class SurfaceSamples:
 
     def limbs(self, point: SurfacePoint) -> tuple[Limb, ...]:
         """Return the limbs on which *point* is, the smallest first, with shares of samples (s,)."""
-        inner, f, start = self._towards_the_body(point)
-        faces = self.faces[np.isfinite(inner[self.faces[:, 0]])]
-        level, a, b, c = f[faces], *self.points[faces.T]
-        low, high = level.min(axis=1), level.max(axis=1)
-        top = faces[np.arange(len(faces)), level.argmax(axis=1)]
-        ends = np.maximum(np.minimum(high, inner[top]), low)
-        areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        levels = Levels.of(self._joined, int(self.cells[point.vertex]))
         edge = float(self.edges.data.mean()) if self.edges.nnz else _SHORTEST
-        levels = np.arange(start - 0.5 * _ACROSS * edge, edge, -_STEP * edge)
-        fronts = _lengths(levels, low, ends, areas / np.maximum(high - low, _SHORTEST), edge)
-        order = np.argsort(-inner)
-        count = np.searchsorted(-inner[order], -levels)
-        extents = np.maximum.accumulate(f[order])[np.maximum(count - 1, 0)] - levels
-        ahead = levels >= (levels - _AHEAD * extents)[:, None]
-        widest = np.where(np.triu(ahead), fronts, 0.0).max(axis=1, initial=0.0)
-        fast, found = widest > _WIDENS * fronts, []
-        for first in np.flatnonzero(fast & ~np.insert(fast[:-1], 0, False)):
-            last = first + int(np.append(~fast[first:], True).argmax())
-            widths = fronts[first:last] / extents[first:last]
-            k = first + int(np.flatnonzero(widths <= _NARROW * widths.min())[-1])
-            beyond = self._beyond(inner > levels[k])
-            share = np.clip(1.0 - beyond / (_FADES * extents[k]), 0.0, 1.0)
-            found.append(Limb(float(start - levels[k]), float(extents[k]), share))
+        found = []
+        for joint in levels.joints(self.points, self.faces, edge):
+            beyond = self._beyond(levels.within(joint.depth))
+            share = np.clip(1.0 - beyond / (_FADES * joint.length), 0.0, 1.0)
+            found.append(Limb(joint.depth, joint.length, share))
         return tuple(found)
-
-    def _towards_the_body(self, point: SurfacePoint) -> tuple[FloatArray, FloatArray, float]:
-        """Return m and f of the samples, (s,) each, and f of *point*; m is -inf elsewhere."""
-        graph, p = self._joined, int(self.cells[point.vertex])
-        away = csgraph.dijkstra(graph, directed=False, indices=p)
-        q = int(np.where(np.isfinite(away), away, -1.0).argmax())
-        f = np.asarray(csgraph.dijkstra(graph, directed=False, indices=q))
-        i, j = graph.nonzero()
-        lower = np.minimum(f[i], f[j])
-        costs = np.where(np.isfinite(lower), 2.0 * away[q] + 1.0 - lower, 0.0)
-        tree = csgraph.minimum_spanning_tree(sparse.csr_array((costs, (i, j)), graph.shape))
-        order, before = csgraph.breadth_first_order(tree, p, directed=False)
-        inner = np.full(len(f), -np.inf).tolist()
-        inner[p] = f[p]
-        for x, last in zip(order[1:].tolist(), before[order[1:]].tolist(), strict=True):
-            inner[x] = min(inner[last], f[x])
-        return np.array(inner), f, float(f[p])
 
     def _beyond(self, inside: BoolArray) -> FloatArray:
         """Return the distance of each sample from those *inside*, (s,)."""
@@ -355,8 +280,8 @@ class SurfaceSamples:
         if np.isinf(reach):
             return np.zeros(len(self.points))
         if depth:
-            found = [self._towards_the_body(each) for each in points]
-            limbs = np.any([inner > start - depth for inner, _, start in found], axis=0)
+            found = [Levels.of(self._joined, int(self.cells[each.vertex])) for each in points]
+            limbs = np.any([levels.within(depth) for levels in found], axis=0)
             away = 1.0 + self._beyond(limbs) / max(reach, _SHORTEST)
         else:
             away = np.min([self.distances(each) for each in points], axis=0)
@@ -390,20 +315,3 @@ class SurfaceSamples:
         for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
-
-
-def _lengths(
-    levels: FloatArray, low: FloatArray, ends: FloatArray, rates: FloatArray, edge: float
-) -> FloatArray:
-    """Return the lengths of fronts at *levels* (k,): areas of strips, over their width.
-
-    A face has fronts from *low* to *ends* with its *rates*, the area for a step of the level.
-    """
-    where = np.concatenate([low, ends])
-    order = np.argsort(where)
-    slope = np.cumsum(np.concatenate([rates, -rates])[order])
-    where = where[order]
-    area = np.concatenate([[0.0], np.cumsum(slope[:-1] * np.diff(where))])
-    half = 0.5 * _ACROSS * edge
-    upper, lower = (np.interp(levels + side, where, area) for side in (half, -half))
-    return np.asarray((upper - lower) / (2.0 * half))
