@@ -90,9 +90,9 @@ class Levels:
     @classmethod
     def of(cls, graph: sparse.csr_array, p: int) -> Levels:
         """Return the levels for the point *p* of a *graph* (s, s) with the lengths of its edges."""
-        away = csgraph.dijkstra(graph, directed=False, indices=p)
+        (away,) = csgraph.dijkstra(graph, directed=False, indices=[p])
         q = int(np.where(np.isfinite(away), away, -1.0).argmax())
-        f = np.asarray(csgraph.dijkstra(graph, directed=False, indices=q))
+        (f,) = csgraph.dijkstra(graph, directed=False, indices=[q])
         i, j = graph.nonzero()
         lower = np.minimum(f[i], f[j])
         costs = np.where(np.isfinite(lower), 2.0 * away[q] + 1.0 - lower, 0.0)

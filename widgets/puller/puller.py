@@ -308,8 +308,9 @@ class Puller(Widget):
         start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
         self._pulled = point
-        settings = {"radius": self.radius, "locality": self.locality, "limb": self.limb}
-        pull = partial(session.pull, point, **settings)
+        pull = partial(
+            session.pull, point, radius=self.radius, locality=self.locality, limb=self.limb
+        )
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
         try:
