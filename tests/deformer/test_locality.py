@@ -426,7 +426,7 @@ def test_a_limb_ends_where_the_surface_widens_wherever_it_is_grabbed(neck, angle
     assert (limb.share[z > 1.2] == 1.0).all()
     assert (limb.share[z < 0.4] == 0.0).all()
     weights = samples_of(mesh).weights([on_head(mesh, angle)], limb.length, 0.8, limb.depth)
-    assert ((weights == 0.0) == (limb.share == 1.0)).all()  # so both sides of the body are held
+    assert ((weights == 0.0) == (limb.share > 0.0)).all()  # so both sides of the body are held
     joint, axis = limb.axis(mesh, mesh.vertices + 3.0)
     assert np.linalg.norm(joint - [3.0, 3.0, 3.9]) < 0.3
     assert axis == pytest.approx([0.0, 0.0, 1.0], abs=0.15)

@@ -11,8 +11,9 @@ reach, a thousand times the weight moves the far surface as much; weights that g
 distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
 The reach of a pull ends with the limb that is grabbed: a head is turned without the shoulders.
-All of the limb is free, its extent L is the reach, and d is L + the distance from the limb; see
-`limbs`.
+All of the limb is free; see `limbs`.  Its extent L is the reach, and d is L + the distance from
+where it has faded, L / 4 beyond its joint: in this room it bends.  Without it, triangles were
+distorted by 15 to 25 % more on four bodies.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
@@ -282,7 +283,8 @@ class SurfaceSamples:
         if depth:
             found = [Levels.of(self._joined, int(self.cells[each.vertex])) for each in points]
             limbs = np.any([levels.within(depth) for levels in found], axis=0)
-            away = 1.0 + self._beyond(limbs) / max(reach, _SHORTEST)
+            beyond = self._beyond(limbs) / max(reach, _SHORTEST)
+            away = 1.0 + np.maximum(beyond - _FADES, 0.0)
         else:
             away = np.min([self.distances(each) for each in points], axis=0)
             away /= max(reach, _SHORTEST)
