@@ -18,7 +18,8 @@ from vtk_segdeform.widgets import DeformEditor
 
 PICTURES = (
     "hand-open", "hand-pulled", "hand-regions", "hand-cages", "hand-fixed", "hand-handle",
-    "hand-bent", "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys",
+    "hand-bent", "hand-volume", "hand-painted", "hand-cage-vertex", "hand-keys", "hand-limb-1",
+    "hand-limb-2",
 )  # fmt: skip
 """In the order in which they are drawn."""
 
@@ -140,8 +141,26 @@ def paint(hand: Hand) -> None:
         raise RuntimeError("the drag missed the cage vertex")
 
 
+def point(hand: Hand) -> None:
+    """Let the pointer rest on a limb, and choose the next larger one."""
+    x = hand.editor.session.mesh.vertices
+    hand.wait()  # until pulls are prepared
+    place = hand.at(x[[np.argmax(x @ [1.0, 0.0, 1.0])]])[0] - [8.0, 8.0]
+    hand.send("MouseMoveEvent", place)
+    hand.wait(3)
+    hand.save("hand-limb-1")
+    hand.send("KeyPressEvent", place, "bracketright")
+    if hand.editor.widgets.puller.limb is None:
+        raise RuntimeError("the pointer is not on a limb")
+    hand.save("hand-limb-2")
+
+
 if __name__ == "__main__":
-    for story in (bend, paint):
-        hand = Hand(sd.models.cactus(4000))
+    for story, body in (
+        (bend, sd.models.cactus),
+        (paint, sd.models.cactus),
+        (point, sd.models.dinosaur),
+    ):
+        hand = Hand(body(4000))
         story(hand)
         hand.plotter.close()

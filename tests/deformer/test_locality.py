@@ -26,6 +26,7 @@ from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry import distortion
 from vtk_segdeform.io.surface import Surface
 from vtk_segdeform.mesh import Mesh, SurfacePoint
+from vtk_segdeform.models.implicit import Limb, implicit_surface
 from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver.position_constraints import Anchors, PositionTerm
@@ -407,38 +408,96 @@ def figure(neck: float) -> Mesh:
     return turned(profile)
 
 
-@pytest.mark.parametrize("neck", [0.3, 0.8])
-def test_a_limb_ends_where_the_surface_widens(neck):
+def on_head(mesh: Mesh, angle: float) -> SurfacePoint:
+    """Return the vertex of a `figure` on its head at this angle from the top."""
+    centre = mesh.vertices[:, 2].max() - 0.35
+    place = [0.35 * np.sin(angle), 0.0, centre + 0.35 * np.cos(angle)]
+    return SurfacePoint.at_vertex(int(np.linalg.norm(mesh.vertices - place, axis=1).argmin()))
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.8, 1.6])
+@pytest.mark.parametrize("neck", [0.5, 0.8])
+def test_a_limb_ends_where_the_surface_widens_wherever_it_is_grabbed(neck, angle):
     mesh = figure(neck)
-    top = int(mesh.vertices[:, 2].argmax())
-    found = samples_of(mesh).limb(SurfacePoint.at_vertex(top), 0.3, 5.0)
-    assert found == pytest.approx(2.5 * 0.35 + neck, rel=0.15)
-    assert samples_of(mesh).limb(SurfacePoint.at_vertex(top), 0.3, 0.5) == 0.5
+    z = mesh.vertices[:, 2]
+    (limb,) = samples_of(mesh).limbs(on_head(mesh, angle))
+    assert limb.length == pytest.approx(2.5 * 0.35 + neck, rel=0.15)
+    assert limb.length - 0.35 * angle - 0.15 < limb.depth <= limb.length
+    assert (limb.share[z > 1.2] == 1.0).all()
+    assert (limb.share[z < 0.4] == 0.0).all()
+    weights = samples_of(mesh).weights([on_head(mesh, angle)], limb.length, 0.8, limb.depth)
+    assert ((weights == 0.0) == (limb.share > 0.0)).all()  # so both sides of the body are held
+    joint, axis = limb.axis(mesh, mesh.vertices + 3.0)
+    assert np.linalg.norm(joint - [3.0, 3.0, 3.9]) < 0.3
+    assert axis == pytest.approx([0.0, 0.0, 1.0], abs=0.15)
+
+
+def test_limbs_are_nested_and_branches_belong_to_them():
+    fingers = [Limb([(x, 0, 0.2), (1.5 * x, 0, 0.9)], [0.07, 0.06]) for x in (-0.2, 0.0, 0.2)]
+    hand = [*fingers, Limb([(0, 0, -0.1), (0, 0, 0.2)], [0.2, 0.25])]
+    arm = [
+        Limb([(0, 0, -1.0), (0, 0, 0.0)], [0.12, 0.1]),
+        Limb([(0, 0, -1.9), (0, 0, -1.5)], [0.7, 0.7]),
+    ]
+
+    def field(x):
+        return np.min([limb(x) for limb in (*hand, *arm)], axis=0)
+
+    mesh = implicit_surface(field, np.array([[-0.9, -0.9, -2.8], [0.9, 0.9, 1.1]]), 2500)
+    x = mesh.vertices
+    tip = SurfacePoint.at_vertex(int(x[:, 2].argmax()))
+    finger, whole = samples_of(mesh).limbs(tip)
+    assert x[finger.share == 1.0][:, 2].min() > 0.2
+    assert (whole.share >= finger.share).all()
+    assert (whole.share[x[:, 2] > -0.5] == 1.0).all()  # the other fingers belong to it
+    assert (whole.share[x[:, 2] < -1.3] == 0.0).all()
 
 
 @pytest.mark.parametrize("mesh", [models.sphere(1000), models.bar(), models.torus(1200)])
 def test_what_does_not_widen_has_no_limbs(mesh):
-    samples, size = samples_of(mesh), mesh.diagonal
+    samples = samples_of(mesh)
     for vertex in range(0, mesh.n_vertices, 97):
-        assert samples.limb(SurfacePoint.at_vertex(vertex), 0.07 * size, 0.4 * size) == 0.4 * size
+        assert samples.limbs(SurfacePoint.at_vertex(vertex)) == ()
 
 
 def test_the_locality_decides_the_reach_and_what_follows():
     point = SurfacePoint.at_vertex(HIGH)
     for locality, expected in [(0.25, (6.0, 0.75)), (1.0, (3.0, 0.0)), (0.0, (np.inf, 1.0))]:
-        assert held().reach_of_pull(point, 3.0, locality) == pytest.approx(expected)
+        for limb in (None, 0, 7):  # there is none
+            found = held().reach_of_pull(point, 3.0, locality, limb)
+            assert found == pytest.approx((*expected, 0.0))
+
+
+def test_the_limb_decides_the_reach():
+    mesh = figure(0.5)
+    session = Session(mesh)
+    assert session.accept(session.preparation())
+    session.bind()
+    deformer, side = session.deformer, on_head(mesh, 1.6)
+    limb, whole = deformer.limbs(side)
+    assert whole.is_whole
+    assert (whole.share == 1.0).all()
+    assert np.ptp(limb.share) == 1.0
+    assert deformer.limbs(int(mesh.vertices[:, 2].argmin())) == ()
+    expected = limb.length, 0.8, limb.depth
+    assert deformer.reach_of_pull(side, 0.9, 0.2) == pytest.approx(expected)
+    assert deformer.reach_of_pull(side, 0.1, 0.2) == pytest.approx((0.1 / 0.2**0.5, 0.8, 0.0))
+    assert deformer.reach_of_pull(side, 0.1, 0.2, 0) == pytest.approx(expected)
+    assert deformer.reach_of_pull(side, 0.9, 0.0, 0) == pytest.approx(expected)
+    assert deformer.reach_of_pull(side, 0.9, 0.2, 1) == (np.inf, 1.0, 0.0)
+    with pytest.raises(ConstraintError, match="limb must be None or a whole number"):
+        deformer.reach_of_pull(side, 0.9, 0.2, -1)
 
 
 def test_a_head_nods_alone():
     mesh = figure(0.5)
-    top, body = int(mesh.vertices[:, 2].argmax()), mesh.vertices[:, 2] < 0.8
-    to = mesh.vertices[top] + [0.5, 0.0, -0.1]
-    one, all_of_it = (
-        np.linalg.norm(pull(mesh, top, to, 0.9, locality=share).vertices - mesh.vertices, axis=1)
-        for share in (None, 0.19)
-    )
-    assert one[body].max() < 0.2 * all_of_it[body].max()
-    assert one[top] == pytest.approx(all_of_it[top], rel=1e-3)
+    body = mesh.vertices[:, 2] < 0.6
+    for angle in (0.0, 1.6):  # the crown and the chin
+        point = on_head(mesh, angle)
+        to = mesh.vertices[point.vertex] + [0.2, 0.0, -0.3]
+        moves = pull(mesh, point, to, 0.9).vertices - mesh.vertices
+        assert np.linalg.norm(moves[body], axis=1).max() < 0.005 * mesh.diagonal
+        assert np.linalg.norm(moves, axis=1).max() > 0.07 * mesh.diagonal
 
 
 def test_weights_grow_with_the_distance_to_the_largest_one():

@@ -238,8 +238,8 @@ def _pulling(deformer: Deformer, pose: Mapping[str, Any]) -> tuple[Deformer, lis
     locality = checked_locality(pose.get("locality"))
     locality = automatic_locality(len(fixed)) if locality is None else locality
     own = deformer.hold(fixed=fixed, handle=handle, volumes=pose.get("volumes"))
-    reach, follows = own.reach_of_pull(point, radius, locality)
-    own = own.local(point, reach, SPREAD * radius, follows=follows)
+    reach, follows, depth = own.reach_of_pull(point, radius, locality)
+    own = own.local(point, reach, SPREAD * radius, follows=follows, depth=depth)
     return own, [checked_point(pose["to"])[None] - point.at(mesh.vertices) + mesh.vertices[handle]]
 
 

@@ -18,6 +18,7 @@ The files, in reading order:
     frame            the coordinates in which a mesh is deformed
     arguments        checks of its arguments
     locality         what stays when one point is pulled
+    limbs            parts of a body that bend at a joint, found from a grabbed point
     binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
     clamping         regions of their own for fixed parts and rigid handles
@@ -33,6 +34,7 @@ from .arguments import (
     SPREAD,
     automatic_locality,
     checked_constraints,
+    checked_limb,
     checked_locality,
     checked_place,
     checked_point,
@@ -49,6 +51,7 @@ from .deformer import Deformer
 from .derivatives import Gradient
 from .enclosed_volume import changing_components
 from .finishing import on_volumes
+from .limbs import Limb
 from .problem import Problem
 from .pull import pull
 from .slides import Slide, checked_slides
@@ -65,6 +68,7 @@ __all__ = [
     "Deformer",
     "Goals",
     "Gradient",
+    "Limb",
     "Mirror",
     "PaperDeformer",
     "PaperSolution",
@@ -77,6 +81,7 @@ __all__ = [
     "changing_components",
     "checked_constraints",
     "checked_goals",
+    "checked_limb",
     "checked_locality",
     "checked_place",
     "checked_point",

@@ -201,6 +201,13 @@ def checked_locality(locality: float | None) -> float | None:
     return None if locality is None else float(locality)
 
 
+def checked_limb(limb: int | None) -> int | None:
+    """Return *limb*; ConstraintError unless it is a whole number, 0 or more, or None."""
+    if limb is not None and not is_whole(limb, 0):
+        raise ConstraintError(f"limb must be None or a whole number, 0 or more; got {shown(limb)}")
+    return None if limb is None else int(limb)
+
+
 def automatic_locality(n_fixed: int) -> float:
     """Return the locality of a pull if none is given, with *n_fixed* fixed points elsewhere.
 

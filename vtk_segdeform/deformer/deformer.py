@@ -54,6 +54,7 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_limb,
     checked_locality,
     checked_parts,
     checked_place,
@@ -67,7 +68,9 @@ from .constraints import Constraints, HoldOptions
 from .derivatives import Gradient, Linearised
 from .enclosed_volume import EnclosedVolume
 from .finishing import VOLUME_MET, finish_of
+from .limbs import Limb
 from .local import near_point
+from .locality import Reach
 from .path import Path, Pose
 from .problem import Problem
 from .slides import Slide, checked_slides
@@ -300,7 +303,13 @@ class Deformer:
 
     @one_blas_thread()
     def local(
-        self, vertex: int | SurfacePoint, reach: float, spread: float, *, follows: float = 0.0
+        self,
+        vertex: int | SurfacePoint,
+        reach: float,
+        spread: float,
+        *,
+        follows: float = 0.0,
+        depth: float = 0.0,
     ) -> Deformer:
         """Return a deformer in the same pose that deforms the surface near *vertex* only.
 
@@ -327,6 +336,9 @@ class Deformer:
         follows : float
             0 to 1: parts of the surface beyond the reach, such as the hand if the elbow is grabbed,
             follow if their area is less than this share of the largest such part.
+        depth : float
+            Of the joint of the limb that is pulled, see `limbs`: it is free, and the reach begins
+            at its joint.  0: it begins at the point.
         """
         point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
@@ -336,36 +348,78 @@ class Deformer:
             raise ConstraintError(f"spread must be a positive number; got {shown(spread)}")
         if not (is_number(follows, 0.0) and follows <= 1.0):
             raise ConstraintError(f"follows must be a number from 0 to 1; got {shown(follows)}")
+        if not is_number(depth, 0.0):
+            raise ConstraintError(f"depth must be 0 or a positive number; got {shown(depth)}")
         path = self._path
         if not path.is_solved:
             path = path.copy()
             path.solve(path.targets, self._limits)
-        near = near_point(
-            path, point, reach=float(reach), spread=float(spread), follows=float(follows)
-        )
+        lengths = {"reach": float(reach), "spread": float(spread), "depth": float(depth)}
+        near = near_point(path, point, follows=float(follows), **lengths)
         other = self._shared()
         other._path = Path.begin(near, path.p, path.targets)
         return other
 
+    def limbs(self, vertex: int | SurfacePoint) -> tuple[Limb, ...]:
+        """Return the limbs on which *vertex*, or another point, is: finger, hand, arm, body.
+
+        The last one is the whole body, and each of the others ends where the surface widens into a
+        larger part of it; see `limbs`.  None on a body without any limb there.
+        """
+        found = self._problem.samples.limbs(checked_place(self.mesh, vertex))
+        return (*map(self._at_vertices, found), self._whole) if found else ()
+
+    def limb_of_pull(
+        self, vertex: int | SurfacePoint, radius: float, locality: float, limb: int | None = None
+    ) -> Limb | None:
+        """Return the limb that a pull moves; None if it has none.  See `reach_of_pull`."""
+        found = self._limb_of_pull(checked_place(self.mesh, vertex), radius, locality, limb)
+        return found if found is None or found.is_whole else self._at_vertices(found)
+
     def reach_of_pull(
-        self, vertex: int | SurfacePoint, radius: float, locality: float
-    ) -> tuple[float, float]:
-        """Return *reach* and *follows* of `local` for a pull of *vertex*, or another point.
+        self, vertex: int | SurfacePoint, radius: float, locality: float, limb: int | None = None
+    ) -> Reach:
+        """Return *reach*, *follows* and *depth* of `local` for a pull of *vertex*, or a point.
 
         The reach is ``radius / sqrt(locality)``, with a *locality* from 0 to 1.  From the default
-        locality on it ends with the limb of the point if that is shorter; limbs within the spread
-        do not count.
+        locality on it is the smallest limb of the point that is longer than the spread, if its
+        joint is within that reach.  *limb* is the number of another one of `limbs`, or of the last
+        one if it is larger.
         """
-        point = checked_place(self.mesh, vertex)
-        radius, share = checked_radius(self.mesh, radius), checked_locality(locality) or 0.0
-        if not share:
-            return math.inf, 1.0
-        reach = radius / math.sqrt(share)
-        if share >= LOCALITY:
+        point, share = checked_place(self.mesh, vertex), checked_locality(locality) or 0.0
+        found = self._limb_of_pull(point, radius, share, limb)
+        if found is not None and found.is_whole:
+            return Reach(math.inf, 1.0, 0.0)
+        if found is not None:
             size = self._problem.frame.size
-            limb = self._problem.samples.limb(point, SPREAD * radius / size, reach / size)
-            reach = size * limb
-        return reach, 1.0 - share
+            return Reach(size * found.length, 1.0 - (share or LOCALITY), size * found.depth)
+        radius = checked_radius(self.mesh, radius)
+        return Reach(radius / math.sqrt(share) if share else math.inf, 1.0 - share, 0.0)
+
+    def _limb_of_pull(
+        self, point: SurfacePoint, radius: float, locality: float, limb: int | None
+    ) -> Limb | None:
+        """Return the limb that a pull moves, in the frame and with shares of samples."""
+        radius = checked_radius(self.mesh, radius) / self._problem.frame.size
+        share = checked_locality(locality) or 0.0
+        if checked_limb(limb) is None and share < LOCALITY:
+            return None
+        found = self._problem.samples.limbs(point)
+        if limb is not None:
+            return (*found, self._whole)[min(limb, len(found))] if found else None
+        first = next((each for each in found if each.length >= SPREAD * radius), None)
+        is_near = first is not None and first.depth <= radius / math.sqrt(share)
+        return first if is_near else None
+
+    def _at_vertices(self, limb: Limb) -> Limb:
+        """Return *limb* in the mesh's unit, with shares of the vertices."""
+        size, samples = self._problem.frame.size, self._problem.samples
+        share = samples.smooth_at_vertices(limb.share)
+        return Limb(size * limb.depth, size * limb.length, share)
+
+    @property
+    def _whole(self) -> Limb:
+        return Limb(math.inf, math.inf, np.ones(self.mesh.n_vertices))
 
     def copy(self) -> Deformer:
         """Return a deformer in the same pose that continues independently."""

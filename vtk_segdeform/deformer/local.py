@@ -32,7 +32,7 @@ class _HandlePoint(NamedTuple):
 
 
 def near_point(
-    path: Path, point: SurfacePoint, *, reach: float, spread: float, follows: float
+    path: Path, point: SurfacePoint, *, reach: float, spread: float, follows: float, depth: float
 ) -> Constraints:
     """Return constraints that keep the surface far from *point* where it is on *path*.
 
@@ -46,7 +46,8 @@ def near_point(
     size, energy, samples = problem.frame.size, problem.energy, problem.samples
     # The finish has some room around the points, also if they are in a small limb.
     near, finished = (
-        (points, far / size or np.inf, follows) for far in (reach, reach and max(reach, 2 * spread))
+        (points, far / size or np.inf, follows, depth / size)
+        for far in (reach, reach and max(reach, 2 * spread))
     )
     ids = np.concatenate([constraints.handle, constraints.fixed])
     quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)

@@ -10,10 +10,10 @@ Where this is compensated depends on the ratios of the weights.  With equal weig
 reach, a thousand times the weight moves the far surface as much; weights that grow with the
 distance move it a fifth as much, and the smaller ones nearby take fewer steps of the solver.
 
-The reach of a pull ends where the limb does that is grabbed: who turns a head does not mean the
-shoulders.  The points at a distance d from the grabbed one lie on a front.  Its length is constant
-along a limb and at most proportional to d on a flat or rounded surface around the point.  Where a
-limb ends in a body it grows faster: it doubles until 1.5 d, or more.
+The reach of a pull ends with the limb that is grabbed: a head is turned without the shoulders.
+All of the limb is free; see `limbs`.  Its extent L is the reach, and d is L + the distance from
+where it has faded, L / 4 beyond its joint: in this room it bends.  Without it, triangles were
+distorted by 15 to 25 % more on four bodies.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
@@ -50,21 +50,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import faces_between, joints
 from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
+from .limbs import Levels, Limb
 
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
-_RATIO, _WIDTH, _AHEAD = 1.06, 5, 7  # of distances; steps across a front, and to the next one
-_END = 4  # steps from the inner edge of a front to the end of a limb, if the next is the longest
-_WIDENS = 2.0  # growth from one to the other where a limb ends; 1.5 on a disc
+_FADES = 0.25  # of the length of a limb, beyond its joint
 _FEWEST = 4  # points of a ring, its own included
 _SHORTEST = 1e-12  # reach; the mesh has size 1
 _SMOOTHING = 2.0  # rounds, in edges across a cell
@@ -108,6 +108,14 @@ class Ring:
         offsets = combinations @ x[vertices]
         weights = np.concatenate([[1.0], np.full(len(ring), _RIGID / len(ring))])
         return cls(vertices, combinations, offsets, weights, edge)
+
+
+class Reach(NamedTuple):
+    """How far the surface around a grabbed point is free; see `Deformer.local`."""
+
+    reach: float
+    follows: float
+    depth: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,37 +252,42 @@ class SurfaceSamples:
             found += np.linalg.norm(x[corners] - point.at(x), axis=1)[:, None]
         return np.asarray(found.min(axis=0), dtype=np.float64)
 
-    def limb(self, point: SurfacePoint, least: float, most: float) -> float:
-        """Return how far the limb of *point* extends; *most* if it is longer, or there is none.
+    def limbs(self, point: SurfacePoint) -> tuple[Limb, ...]:
+        """Return the limbs on which *point* is, the smallest first, with shares of samples (s,)."""
+        levels = Levels.of(self._joined, int(self.cells[point.vertex]))
+        edge = float(self.edges.data.mean()) if self.edges.nnz else _SHORTEST
+        found = []
+        for joint in levels.joints(self.points, self.faces, edge):
+            beyond = self._beyond(levels.within(joint.depth))
+            share = np.clip(1.0 - beyond / (_FADES * joint.length), 0.0, 1.0)
+            found.append(Limb(joint.depth, joint.length, share))
+        return tuple(found)
 
-        Limbs shorter than *least* do not count, nor do other components.
-        """
-        count = math.ceil(math.log(most / least, _RATIO)) + _WIDTH + _AHEAD
-        radii = least * _RATIO ** (np.arange(count) - _END)
-        of_face = self._component[self.faces[:, 0]]
-        faces = self.faces[of_face == self._component[self.cells[point.vertex]]]
-        nearest, _, farthest = np.sort(self.distances(point)[faces], axis=1).T
-        a, b, c = self.points[faces.T]
-        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        widths = np.maximum(farthest - nearest, _SHORTEST)
-        within = np.array([np.clip((d - nearest) / widths, 0.0, 1.0) @ areas for d in radii])
-        fronts = (within[_WIDTH:] - within[:-_WIDTH]) / (radii[_WIDTH:] - radii[:-_WIDTH])
-        growth = fronts[_AHEAD:] / np.maximum(fronts[:-_AHEAD], _SHORTEST)
-        fast = np.append(growth > _WIDENS, False)
-        if not fast.any():
-            return most
-        first = int(fast.argmax())
-        last = first + int((~fast[first:]).argmax())
-        return min(float(radii[first + growth[first:last].argmax() + _END]), most)
+    def _beyond(self, inside: BoolArray) -> FloatArray:
+        """Return the distance of each sample from those *inside*, (s,)."""
+        found = csgraph.dijkstra(
+            self._joined, directed=False, indices=np.flatnonzero(inside), min_only=True
+        )
+        return np.asarray(found, dtype=np.float64)
 
-    def weights(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
+    def weights(
+        self, points: Sequence[SurfacePoint], reach: float, follows: float, depth: float = 0.0
+    ) -> FloatArray:
         """Return w_s / a_s for kappa = 1, (s,), around several *points*.
 
         Parts beyond the *reach* that are smaller than the largest by the factor *follows* are free.
+        With the *depth* of a joint, the limbs of the points are free, and the reach begins there.
         """
         if np.isinf(reach):
             return np.zeros(len(self.points))
-        away = np.min([self.distances(each) for each in points], axis=0) / max(reach, _SHORTEST)
+        if depth:
+            found = [Levels.of(self._joined, int(self.cells[each.vertex])) for each in points]
+            limbs = np.any([levels.within(depth) for levels in found], axis=0)
+            beyond = self._beyond(limbs) / max(reach, _SHORTEST)
+            away = 1.0 + np.maximum(beyond - _FADES, 0.0)
+        else:
+            away = np.min([self.distances(each) for each in points], axis=0)
+            away /= max(reach, _SHORTEST)
         nearer = np.clip(away, 1.0, 1e2)
         weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
@@ -284,9 +297,11 @@ class SurfaceSamples:
             weights[far[(size < follows * size.max())[part]]] = 0.0
         return np.asarray(weights)
 
-    def quadratic(self, points: Sequence[SurfacePoint], reach: float, follows: float) -> FloatArray:
+    def quadratic(
+        self, points: Sequence[SurfacePoint], reach: float, follows: float, depth: float = 0.0
+    ) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
-        weights = self.areas * self.weights(points, reach, follows)
+        weights = self.areas * self.weights(points, reach, follows, depth)
         kept = weights > 0.0
         rows = self.rows[kept]
         return np.asarray((rows.T * weights[kept]) @ rows)

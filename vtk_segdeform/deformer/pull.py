@@ -156,7 +156,7 @@ def pull(
         stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
         progress=next(stages),
     )  # fmt: skip
-    reach, follows = deformer.reach_of_pull(point, radius, locality)
-    deformer = deformer.local(point, reach, SPREAD * radius, follows=follows)
+    reach, follows, depth = deformer.reach_of_pull(point, radius, locality)
+    deformer = deformer.local(point, reach, SPREAD * radius, follows=follows, depth=depth)
     solution = deformer.solve(target, progress=next(stages))
     return finished(deformer, solution, refine, progress=next(stages))

@@ -58,6 +58,8 @@ class Grip(NamedTuple):
     """Of the pulled surface, in the mesh's unit."""
     locality: float | None
     """0 to 1; None is `locality_of`."""
+    limb: int | None
+    """The number of the limb that is pulled; see `Deformer.reach_of_pull`."""
     turns: bool
     """Whether a patch around the point turns with the motion, which a single vertex cannot."""
 
@@ -142,7 +144,7 @@ def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Gr
 
     ConstraintError if the point is fixed, or no vertex is near it.
     """
-    mesh, (point, radius, locality, turns) = bound.mesh, grip
+    mesh, (point, radius, locality, limb, turns) = bound.mesh, grip
     if np.isin(point.vertex, state.fixed):
         raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
     if fault := fault_of_grab(mesh, point, radius):
@@ -177,10 +179,10 @@ def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Gr
         kept = np.isin(finished.held, state.fixed)
         finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
     pose = Pose(places, targets_at(handles, vertices), finished)
-    reach, follows = bound.reach_of_pull(point, radius, locality)
+    reach, follows, depth = bound.reach_of_pull(point, radius, locality, limb)
     if len(handles[name]) > 1:  # which moves as a whole
         point = SurfacePoint.at_vertex(point.vertex)
-    local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices)
+    local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices, depth)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
     return Grasp(grip, after, name, grip.point.at(vertices), MappingProxyType(carried))
 
@@ -211,7 +213,7 @@ def kept(state: State, vertices: FloatArray) -> State:
     pose, locality = state.pose, state.locality
     if pose is None or locality is None or not locality.reach:
         return state
-    here = replace(locality, reach=0.0, cage_vertices=pose.cage_vertices)
+    here = replace(locality, reach=0.0, depth=0.0, cage_vertices=pose.cage_vertices)
     return replace(released(state, vertices), locality=here)
 
 
@@ -257,7 +259,10 @@ def localised(constrained: Deformer, locality: Locality, x: FloatArray) -> Defor
         other.reset()  # to the shape that has the volumes which are set
     else:
         other.resume(locality.cage_vertices, x[other.handle])
-    return other.local(locality.point, locality.reach, locality.spread, follows=locality.follows)
+    follows, depth = locality.follows, locality.depth
+    return other.local(
+        locality.point, locality.reach, locality.spread, follows=follows, depth=depth
+    )
 
 
 def pinned(mesh: Mesh, state: State, vertex: int) -> tuple[str, Mapping[str, IntArray]]:

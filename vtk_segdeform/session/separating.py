@@ -111,7 +111,7 @@ def _with_regions(
     targets = MappingProxyType({**pose.targets, **state.pose.targets})
     pose, locality = replace(pose, targets=targets), state.locality
     if locality is not None:
-        locality = replace(locality, reach=0.0, cage_vertices=pose.cage_vertices)
+        locality = replace(locality, reach=0.0, depth=0.0, cage_vertices=pose.cage_vertices)
     return replace(at_rest, pose=pose, locality=locality)
 
 

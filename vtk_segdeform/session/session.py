@@ -44,6 +44,7 @@ from ..deformer import (
     Mirror,
     Slide,
     checked_constraints,
+    checked_limb,
     checked_locality,
     checked_place,
     checked_radius,
@@ -560,6 +561,7 @@ class Session(Described):
         *,
         radius: float | None = None,
         locality: float | None = None,
+        limb: int | None = None,
         max_steps: int | None = None,
     ) -> Solution:
         """Pull one point of the surface, as part of a drag like `drag`; see `pulling`.
@@ -580,6 +582,10 @@ class Session(Described):
             than 0.2 also the body that the pulled limb is on; with 0 all is free.  By default 0.2;
             0 if fixed vertices, pins and handles that were not made by pulls are three points or
             more, and 0.05 if they are fewer.
+        limb : int, optional
+            The limb that moves, up to its joint, by its number in `Deformer.limbs`: 0 is the
+            smallest one of the point, and beyond the last one is the whole body.  By default the
+            first one that is longer than half the radius.
         max_steps : int, optional
             As in `drag`.
 
@@ -591,23 +597,23 @@ class Session(Described):
 
         Notes
         -----
-        Calls with the same point, radius and locality belong to one pull until `commit`, which
+        Calls with the same point, radius, locality and limb belong to one pull until `commit`.  It
         leaves a handle at the vertex nearest to it.  When the first map follows points, the surface
         around the point keeps its current shape; see `turned`.
         """
         point = checked_place(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
-        locality = checked_locality(locality)
+        locality, limb = checked_locality(locality), checked_limb(limb)
         motion = pulls.checked_motion(self.mesh, to)
         turns = motion.shape == (4, 4)
         before = self._grasp
-        if before is None or before.grip[:3] != (point, radius, locality):
+        if before is None or before.grip[:4] != (point, radius, locality, limb):
             self.commit()
             before = None
         start = self.state if self.history.drag is None else self.history.drag.start
         grasp = before
         if grasp is None or (turns and not grasp.grip.turns):
-            grip = pulls.Grip(point, radius, locality, turns)
+            grip = pulls.Grip(point, radius, locality, limb, turns)
             grasp = pulls.grasp(self.poses.bind(start), start, self.poses.vertices(start), grip)
             if before is not None:  # the handle becomes a patch, of the shape that it has now
                 grasp = pulls.as_it_is(grasp, self.turned(), self.vertices)

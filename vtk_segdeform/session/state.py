@@ -198,6 +198,8 @@ class Locality(Frozen):
     """0 to 1."""
     cage_vertices: Cages
     """At the press; the rest stays in this pose."""
+    depth: float = 0.0
+    """Of the joint of the pulled limb, in the mesh's unit; 0 without one."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -493,6 +495,8 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
         raise ConstraintError(f"the radius of a pull must be positive; got {', '.join(lengths)}")
     if not (is_number(locality.follows, 0.0) and locality.follows <= 1.0):
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
+    if not is_number(locality.depth, 0.0):
+        raise ConstraintError(f"depth must be 0 or positive; got {shown(locality.depth)}")
     return replace(locality, point=point, cage_vertices=start.cage_vertices)
 
 

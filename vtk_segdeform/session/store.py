@@ -214,8 +214,11 @@ def _write(
     if state.pulls:  # optional, like what follows
         header["pulls"] = list(state.pulls)
     if state.locality is not None:
-        point, reach, *lengths, _ = vars(state.locality).values()
-        header["locality"] = [point.vertex, None if reach == math.inf else reach, *lengths]
+        last = state.locality
+        point, reach = last.point, None if last.reach == math.inf else last.reach
+        header["locality"] = [point.vertex, reach, last.spread, last.follows]
+        if last.depth:
+            header["pulled_limb"] = last.depth
         if not point.is_vertex:
             header["pulled_point"] = [point.corners, point.shares]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
@@ -306,7 +309,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
             shape = row_of(list_of(whole), list_of(number))
             corners, shares = field(header, "pulled_point", shape)
             point = SurfacePoint(tuple(corners), tuple(shares))
-        locality = Locality(point, reach, spread, follows, tuple(kept))
+        depth = field(header, "pulled_limb", number) if "pulled_limb" in header else 0.0
+        locality = Locality(point, reach, spread, follows, tuple(kept), depth)
     handles, more = dict(zip(sizes, ids, strict=True)), dict[str, Any]()
     if "pivots" in header:
         pivots = field(header, "pivots", map_of(row_of(number, number, number)))

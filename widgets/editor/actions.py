@@ -338,9 +338,14 @@ def changing_locality(change: float) -> Action:
     return make_local
 
 
+def changing_limb(steps: int) -> Action:
+    """Return the action that lets the next pull move a larger limb, or a smaller one."""
+    return lambda controller: controller.say(controller.widgets.puller.change_limb(steps))
+
+
 def auto_locality(controller: Controller) -> None:
-    """Let pins decide how local a pull is."""
-    controller.widgets.puller.locality = None
+    """Let pins decide how local a pull is, and the radius which limb it moves."""
+    controller.widgets.puller.locality = controller.widgets.puller.limb = None
     controller.say("Locality: auto")
 
 

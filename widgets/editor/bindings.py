@@ -67,18 +67,23 @@ BINDINGS = (
         )
         for tool, key in zip(TOOLS, "bltkr", strict=True)
     ),
-    *(
-        Binding("", ("bracketleft", "bracketright"), modes, label, None, is_reserved=True)
-        for modes, label in (
-            (PAINTING, "Smaller, larger brush"),
-            (P, "Smaller, larger radius"),
-        )
+    Binding(
+        "",
+        ("bracketleft", "bracketright"),
+        PAINTING,
+        "Smaller, larger brush",
+        None,
+        is_reserved=True,
+    ),
+    Binding("smaller_limb", ("bracketleft",), P, "Smaller limb", actions.changing_limb(-1)),
+    Binding(
+        "larger_limb", ("bracketright",), P, "Larger limb, whole body", actions.changing_limb(1)
     ),
     Binding("more_local", ("plus", "equal"), P, "More local", actions.changing_locality(0.1)),
     Binding("less_local", ("minus",), P, "Less local", actions.changing_locality(-0.1)),
     Binding("auto_locality", ("a",), P, "Automatic locality", actions.auto_locality),
     Binding("remove_pins", ("u",), P, "Remove all points", actions.unpin_all),
-    Binding("", ("r",), P, "While pulling: turn", None),
+    Binding("", ("r",), P, "While pulling: turn the limb, turn in the view, move", None),
     Binding("select_through", ("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
     Binding(
         "grow", ("plus", "equal"), PAINTING, "Grow by one ring", lambda c: c.widgets.selector.grow()

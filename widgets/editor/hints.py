@@ -16,6 +16,12 @@ from ..volume_overlay import brief, signed
 from .keys import Keys
 from .widget_set import Mode, WidgetSet
 
+_TURNING = {
+    "": "R: turn",
+    "limb": "Turning the limb about its axis. R: about the view",
+    "view": "Turning about the line of sight. R: move",
+    **dict.fromkeys("xyz", "Turning about the axis. R: move"),
+}
 TOOLS = {
     Tool.BRUSH: "brush",
     Tool.LASSO: "lasso",
@@ -82,8 +88,8 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
         return "Preview until the mesh is ready · Esc to cancel"
     if widgets.puller.waiting.is_active:
         return "Preparing: the pull starts in a moment · Esc to cancel"
-    if session.is_dragging:
-        return _drag_hint(widgets, "X Y Z: axis. R: turn. ")
+    if session.is_dragging or widgets.puller.turning:
+        return _drag_hint(widgets, f"X Y Z: axis. {_TURNING[widgets.puller.turning]}. ")
     if _is_volume_off(session):
         return f"Drag the surface · {_volume_off(keys)}"
     part = _part(widgets, keys)
@@ -91,7 +97,8 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
         return f"Drag the surface. Shift-click pins. {part or keys.cap('undo') + ': undo'}"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
     share = f"{radius:.1f}".removesuffix(".0")  # as in the panel
-    return f"Drag the surface. Shift-click pins. Shift+wheel: radius ({share} %)"
+    limb = f"{keys.cap('smaller_limb')} {keys.cap('larger_limb')}: limb"
+    return f"Drag the surface. Shift-click pins. {limb}. Shift+wheel: radius ({share} %)"
 
 
 def _drag_hint(widgets: WidgetSet, own: str = "") -> str:

@@ -69,8 +69,7 @@ class HandleDragger(Widget):
     gizmo : Gizmo
         The gizmo of the active handle.
     pulls_with : callable
-        Returns the radius and the locality with which pins and pulled points are moved; see
-        `Session.pull`.
+        Returns the options of `Session.pull` with which pins and pulled points are moved.
     """
 
     def __init__(self, view: Any, session: Session, surface: SurfaceDisplay | None = None) -> None:
@@ -82,7 +81,7 @@ class HandleDragger(Widget):
         self._picker = Picker(self._surface)
         self._marks = HandleMarks(self.view, session)
         self.gizmo = Gizmo(self.view)
-        self.pulls_with: Callable[[], tuple[float | None, float | None]] = lambda: (None, None)
+        self.pulls_with: Callable[[], dict[str, Any]] = dict
         self._local = False
         self._handle: str | None = None
         self._locked: frozenset[str] = frozenset()
@@ -350,9 +349,9 @@ class HandleDragger(Widget):
         session, ids = self.session, self.session.handles[name]
         if len(ids) > 1 and name not in session.state.pulls:
             return lambda matrix: partial(session.move_handle, name, matrix)
-        vertex, (radius, locality) = pulls.middle_vertex(session.mesh, ids), self.pulls_with()
+        vertex = pulls.middle_vertex(session.mesh, ids)
         start = session.targets[name][ids == vertex][0]
-        pull = partial(session.pull, vertex, radius=radius, locality=locality)
+        pull = partial(session.pull, vertex, **self.pulls_with())
 
         def moved(matrix: FloatArray) -> Callable[..., Solution]:
             turns = (matrix[:3, :3] != np.eye(3)).any()

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from ..editor import Action, Controller, DeformEditor, actions
+from ..puller import Puller
 from ..volume_overlay import percent
 from .fields import Field, Section, key_button
+
+_MOST_LIMBS = 9.0  # nested in each other, and more than any body has
 
 
 def pull_section(editor: DeformEditor) -> Section:
@@ -18,13 +21,27 @@ def pull_section(editor: DeformEditor) -> Section:
                 "pull.radius",
                 "number",
                 "Radius",
-                "Radius of the pulled surface, in % of the model's size ([ ] or Shift+wheel)",
+                "Radius of the pulled surface, in % of the model's size (Shift+wheel)",
                 value=100.0 * puller.radius / session.mesh.diagonal,
                 minimum=0.5,
                 maximum=100.0,
                 decimals=1,
                 unit="%",
                 act=_with_radius,
+            ),
+            Field(
+                "pull.limb",
+                "integer",
+                "Limb",
+                "The limb under the pointer that moves: 1 is the smallest, such as a finger, "
+                "larger ones end with the whole body",
+                "larger_limb",
+                value=None if puller.limb is None else puller.limb + 1,
+                maximum=_MOST_LIMBS,
+                special="Auto",
+                act=lambda number: actions.assigning(
+                    _puller, "limb", number - 1 if number else None
+                ),
             ),
             Field(
                 "pull.local",
@@ -96,7 +113,11 @@ def _with_radius(percentage: float) -> Action:
 
 
 def _with_locality(locality: float | None) -> Action:
-    return actions.assigning(lambda c: c.widgets.puller, "locality", locality)
+    return actions.assigning(_puller, "locality", locality)
+
+
+def _puller(controller: Controller) -> Puller:
+    return controller.widgets.puller
 
 
 def _not_auto(controller: Controller) -> None:

@@ -4,6 +4,7 @@ The files, in reading order:
 
     puller         `Puller`
     waiting        a pull that waits for its session, and the stand-in that follows
+    limb_tint      the limb that a pull would move, tinted before the press
     pull_motion    from pointer positions to the motion of the grabbed point
     markers        pins and pulled points as dots
 """

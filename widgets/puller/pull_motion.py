@@ -1,4 +1,7 @@
-"""From the pointer to the motion of the grabbed point: moved, turned, or one after the other."""
+"""From the pointer to the motion of the grabbed point: moved, turned, or one after the other.
+
+A limb is turned about its own axis through its joint, anything else about the grabbed point.
+"""
 
 from __future__ import annotations
 
@@ -35,6 +38,7 @@ class PullMotion:
         self.entry = NumberEntry()
         self.is_turning = False
         self.has_turned = False
+        self._axis: tuple[FloatArray, FloatArray] | None = None  # of the limb, while it turns
         self._projection, self._point, self._arm = projection, point, arm
         self._step = step
         self._constraint: Part | None = None
@@ -47,7 +51,27 @@ class PullMotion:
     @property
     def part(self) -> Part:
         """The kind of the current motion and its axis."""
-        return self._constraint or (TURN if self.is_turning else FREE)
+        return self._constraint or self._unconstrained
+
+    @property
+    def turns_limb(self) -> bool:
+        """Whether the limb is turned about its axis."""
+        return self._axis is not None and self._constraint is None
+
+    @property
+    def centre(self) -> FloatArray:
+        """(3,) float: the centre of the motion: the joint of a turned limb, or `place`."""
+        return self._axis[0] if self._axis is not None and self.turns_limb else self.place
+
+    @property
+    def axes(self) -> FloatArray:
+        """(3, 3) float: the axes of `part`, as rows; z is that of a turned limb."""
+        if self._axis is None or not self.turns_limb:
+            return np.eye(3)
+        z = self._axis[1]
+        x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
+        x /= np.linalg.norm(x)
+        return np.stack([x, np.cross(z, x), z])
 
     @property
     def place(self) -> FloatArray:
@@ -65,15 +89,25 @@ class PullMotion:
         self._constraint = next_constraint(unconstrained, self._constraint, axis)
         self._begin()
 
-    def toggle_turning(self, pointer: Pointer, turned: FloatArray) -> None:
-        """Turn instead of moving from now on, or the other way round; the motion so far stays.
+    def toggle_turning(
+        self,
+        pointer: Pointer,
+        turned: FloatArray,
+        axis: tuple[FloatArray, FloatArray] | None = None,
+    ) -> None:
+        """Turn a limb instead of moving, then turn about the line of sight, then move again.
 
-        *turned* (3, 3) is the rotation of the surface around the point since the press; see
-        `Session.turned`.
+        The motion so far stays.  *turned* (3, 3) is the rotation of the surface around the point
+        since the press; see `Session.turned`.  *axis*, a point and a direction, (3,) each, is that
+        of the limb; without one, the first turn is about the line of sight.
         """
         self._base_shift = self._shift
         self._base_turn = self._turn if self.has_turned else turned
-        self.is_turning = not self.is_turning
+        if self._axis is not None:
+            self._axis = None
+        else:
+            self.is_turning = not self.is_turning
+            self._axis = axis if self.is_turning else None
         self.has_turned = True
         self._constraint = None
         self.entry = NumberEntry()
@@ -87,7 +121,11 @@ class PullMotion:
         if matrix is None or (self.entry.value and np.array_equal(matrix, np.eye(4))):
             return False  # no number yet, or no direction
         self._turn = matrix[:3, :3] @ self._base_turn
-        self._shift = self._base_shift if self.is_turning else self._base_shift + matrix[:3, 3]
+        if self.turns_limb:
+            place = self._point + self._base_shift
+            self._shift = matrix[:3, :3] @ place + matrix[:3, 3] - self._point
+        else:
+            self._shift = self._base_shift + (0.0 if self.is_turning else matrix[:3, 3])
         return True
 
     def of(self, start: FloatArray) -> FloatArray:
@@ -100,8 +138,15 @@ class PullMotion:
         matrix[:3, 3] = to - self._turn @ start
         return matrix
 
+    @property
+    def _unconstrained(self) -> Part:
+        if self._axis is not None:
+            return Part(Kind.ROTATION, 2)
+        return TURN if self.is_turning else FREE
+
     def _begin(self) -> None:
         place = self._point + self._base_shift
         radius = self._arm * self._projection.pixel_at(place)
-        grip = Grip(place, place, np.eye(3), radius, self._step, has_arm=False)
+        centre = self.centre if self.turns_limb else place
+        grip = Grip(place, centre, self.axes, radius, self._step, has_arm=False)
         self._motion = Motion(self._projection, self.part, grip, self._start)

@@ -1,17 +1,21 @@
 """Pulling the surface at any point; it follows at every move.
 
 A press grabs the surface under the pointer and moves it in the view plane.  A ring on the surface
-shows the radius.  A press on a pin or a pulled point, shown as dots, grabs that.
+shows the radius, and the limb that would move is tinted.  A press on a pin or a pulled point, shown
+as dots, grabs that.
 
     shift + click       pin the point, or remove the pin or pulled point there
-    shift + wheel, [ ]  smaller, larger radius
+    shift + wheel       smaller, larger radius
     while pulling:
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
-    r           turn the surface around the point, about the line of sight or x, y, z; again: move
+    r           turn the limb about its axis, or without one the surface around the point about
+                the line of sight; again: that; again: move.  Or about x, y, z
     control     pull in steps of about 1 % of the diagonal, turn in steps of 5 degrees
     shift       pull slowly; with control in finer steps
     a number, enter             pull by exactly that much along the axis, or in the direction so far
     escape, right button        cancel
+
+Long because one widget shows what a press would move, pulls it, turns it and pins it.
 """
 
 from __future__ import annotations
@@ -24,7 +28,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import checked_locality
+from vtk_segdeform.deformer import Limb, checked_limb, checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session, SurfacePoint, pulls
@@ -34,6 +38,7 @@ from ..handle_dragger import Gizmo, LiveSolve, step_of
 from ..picking import Hit, Picker
 from ..region_selector import BrushRing
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
+from .limb_tint import LimbTint
 from .markers import Markers, marked_vertices
 from .pull_motion import PullMotion
 from .waiting import Pull, Waiting
@@ -48,6 +53,7 @@ _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode
 LOCKED = "{} is locked. Clear Lock in the list of handles to move it"
 _NO_DIRECTION = "No direction yet. Press X, Y or Z before the number, or drag first"
 _NOT_YET = "The last pull is not computed yet. Wait a moment, or press Esc to cancel it"
+_PREPARING_LIMBS = "The mesh is not ready yet. Wait until it is prepared"
 _PREPARING = "Preparing: the pull starts in a moment"
 
 
@@ -87,10 +93,13 @@ class Puller(Widget):
         self._picker = Picker(self._surface)
         self._ring = BrushRing(self._surface)
         self._markers = Markers(self._surface, self._picker, lambda name: self.is_hidden(name))
+        self._tint = LimbTint(self._surface, self._limb_of_pull)
         self._gizmo = Gizmo(self.view)
+        self._limb: int | None = None
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
+        self._pulled: SurfacePoint | None = None  # by it
         self._live = LiveSolve(self.view, session, self.cancel)
         self._stop_listening = session.on_change(self._changed)
 
@@ -123,6 +132,46 @@ class Puller(Widget):
     def effective_locality(self) -> float:
         """`locality`, or the value that the pins and fixed vertices lead to."""
         return pulls.locality_of(self.session.state, self._locality)
+
+    @property
+    def limb(self) -> int | None:
+        """The number of the limb that a pull moves, 0 for the smallest; None is automatic."""
+        return self._limb
+
+    @limb.setter
+    def limb(self, limb: int | None) -> None:
+        self._limb = checked_limb(limb)
+        self._invoke("ModifiedEvent")
+
+    def change_limb(self, steps: int) -> str:
+        """Let a pull move a larger limb of the point under the pointer, or a smaller one.
+
+        Return which one it is, or why there is none.
+        """
+        pointer = self.view.pointer(Phase.HOVER)
+        point = self._point_at(self._markers.at(pointer), self._picker.hit(pointer))
+        if point is None:
+            return "Point at the surface to choose a limb"
+        limbs = self.session.deformer.limbs(point) if self.session.is_bound else ()
+        if not limbs:
+            return "No limb here" if self.session.is_bound else _PREPARING_LIMBS
+        now, depths = self._limb_of_pull(point), [limb.depth for limb in limbs]
+        number = (depths.index(now.depth) if now is not None else -1) + steps
+        self.limb = min(max(number, 0), len(limbs) - 1)
+        self._tint.show(point)
+        if limbs[self.limb].is_whole:
+            return "Limb: whole body"
+        return f"Limb: {self.limb + 1} of {len(limbs)}"
+
+    @property
+    def turning(self) -> str:
+        """What the running pull turns about: "limb", "view" or an axis; "" if it moves."""
+        motion = self._motion
+        if motion is None or not motion.is_turning:
+            return ""
+        if motion.turns_limb:
+            return "limb"
+        return "view" if motion.part.axis is None else "xyz"[motion.part.axis]
 
     @property
     def is_refining(self) -> bool:
@@ -181,6 +230,19 @@ class Puller(Widget):
         self._markers.highlight(marker)
         hit = self._picker.hit(pointer) if inside and marker is None else None
         self._draw_ring(hit)
+        self._tint.follow(self._point_at(marker, hit))
+
+    def _point_at(self, marker: str | None, hit: Hit | None) -> SurfacePoint | None:
+        if marker is not None:
+            return SurfacePoint.at_vertex(self._markers.vertex(marker))
+        return None if hit is None else hit.place
+
+    def _limb_of_pull(self, point: SurfacePoint) -> Limb | None:
+        """Return the limb that a pull of *point* would move, if the session is ready."""
+        if not self.session.is_bound:
+            return None
+        locality = self.effective_locality
+        return self.session.deformer.limb_of_pull(point, self.radius, locality, self.limb)
 
     def on_press(self, press: Pointer) -> Gesture | None:
         """Pull the marker or the surface under the pointer; beside it, pass on the press."""
@@ -189,11 +251,8 @@ class Puller(Widget):
         hit = self._picker.hit(press) if marker is None else None
         if self.waiting.has_pull and (marker is not None or hit is not None):
             return self._refuse(_NOT_YET)
-        if marker is not None:
-            point = SurfacePoint.at_vertex(self._markers.vertex(marker))
-        elif hit is not None:
-            point = hit.place
-        else:
+        point = self._point_at(marker, hit)
+        if point is None:
             return None
         name = pulls.grabbed(self.session.mesh, self.session.state, point, self.radius)
         if name is not None and self.is_locked(name):
@@ -213,15 +272,10 @@ class Puller(Widget):
         return True
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
-        """Change the radius, or the constraint or the kind of the running pull, or type a number.
+        """Change the constraint or the kind of the running pull, or type a number.
 
         During a pull all keys of a number are handled here, whatever else they do.
         """
-        clicks = {"bracketleft": -1, "[": -1, "bracketright": +1, "]": +1}.get(key)
-        if clicks is not None:
-            if not self.is_grabbing:
-                self._resize(clicks, pointer)
-            return True
         motion = self._motion
         if motion is None or pointer.control:
             return False
@@ -229,13 +283,21 @@ class Puller(Widget):
         if axis >= 0:
             motion.constrain(axis)
         elif key.lower() == "r":
-            motion.toggle_turning(pointer, self.session.turned())
+            motion.toggle_turning(pointer, self.session.turned(), self._limb_axis())
         elif motion.entry.is_enter(key):
             return self._live.is_refused or self.finish()
         elif not motion.entry.type(key):
             return False
         self._send(Phase.MOVE, "InteractionEvent")
+        self._invoke("ModifiedEvent")  # the hint names what it turns about
         return True
+
+    def _limb_axis(self) -> tuple[FloatArray, FloatArray] | None:
+        """Return the joint and the direction of the limb that the running pull moves."""
+        limb = None if self._pulled is None else self._limb_of_pull(self._pulled)
+        if limb is None or limb.is_whole:
+            return None
+        return limb.axis(self.session.mesh, self.session.vertices)
 
     # Gestures.
     def _pull(self, point: SurfacePoint, press: Pointer) -> Gesture:
@@ -245,7 +307,10 @@ class Puller(Widget):
         self._live.begin()
         start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
-        pull = partial(session.pull, point, radius=self.radius, locality=self.locality)
+        self._pulled = point
+        pull = partial(
+            session.pull, point, radius=self.radius, locality=self.locality, limb=self.limb
+        )
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
         try:
@@ -278,7 +343,7 @@ class Puller(Widget):
                 session.commit("pull")
                 committed = True
         finally:
-            self._motion = None
+            self._motion = self._pulled = None
             self._show(None)
             if not self.waiting.has_pull:
                 self.waiting.drop()
@@ -289,6 +354,7 @@ class Puller(Widget):
     def _refuse(self, remark: str) -> Gesture:
         """Do nothing until the release, and say why."""
         self._ring.hide()
+        self._tint.follow(None)
         while (yield).phase is Phase.MOVE:
             pass
         self.remark = remark
@@ -363,13 +429,15 @@ class Puller(Widget):
         """Show the part of the gizmo and the amount of *motion*, or neither."""
         self._markers.highlight(None)
         self._ring.hide()
+        self._tint.follow(None)
         self._gizmo.show_only(None if motion is None else motion.part)
-        self._gizmo.place(None if motion is None else motion.place)
+        self._gizmo.place(*(None,) if motion is None else (motion.centre, motion.axes))
         self._gizmo.set_caption("" if motion is None else motion.caption)
 
     def leave(self) -> None:
         """Show nothing at the pointer until it moves again."""
         self._ring.hide()
+        self._tint.follow(None)
         self._markers.highlight(None)
 
     def _changed(self, change: Change) -> None:

@@ -1,8 +1,8 @@
 """The mesh of a session in its current pose, as one actor shared by all widgets.
 
 Positions and normals are updated in place when the pose changes.  Colours come in layers, and the
-newest layer is visible.  The body is matte clay, drawn shaded, shaded with its edges, or as a
-wireframe.
+newest layer is visible; a tint lies over it.  The body is matte clay, drawn shaded, shaded with its
+edges, or as a wireframe.
 
 A surface with one side has a seam, where neighbouring faces differ in orientation and light needs
 opposite normals.  The vertices there are drawn twice: the second ones, with opposite normals, are
@@ -24,14 +24,14 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
-from vtk_segdeform.arrays import FloatArray, IntArray, as_points, plain
+from vtk_segdeform.arrays import FloatArray, IntArray, as_numbers, as_points, plain
 from vtk_segdeform.checks import require
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.io import polydata_of
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.pictures import BODY, INK, rgb
+from vtk_segdeform.pictures import BODY, COLOURS, INK, rgb
 from vtk_segdeform.session import Change, Session
 
 from .decimated_surface import DecimatedSurface, decimated_soon
@@ -39,6 +39,7 @@ from .draft import SLOW, Draft, observe_drafts
 from .view import View
 
 _NOTHING = np.arange(0)
+_TINT, _OPACITY = COLOURS[1], 0.6  # sky blue: colour-blind people tell it from clay
 _all_triangles: WeakKeyDictionary[Mesh, tuple[Any, IntArray]] = WeakKeyDictionary()
 
 
@@ -83,6 +84,7 @@ class SurfaceDisplay:
         self.view = View.of(view)
         self.session = require(session, Session, "session")
         self._layers: dict[str, NDArray[np.uint8]] = {}
+        self._tint: FloatArray | None = None
         self._style = SurfaceStyle.SHADED
         self._instead: FloatArray | None = None
         mesh = session.mesh
@@ -133,8 +135,15 @@ class SurfaceDisplay:
 
     @property
     def colours(self) -> NDArray[np.uint8] | None:
-        """(n, 3) uint8: the colours of the vertices in the newest layer; None without any."""
-        return next(reversed(self._layers.values()), None)
+        """(n, 3) uint8: the colours of the vertices, tinted; None without layers and a tint."""
+        top = next(reversed(self._layers.values()), None)
+        if self._tint is None:
+            return top
+        shares = _OPACITY * self._tint.astype(np.float32)[:, None]
+        below = rgb(BODY) if top is None else top
+        return np.asarray(
+            np.rint(below + shares * (rgb(_TINT) - below.astype(np.float32))), np.uint8
+        )
 
     @property
     def style(self) -> SurfaceStyle:
@@ -175,6 +184,18 @@ class SurfaceDisplay:
             self._layers.pop(layer, None)
         else:
             self._layers[layer] = self._checked(colours)
+        self._draw_colours()
+
+    def tint(self, shares: FloatArray | None) -> None:
+        """Tint the vertices, each by a share (n,) from 0 to 1; None removes the tint."""
+        if shares is not None:
+            shares = as_numbers(shares, "shares")
+            if shares.shape != (len(self._points),):
+                raise ArgumentError(f"shares must be one for each vertex; got {shares.shape}")
+        self._tint = shares
+        self._draw_colours()
+
+    def _draw_colours(self) -> None:
         top = self.colours
         self._mapper.SetScalarVisibility(top is not None)
         if top is not None:

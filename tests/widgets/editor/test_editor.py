@@ -540,7 +540,7 @@ SAID = [
     ("v", "Visible surface only"), ("x", "Split region 1"), ("ctrl+z", "Undo: split region 1"),
     ("ctrl+y", "Redo: split region 1"), ("4", "No cages yet. Press F"),
     ("l", "Axes: local"), ("l", "Axes: global"), ("Home", "Pose reset"),
-    ("0", "Drag the surface. Shift-click pins. Shift+wheel: radius (5 %)"),
+    ("0", "Drag the surface. Shift-click pins. [ ]: limb. Shift+wheel: radius (5 %)"),
 ]  # fmt: skip
 
 

@@ -520,7 +520,7 @@ def test_a_pulled_point_is_moved_by_a_pull_and_what_was_pulled_elsewhere_stays(b
     for vertex in ends:
         session.pull(vertex, mesh.vertices[vertex] + [0.0, 0.0, 1.0], locality=0.8)
         session.commit("pull")
-    bench.dragger.pulls_with = lambda: (0.15 * mesh.diagonal, 0.8)
+    bench.dragger.pulls_with = lambda: {"radius": 0.15 * mesh.diagonal, "locality": 0.8}
     bench.dragger.handle = "pull 2"
     bench.view.camera.Zoom(0.8)
     View.render(bench.view)
