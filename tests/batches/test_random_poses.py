@@ -15,15 +15,15 @@ from vtk_segdeform.models import random_limbs
 
 @pytest.fixture(scope="module")
 def body():
-    return random_limbs(900, 11)
+    return random_limbs(500, 11)
 
 
 def test_the_first_poses_are_the_same_for_any_number_of_them(body):
-    four, two = (sd.random_poses(body, n, 1).poses for n in (4, 2))
-    for a, b in zip(four, two, strict=False):
+    three, one = (sd.random_poses(body, n, 1).poses for n in (3, 1))
+    for a, b in zip(three, one, strict=False):
         assert a.vertices.tobytes() == b.vertices.tobytes()
     other = sd.random_poses(body, 1, 2).poses[0]
-    assert np.abs(other.vertices - four[0].vertices).max() > 0.01 * body.diagonal
+    assert np.abs(other.vertices - three[0].vertices).max() > 0.01 * body.diagonal
 
 
 def test_random_poses_are_valid_and_differ(body):

@@ -88,7 +88,7 @@ LONG = {
     "beat_a_ventricle", "bend_the_cactus", "dinosaur", "editor_by_itself", "film_a_drag",
     "one_cage_or_several", "with_and_without_volume",
 }  # fmt: skip
-FEW = {"cactus": 600, "dinosaur": 1000}  # vertices
+FEW = {"cactus": 600, "dinosaur": 1000, "random_limbs": 600}  # vertices
 DRAW = {"bend_a_solid", "carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
 ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
 
@@ -106,7 +106,7 @@ def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_
     folder = tmp_path / "some" / "where"  # which it makes
     monkeypatch.setattr("sys.argv", [name, str(folder)] if name in LEAVES else [name])
     if not whole:  # the models and the cages are smaller than those that its pages show
-        for model in (models.cactus, models.dinosaur):
+        for model in (models.cactus, models.dinosaur, models.random_limbs):
             monkeypatch.setattr(models, model.__name__, smaller(model))
         for call in (vtk_segdeform.deform, vtk_segdeform.pull):
             monkeypatch.setattr(
@@ -124,7 +124,7 @@ def test_the_example_runs_and_its_number_is_right(name, whole, monkeypatch, tmp_
 def smaller(model):
     """Return what makes a model of few vertices, whatever is asked for."""
     few = FEW[model.__name__]
-    return lambda n_vertices=few: model(min(n_vertices, few))
+    return lambda n_vertices=few, **seed: model(min(n_vertices, few), **seed)
 
 
 def test_the_readme_shows_the_first_example_as_it_is():
