@@ -88,7 +88,7 @@ def test_what_is_carried_moves_with_the_vertices_and_stays_inside():
     assert_allclose(fit.moved(line), bent(90.0, line), atol=0.03 * LENGTH)
 
 
-@pytest.mark.parametrize(("volume", "share"), [("keep", 0.0), ("+10%", 0.1), ("-15%", -0.15)])
+@pytest.mark.parametrize(("volume", "share"), [("keep", 0.0), ("-15%", -0.15)])
 def test_a_volume_that_is_set_is_exact_and_landmarks_are_met(volume, share):
     truth, ids = grown(), SPREAD[:16]
     fit = fit_landmarks(BAR, X[ids], truth[ids], volume=volume, **OPTIONS)
