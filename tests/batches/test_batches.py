@@ -55,13 +55,6 @@ def own_cache(tmp_path, monkeypatch):
     deformer_of.cache_clear()
 
 
-def poses_of(store):
-    """Return the cage vertices by mesh and pose."""
-    table = store.table()
-    names = zip(table["mesh"], table["pose"], strict=True)
-    return {name: np.concatenate(store.cage_vertices(k)) for k, name in enumerate(names)}
-
-
 @pytest.fixture(scope="module")
 def plan(meshes):
     return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2}

@@ -82,7 +82,7 @@ LEAVES = {
     "bend_a_solid": ["bent.vtu", "solids.png"],
     "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"],
 }  # the others' pictures: `make docs`
-# In the campaign only: pages and the tests of the folders make the same calls every day.  Of the two
+# In the campaign only: pages and the tests of the folders make the same calls every day.  Of both
 # editors, the one in a plotter runs always; test_numbers bends the cactus.
 LONG = {
     "an_arm_in_a_sleeve", "beat_a_ventricle", "bend_the_cactus", "carry_a_grid", "dinosaur",
