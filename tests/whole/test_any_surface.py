@@ -9,14 +9,12 @@ from __future__ import annotations
 
 from functools import cache
 
-import any_surface
 import numpy as np
 import pytest
 import pyvista as pv
-from any_surface import SPECIMENS, Specimen, triangles
+from any_surface import SPECIMENS, Specimen
 from numpy.testing import assert_allclose, assert_array_equal
 from solids import icosphere, rotation
-from zoo import body
 from zoo_operations import bent, ends, require_right
 
 import vtk_segdeform as sd
@@ -260,18 +258,3 @@ def test_values_at_given_points_and_at_vertices_are_inverse(specimen: Specimen):
     some = np.arange(surface.given.n_points) % 3 == 0
     at_vertex = (surface.given.points == surface.mesh.vertices[surface.vertex_of]).all(axis=1)
     assert_array_equal(surface.vertices_at(some), np.unique(surface.vertex_of[some & at_vertex]))
-
-
-def test_planted_differences_are_found():
-    given = any_surface.with_arrays(triangles(body()))
-    for name, plant in {
-        "faces": lambda x: setattr(x, "faces", x.faces[4:]),
-        "a value": lambda x: x.point_data.__setitem__("a i4", x.point_data["a i4"] + 1),
-        "an array": lambda x: x.cell_data.remove("a f4"),
-        "a type": lambda x: x.cell_data.__setitem__("a f4", x.cell_data["a f4"].astype(float)),
-        "active": lambda x: setattr(x.point_data, "active_scalars_name", "a i4"),
-    }.items():
-        other = given.copy()
-        plant(other)
-        assert differences(given, other), name
-    assert not differences(given, given.copy())
