@@ -290,7 +290,8 @@ def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
             threading.Thread(target=work).start()
             return future
 
-    sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), n_workers=1)
+    few = {**plan, "poses": [BEND, {**RANDOM, "random": 1}], "block": 1}
+    sd.batch(few, tmp_path / "out", executor=Slow(), n_workers=1)
     assert Slow.most == _AHEAD
 
 

@@ -27,11 +27,11 @@ def test_the_first_poses_are_the_same_for_any_number_of_them(body):
 
 
 def test_random_poses_are_valid_and_differ(body):
-    found = sd.random_poses(body, 4, 1)
+    found = sd.random_poses(body, 3, 1)
     assert 0.0 <= found.refused < 0.9
     volume = signed_volume(body.vertices, body.faces)
     distinct = {pose.vertices.tobytes() for pose in found.poses}
-    assert len(distinct) == 4
+    assert len(distinct) == 3
     for pose in found.poses:
         x = pose.vertices
         assert signed_volume(x, body.faces) == pytest.approx(volume, rel=1e-12)
