@@ -85,9 +85,10 @@ LEAVES = {
 # In the campaign only: pages and the tests of the folders make the same calls every day.  Of both
 # editors, the one in a plotter runs always; test_numbers bends the cactus.
 LONG = {
-    "an_arm_in_a_sleeve", "beat_a_ventricle", "bend_the_cactus", "carry_a_grid", "dinosaur",
-    "dinosaur_with_constraints", "editor_by_itself", "film_a_drag", "fit_an_atlas", "many_poses",
-    "one_cage_or_several", "with_and_without_volume",
+    "an_arm_in_a_sleeve", "beat_a_ventricle", "bend_a_solid", "bend_the_cactus", "carry_a_grid",
+    "dinosaur", "dinosaur_with_constraints", "editor_by_itself", "film_a_drag", "find_the_handles",
+    "fit_an_atlas", "many_poses", "one_cage_or_several", "with_and_without_volume",
+    "write_a_motion",
 }  # fmt: skip
 FEW = {"cactus": 600, "dinosaur": 1000, "random_limbs": 600}  # vertices
 DRAW = {"bend_a_solid", "carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
