@@ -95,5 +95,6 @@ def test_no_limbs_are_found_in_loose_pieces():
 
 def test_an_impossible_angle_says_what_to_do(body, monkeypatch):
     monkeypatch.setattr(sd.Solution, "crossings", lambda self: np.arange(1))
+    monkeypatch.setitem(sd.random_poses.__globals__, "_MOST_DRAWS", 3)
     with pytest.raises(sd.errors.ConstraintError, match="bend by less than 60 degrees"):
         sd.random_poses(body, 1)
