@@ -55,13 +55,6 @@ def own_cache(tmp_path, monkeypatch):
     deformer_of.cache_clear()
 
 
-def poses_of(store):
-    """Return the cage vertices by mesh and pose."""
-    table = store.table()
-    names = zip(table["mesh"], table["pose"], strict=True)
-    return {name: np.concatenate(store.cage_vertices(k)) for k, name in enumerate(names)}
-
-
 @pytest.fixture(scope="module")
 def plan(meshes):
     return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2}
@@ -75,22 +68,15 @@ def reference(plan, tmp_path_factory):
         return sd.batch(plan, folder, executor=Here())
 
 
-@pytest.mark.parametrize("count", [pytest.param(1, marks=pytest.mark.campaign), 2])
-def test_the_bytes_are_the_same_in_other_processes_and_here(count, plan, reference, tmp_path):
-    assert set(reference.table()["status"]) == {"converged"}
-    store = sd.batch(plan, tmp_path / "out", n_workers=count)
-    assert store.digest() == reference.digest()
-
-
 def test_poses_start_from_rest_so_their_order_makes_no_difference(meshes, tmp_path):
     other = {**BEND, "handles": [{"select": "z>90%", "rotate": "y,-30"}]}
-    poses, found = [BEND, other, RANDOM], []
+    poses, found = [BEND, other, {**RANDOM, "random": 1}], []
     for name in ("forward", "backward"):
         plan = {"meshes": meshes[:1], "poses": poses}
         store = sd.batch(plan, tmp_path / name, executor=Here())
-        found.append({np.concatenate(store.cage_vertices(k)).tobytes() for k in range(6)})
+        found.append({np.concatenate(store.cage_vertices(k)).tobytes() for k in range(3)})
         poses = poses[::-1]
-    assert len(found[0]) == 6
+    assert len(found[0]) == 3
     assert found[0] == found[1]
 
 
@@ -205,8 +191,8 @@ def test_a_pose_that_takes_too_long_is_stopped(meshes, tmp_path):
     assert set(table["status"]) == {"too long"}
 
 
-@pytest.mark.campaign  # a killed worker of a cluster is in the daily tests
-def test_a_killed_process_costs_no_pose(plan, reference, tmp_path):
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.campaign)])
+def test_a_killed_process_changes_no_byte(count, plan, reference, tmp_path):
     killed = []
 
     def kill(fraction, text):
@@ -214,8 +200,9 @@ def test_a_killed_process_costs_no_pose(plan, reference, tmp_path):
             killed.append(multiprocessing.active_children()[0])
             killed[0].kill()
 
-    store = sd.batch(plan, tmp_path / "out", n_workers=2, progress=kill)
+    store = sd.batch(plan, tmp_path / "out", n_workers=count, progress=kill)
     assert killed
+    assert set(reference.table()["status"]) == {"converged"}
     assert store.digest() == reference.digest()
 
 
@@ -232,7 +219,7 @@ if __name__ == "__main__":
     bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
     meshes = [random_limbs(600, 1), random_limbs(700, 2)]
     plan = {"meshes": meshes, "poses": [bend, random], "block": 2}
-    sd.batch(plan, sys.argv[1], n_workers=2, progress=tell)
+    sd.batch(plan, sys.argv[1], n_workers=1, progress=tell)
 """
 
 
@@ -262,6 +249,7 @@ def test_a_killed_client_continues(number, plan, reference, tmp_path):
     assert store.digest() == reference.digest()
 
 
+@pytest.mark.campaign  # which starts five processes; what continues after it is the same
 def test_a_killed_worker_of_a_cluster_costs_no_pose(plan, reference, tmp_path):
     distributed = pytest.importorskip("distributed")
     log = []
@@ -302,7 +290,8 @@ def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
             threading.Thread(target=work).start()
             return future
 
-    sd.batch({**plan, "block": 1}, tmp_path / "out", executor=Slow(), n_workers=1)
+    few = {**plan, "poses": [BEND, {**RANDOM, "random": 1}], "block": 1}
+    sd.batch(few, tmp_path / "out", executor=Slow(), n_workers=1)
     assert Slow.most == _AHEAD
 
 

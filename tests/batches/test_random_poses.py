@@ -15,23 +15,23 @@ from vtk_segdeform.models import random_limbs
 
 @pytest.fixture(scope="module")
 def body():
-    return random_limbs(900, 11)
+    return random_limbs(500, 11)
 
 
 def test_the_first_poses_are_the_same_for_any_number_of_them(body):
-    four, two = (sd.random_poses(body, n, 1).poses for n in (4, 2))
-    for a, b in zip(four, two, strict=False):
+    three, one = (sd.random_poses(body, n, 1).poses for n in (3, 1))
+    for a, b in zip(three, one, strict=False):
         assert a.vertices.tobytes() == b.vertices.tobytes()
     other = sd.random_poses(body, 1, 2).poses[0]
-    assert np.abs(other.vertices - four[0].vertices).max() > 0.01 * body.diagonal
+    assert np.abs(other.vertices - three[0].vertices).max() > 0.01 * body.diagonal
 
 
 def test_random_poses_are_valid_and_differ(body):
-    found = sd.random_poses(body, 4, 1)
+    found = sd.random_poses(body, 3, 1)
     assert 0.0 <= found.refused < 0.9
     volume = signed_volume(body.vertices, body.faces)
     distinct = {pose.vertices.tobytes() for pose in found.poses}
-    assert len(distinct) == 4
+    assert len(distinct) == 3
     for pose in found.poses:
         x = pose.vertices
         assert signed_volume(x, body.faces) == pytest.approx(volume, rel=1e-12)
@@ -95,5 +95,6 @@ def test_no_limbs_are_found_in_loose_pieces():
 
 def test_an_impossible_angle_says_what_to_do(body, monkeypatch):
     monkeypatch.setattr(sd.Solution, "crossings", lambda self: np.arange(1))
+    monkeypatch.setitem(sd.random_poses.__globals__, "_MOST_DRAWS", 3)
     with pytest.raises(sd.errors.ConstraintError, match="bend by less than 60 degrees"):
         sd.random_poses(body, 1)

@@ -28,11 +28,13 @@ def arm(**meshing: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 SCENES = {
-    "sleeve": lambda: bent(arm(), tube(0.53, 0.6, 1.0, 3.0, n=32)),
+    "sleeve": lambda: bent(arm(step=0.2), tube(0.53, 0.6, 1.0, 3.0, n=24, step=0.15)),
     "wide sleeve": lambda: bent(arm(n=32), tube(0.7, 0.8, 1.2, 2.7, step=0.15)),
     "tight fine sleeve": lambda: bent(arm(step=0.2), tube(0.51, 0.53, 0.8, 2.9, n=40, step=0.06)),
     "open sleeve": lambda: bent(arm(), revolved([(0.58, 0.8), (0.62, 3.1)], 28, 0.12)),
-    "lining": lambda: bent(tube(0.5, 0.65, 0.0, 4.0), tube(0.39, 0.42, 0.2, 3.8)),
+    "lining": lambda: bent(
+        tube(0.5, 0.65, 0.0, 4.0, step=0.15), tube(0.39, 0.42, 0.2, 3.8, step=0.15)
+    ),
     "rod in a tube": lambda: bent(tube(0.5, 0.65, 0.0, 4.0), rod(0.3, 0.2, 3.8)),
     "beads": lambda: bent(
         arm(n=32),

@@ -69,20 +69,20 @@ def test_a_twist_to_270_degrees_and_back_never_jumps(sense):
     assert farthest(last, mesh.vertices) < 6e-5 * mesh.diagonal
 
 
-def test_a_pull_of_a_soft_body_keeps_the_point_and_follows():
+@pytest.mark.parametrize("sense", [1.0, pytest.param(-1.0, marks=pytest.mark.campaign)])
+def test_a_pull_of_a_soft_body_keeps_the_point_and_follows(sense):
     """Where it buckles, poses of almost equal merit are far apart, and frames lag behind."""
     mesh, vertex = models.dinosaur(1000), 351
     preparation = Session(mesh).preparation()
     worst, start = 0.0, mesh.vertices[vertex]
-    for sense in (1.0, -1.0):
-        session = Session(mesh)
-        session.accept(preparation)
-        session.pull(vertex, start, max_steps=1)
-        for share in np.linspace(0.03, 0.3, 8):
-            to = start + [sense * share * mesh.diagonal, 0.0, 0.0]
-            session.pull(vertex, to, max_steps=8)
-            assert np.linalg.norm(session.vertices[vertex] - to) < 1e-4 * mesh.diagonal
-            if share > 0.15:
-                worst = max(worst, farthest(converged(session, preparation), session.vertices))
+    session = Session(mesh)
+    session.accept(preparation)
+    session.pull(vertex, start, max_steps=1)
+    for share in np.linspace(0.03, 0.3, 8):
+        to = start + [sense * share * mesh.diagonal, 0.0, 0.0]
+        session.pull(vertex, to, max_steps=8)
+        assert np.linalg.norm(session.vertices[vertex] - to) < 1e-4 * mesh.diagonal
+        if share > 0.15:
+            worst = max(worst, farthest(converged(session, preparation), session.vertices))
     print(f"{worst / mesh.diagonal:.2%} away")
     assert worst < 0.02 * mesh.diagonal

@@ -15,7 +15,7 @@ from vtk_segdeform.cages import Cage
 from vtk_segdeform.energy import Interior, with_interior
 from vtk_segdeform.mesh import Mesh, winding_number
 
-SCENE = sausage(2)
+SCENE = sausage(2, is_coarse=True)
 DEFORMER = SCENE.deformer()
 MESH, CAGES = DEFORMER._problem.rest, DEFORMER._problem.rest_cages
 BODY = np.array([True])

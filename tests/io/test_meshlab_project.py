@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 import pytest
-from any_surface import capsule, polygons, split
+import pyvista as pv
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from solids import icosphere, rotation
@@ -14,7 +14,7 @@ from test_meshlab import painted, same, with_pymeshlab, without_pymeshlab  # noq
 from zoo_operations import bent, ends
 
 from vtk_segdeform.errors import MeshError
-from vtk_segdeform.io import Surface, meshlab, meshlab_project
+from vtk_segdeform.io import Surface, meshlab, meshlab_project, polydata_of
 from vtk_segdeform.io.convert import to_polydata, write_mesh
 from vtk_segdeform.io.meshlab_project import read_project, write_project
 from vtk_segdeform.mesh.mesh import Mesh
@@ -61,10 +61,15 @@ def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
 
 def posed_session():
     """Return a session of a surface of quadrilaterals with a seam, bent, with two cages."""
-    points, quads = capsule()
-    group = (points[quads].mean(axis=1)[:, 1] > 0).astype(int)
-    (points, faces), _ = split((points, quads), group)
-    session = Session(Surface(polygons(points, faces)))
+    box = pv.Box((-3, 3, -1, 1, -1, 1), level=5, quads=True).clean()
+    x, quads = np.asarray(box.points, float), box.regular_faces
+    x[:, 1:] *= np.sqrt(1.2 - (x[:, :1] / 3.6) ** 2)
+    side = np.repeat(x[quads].mean(axis=1)[:, 1] > 0, 4)
+    keys, corners = np.unique(
+        np.stack([quads.ravel(), side], axis=1), axis=0, return_inverse=True
+    )  # the points between the sides are doubled
+    counts = np.full(len(quads), 4)
+    session = Session(Surface(polydata_of(x[keys[:, 0]], counts, corners.ravel())))
     session.segment(2)
     session.change_options(n_cage_vertices=60)
     session.fit_cages()

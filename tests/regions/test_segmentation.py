@@ -107,7 +107,7 @@ def test_fewer_regions_than_components_join_the_nearest():
     assert second == third != regions.labels[mesh.components == 0][0]
 
 
-def with_buttons(n=40, gap=0.05):
+def with_buttons(n=10, gap=0.05):
     """Return the limbed body with *n* small balls around its upper limb, and their vertices."""
     body, (ball, faces) = limbed(), icosphere(1)
     turn = np.arange(n) * 2.4

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import functools
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -414,18 +413,6 @@ def test_what_cannot_be_pulled_says_why_and_changes_nothing(wrong, says):
     assert session.state is state
 
 
-def test_the_locality_of_another_mesh_is_refused():
-    state = pulled().state
-    off = SurfacePoint.at_vertex(len(X))
-    for wrong in ({"point": off}, {"reach": -1.0}, {"spread": 0.0}, {"follows": 2.0}):
-        broken = replace(state, locality=replace(state.locality, **wrong))
-        with pytest.raises(ConstraintError):
-            Session(MESH, state=broken)
-    broken = replace(state, locality=replace(state.locality, cage_vertices=()))
-    with pytest.raises(CageError):
-        Session(MESH, state=broken)
-
-
 def test_a_pin_becomes_a_handle_that_can_rotate_and_a_pin_again():
     session = pulled()
     session.handles.pin(LOW)
@@ -511,15 +498,6 @@ def test_the_error_of_a_point_pulled_on_a_finished_pose_is_that_of_the_mesh(fini
     off = np.linalg.norm(INSIDE.at(session.vertices) - to) / D
     assert solution.handle_error == pytest.approx(off, rel=0.01, abs=1e-12)
     assert off < (1e-12 if finishes_again else 1e-3)
-
-
-def test_a_finish_begins_with_the_error_of_the_pulled_point():
-    session = ready()
-    to = INSIDE.at(X) + 3.0 * UP
-    session.pull(INSIDE, to)
-    session.commit()
-    off = np.linalg.norm(INSIDE.at(session.vertices) - to) / D
-    assert session.finishing().start.handle_error == pytest.approx(off, rel=0.01, abs=1e-9)
 
 
 def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):

@@ -481,20 +481,6 @@ def test_regions_that_stay_in_their_cages_keep_them_and_others_drop_them():
     assert session.cages == ()
 
 
-def test_cages_are_fitted_around_painted_regions():
-    session = Session(SCENE.mesh)
-    session.painting.paint(1, X > -0.5)
-    session.painting.paint(0, X > 0.5, subtract=True)
-    assert session.regions.n_regions == 2
-    session.change_options(n_cage_vertices=60)
-    session.fit_cages()
-    assert sum(cage.n_vertices for cage in session.cages) == 60
-    assert session.history.undo_label == "fit cages"
-    session.handles.add(SCENE.handle)
-    session.drag(SCENE.turned(20))
-    assert volume_error(session) < 1e-13
-
-
 @pytest.mark.parametrize("work", ["segment", "fit_cages", "bind"])
 def test_cancelling_leaves_everything_as_it_was(work):
     session = ready()

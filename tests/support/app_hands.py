@@ -1,15 +1,8 @@
-"""Simulated hands for the desktop program: a window on a screen, and answers to its dialogs.
-
-Run as a program, it waits for lines such as "drag FOLDER" and for each starts a program that drags,
-saves, or rests after a drag, until it is killed; ``FOLDER/told`` contains its reports.
-"""
+"""Simulated hands for the desktop program: a window on a screen, and answers to its dialogs."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import signal
-import sys
 import warnings
 from pathlib import Path
 
@@ -22,9 +15,6 @@ import pyvistaqt  # isort: skip
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app.window import Window
-from vtk_segdeform.widgets.editor import Autosaves, Slot
-
-INTERVAL = 0.3  # seconds
 
 
 def ready_session() -> Session:
@@ -177,12 +167,6 @@ class AppHand:
         plotter.setFocus()
         return QtHand(plotter.interactor, editor.view)
 
-    def way(self, *, by=(0.0, 60.0), steps=6):
-        """Return a path on the screen that starts at the centre of the handle."""
-        view, gizmo = self.window.editor.view, self.window.editor.widgets.dragger.gizmo
-        start = view.to_display(np.array([gizmo.centre]))[0, :2]
-        return [start + t * np.array(by) for t in np.linspace(0.0, 1.0, steps)]
-
 
 def _named(menu, beginning):
     actions = [a for a in menu.actions() if a.text().replace("&", "").startswith(beginning)]
@@ -239,76 +223,3 @@ def delete(window) -> None:
 
 
 # The program that is killed.
-
-
-def _start_programs() -> None:
-    """Fork a program for each line, so that imports and compilation happen once."""
-    ready_session().bind()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # do not wait for children
-    for line in sys.stdin:
-        if os.fork() == 0:
-            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            what, folder = line.rstrip("\n").split(" ", 1)
-            _run(what, Path(folder))
-
-
-def _run(what: str, folder: Path) -> None:
-    """Run the program: open the session, then drag, rest or save, and report each step."""
-    told = os.open(folder / "told", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-
-    def tell(*words):
-        os.write(told, f"{' '.join(words)}\n".encode())
-
-    tell("number", str(os.getpid()))
-    poses = _told_poses(tell)
-    application()
-    window = Window(settings_in(folder), Autosaves(folder / "unsaved"), interval=INTERVAL)
-    hand = AppHand(window)
-    window.open(folder / "arm.segdeform")
-    until(lambda: window.has_mesh, "the file")
-    session = window.session
-    poses(session)
-    session.on_change(lambda _: poses(session))
-    view = hand.view_hand()
-    if what != "save":
-        view.drag(hand.way(steps=6))
-        hand.settle()
-        tell("finished", digest(session))
-        until(lambda: what == "drag", "the end", 60.0)
-        there = hand.way(by=(0.0, -90.0), steps=20)
-        view.press(there[0])
-        while True:  # back and forth, without releasing
-            for place in [*there, *reversed(there)]:
-                view.move(place)
-                tell("moved")
-    while True:
-        for by in (25.0, -25.0):
-            view.drag(hand.way(by=(0.0, by), steps=3))
-            tell("saving")
-            QtTest.QTest.keyClick(view.widget, Qt.Key_S, Qt.ControlModifier)
-            tell("saved", digest(session))
-
-
-def _told_poses(tell):
-    """Return a function that reports new poses of a session; autosaves are reported as well."""
-    digests, poses, write = {}, [], Slot.write
-
-    def tell_pose(session):
-        pose = session.state.pose
-        if id(pose) not in digests:
-            poses.append(pose)  # so that its id is not reused
-            digests[id(pose)] = digest(session)
-            tell("pose", digests[id(pose)])
-
-    def telling_write(slot, session, view):
-        shown = digests.get(id(session.state.pose))
-        write(slot, session, view)
-        if shown is not None:
-            tell("kept", shown)
-
-    Slot.write = telling_write
-    return tell_pose
-
-
-if __name__ == "__main__":
-    _start_programs()

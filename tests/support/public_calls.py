@@ -110,7 +110,7 @@ def expensive(call: Call) -> bool:
         "batch", "random_poses",
         "cactus", "deform", "dinosaur", "edit", "fit_cages", "fit_landmarks", "film",
         "picture_before_after", "picture_distortion", "picture_landmarks",
-        "picture_regions_and_cages", "picture_volume_change", "pull",
+        "picture_regions_and_cages", "picture_volume_change", "pull", "random_limbs",
     }  # fmt: skip
 
 
@@ -353,6 +353,7 @@ def _fit() -> sd.LandmarkFit:
     return sd.fit_landmarks(mesh(), x, x + 0.1, n_regions=1, n_cage_vertices=24)
 
 
+@functools.cache
 def _poses() -> Path:
     """Return a folder with the poses of a batch."""
     folder = Path(tempfile.mkdtemp())

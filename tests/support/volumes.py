@@ -24,7 +24,7 @@ PARTS = {
 }  # fmt: skip
 
 
-def bar(kind: str, across: int = 5, along: int = 20, taper: float = 0.3) -> pv.UnstructuredGrid:
+def bar(kind: str, across: int = 4, along: int = 14, taper: float = 0.3) -> pv.UnstructuredGrid:
     """Return a bar of cells, 1 by 1 by 4, that becomes thinner along z."""
     lattice = pv.ImageData(dimensions=(across + 1, across + 1, along + 1))
     lattice.spacing = (1.0 / across, 1.0 / across, 4.0 / along)

@@ -10,7 +10,6 @@ from contextlib import suppress
 
 import numpy as np
 import pyvista as pv
-from any_surface import triangles
 from solids import rotation
 
 import vtk_segdeform as sd
@@ -18,12 +17,18 @@ from vtk_segdeform.errors import MeshError, SegDeformError
 from vtk_segdeform.filters.deform_filter import SegmentedCageDeformFilter
 from vtk_segdeform.filters.surfaces import surface
 from vtk_segdeform.geometry import lids_of
-from vtk_segdeform.io import triangles_of
+from vtk_segdeform.io import polydata_of, triangles_of
 from vtk_segdeform.mesh import mesh_of
 
 
 class ReportedError(SegDeformError):
     """A report of faults, or an error message of the filter, which does not raise."""
+
+
+def triangles(soup):
+    """Return triangles as PolyData."""
+    vertices, faces = soup
+    return polydata_of(np.asarray(vertices, float), np.full(len(faces), 3), np.ravel(faces))
 
 
 def volume(mesh, vertices=None):

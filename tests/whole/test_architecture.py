@@ -502,46 +502,6 @@ def _writes(what: str, call: ast.Call) -> bool:
     return opens and any(set(mode) <= set("wxabt+") and set(mode) & set("wxa") for mode in modes)
 
 
-TIMERS = {
-    "CreateTimer", "CreateOneShotTimer", "CreateRepeatingTimer", "DestroyTimer", "ResetTimer",
-    "add_timer_event", "create_timer", "destroy_timer",
-}  # fmt: skip
-
-
-def test_only_the_view_creates_and_destroys_vtk_timers():
-    """Hosts may share one timer among all, so a second owner would stop the timer of the first."""
-    none(
-        f"{name}: {word}"
-        for name in FILES
-        if name != "widgets.scene.view"
-        for node in nodes_of(name)
-        if isinstance(node, (ast.Attribute, ast.Constant))
-        for word in [node.attr if isinstance(node, ast.Attribute) else node.value]
-        if isinstance(word, str) and word in TIMERS
-    )
-
-
-def test_tests_share_no_random_generator():
-    """A generator of a module would give a test other numbers after other tests."""
-    none(
-        f"{path.name}: {node.name} uses {name}"
-        for path in sorted((ROOT / "tests").rglob("*.py"))
-        for top in [ast.parse(path.read_text(encoding="utf-8")).body]
-        for name in _generators(top)
-        for node in top
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef))
-        and any(isinstance(use, ast.Name) and use.id == name for use in ast.walk(node))
-    )
-
-
-def _generators(top: list[ast.stmt]) -> Iterator[str]:
-    for node in top:
-        if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Call):
-            continue
-        if ast.unparse(node.value.func).endswith("default_rng"):
-            yield from (target.id for target in node.targets if isinstance(target, ast.Name))
-
-
 def _report() -> Iterator[str]:
     sizes = Counter(room_of(name) for name in NAMES)
     users = Counter(room_of(what.module) for _, what in between_rooms())

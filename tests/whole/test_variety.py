@@ -80,11 +80,6 @@ def bend_body(seed):
     return regions.n_regions, (2 - euler) // 2, solution
 
 
-@pytest.mark.parametrize("seed", [10])
-def test_a_random_body_is_bent(seed):
-    bend_body(seed)
-
-
 @pytest.mark.campaign
 def test_two_hundred_random_bodies_are_bent():
     began, failed, results = time.perf_counter(), [], []

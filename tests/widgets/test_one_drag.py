@@ -19,15 +19,13 @@ pytestmark = pytest.mark.skipif(
 )
 SHIFT = np.array([40, -30])  # of the drag in pixels, down the screen positive
 
-# The program under test opens one window after the other.  Of each it prints the pixel of the
-# screen to press, as soon as that is shown, and the outcome once a pull is committed.
-WINDOWS = """
+# The programs under test print the pixel of the screen to press, as soon as their window is shown,
+# and the outcome once a pull is committed.
+BOTH = """
 import json
 import numpy as np
 import pyvista as pv
-from qtpy import QtCore, QtWidgets
 import vtk_segdeform as sd
-from vtk_segdeform.widgets.qt import DeformWidget
 
 pv.global_theme.multi_samples = 1  # many take five times as long in software
 mesh = sd.models.sphere(300)
@@ -61,7 +59,8 @@ def follow(editor, close, is_shown, corner):
 
     session.on_change(lambda change: volumes.append(session.volume_change))
     view.every(20, tick)
-
+"""
+IN_PYVISTA = """
 plotter = pv.Plotter(window_size=(300, 300))
 editor = plotter.segdeform.edit(mesh)
 plotter.show(interactive_update=True)
@@ -70,6 +69,10 @@ follow(editor, lambda: done.append(True), lambda: True, lambda: (0, 0))
 while not done:
     plotter.update(20)
 plotter.close()
+"""
+IN_QT = """
+from qtpy import QtCore, QtWidgets
+from vtk_segdeform.widgets.qt import DeformWidget
 
 application = QtWidgets.QApplication([])
 widget = DeformWidget(mesh)
@@ -100,36 +103,38 @@ def screen():
     server.communicate()
 
 
-def test_one_drag_right_after_opening_bends_the_mesh(screen):
+@pytest.mark.parametrize(
+    "window",
+    [pytest.param(IN_PYVISTA, marks=pytest.mark.campaign), IN_QT],
+    ids=["pyvista", "Qt"],
+)
+def test_one_drag_right_after_opening_bends_the_mesh(screen, window):
     environment = {
         **{k: v for k, v in os.environ.items() if k != "VTK_DEFAULT_OPENGL_WINDOW"},
         "DISPLAY": screen, "PYVISTA_OFF_SCREEN": "false", "PYTHONPATH": str(ROOT),
         "QT_QPA_PLATFORM": "xcb",
     }  # fmt: skip
     program = subprocess.Popen(
-        [sys.executable, "-c", WINDOWS],
+        [sys.executable, "-c", BOTH + window],
         env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     limit = threading.Timer(100.0, program.kill)  # a drag that is lost would wait forever
     limit.start()
     try:
-        for window in ("pyvista", "Qt"):
-            line = program.stdout.readline()
-            assert line, program.communicate()[1]
-            press = np.array(json.loads(line))
-            words = ["mousemove", *press, "mousedown", 1]
-            for k in range(1, 11):
-                words += ["sleep", 0.01, "mousemove", *np.rint(press + k / 10 * SHIFT).astype(int)]
-            subprocess.run(
-                ["xdotool", *map(str, words), "mouseup", "1"], env=environment, check=True
-            )
-            line = program.stdout.readline()
-            assert line, (window, program.communicate()[1])
-            told = json.loads(line)
-            np.testing.assert_allclose(told["moved"], SHIFT, atol=3, err_msg=window)
-            assert told["worst"] <= 1e-12
-            assert (told["handle"], told["label"], told["next"]) == ("pull 1", "pull", None)
-            assert told["camera"], "the camera has moved"
+        line = program.stdout.readline()
+        assert line, program.communicate()[1]
+        press = np.array(json.loads(line))
+        words = ["mousemove", *press, "mousedown", 1]
+        for k in range(1, 11):
+            words += ["sleep", 0.01, "mousemove", *np.rint(press + k / 10 * SHIFT).astype(int)]
+        subprocess.run(["xdotool", *map(str, words), "mouseup", "1"], env=environment, check=True)
+        line = program.stdout.readline()
+        assert line, program.communicate()[1]
+        told = json.loads(line)
+        np.testing.assert_allclose(told["moved"], SHIFT, atol=3)
+        assert told["worst"] <= 1e-12
+        assert (told["handle"], told["label"], told["next"]) == ("pull 1", "pull", None)
+        assert told["camera"], "the camera has moved"
         assert program.wait() == 0, program.stderr.read()
     finally:
         limit.cancel()

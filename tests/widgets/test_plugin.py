@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from campaign import every
-from given_surfaces import GIVEN, require_only_moved, tube
+from given_surfaces import GIVEN, require_only_moved
 from hands import Hand, picture
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
@@ -107,16 +107,6 @@ def test_any_surface_is_deformed_by_its_own_points(name):
     regions = given.segdeform.regions(2)
     assert regions["region_weights"].shape == (given.n_points, 2)
     assert_array_equal(regions["region_weights"].argmax(axis=1), regions["region"])
-
-
-def test_points_at_a_seam_with_different_targets_go_to_the_mean():
-    given = tube()
-    seam, other = 24 * 17, 24 * 17 + 16  # one place
-    assert_array_equal(given.points[seam], given.points[other])
-    targets = given.points[[seam, other]] + [[0.2, 0.0, 0.1], [0.1, 0.1, 0.0]]
-    vertices, ends = sd.Surface(given).targets_at([seam, other], targets)
-    assert len(vertices) == 1
-    assert np.allclose(ends[0] - given.points[seam], [0.15, 0.05, 0.05])
 
 
 def test_a_handle_that_misses_its_target_is_logged(bar, caplog):

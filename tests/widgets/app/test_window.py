@@ -33,7 +33,7 @@ from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.solver import Status
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app import documents, window
-from vtk_segdeform.widgets.editor import About, Autosaves, Slot, preparing
+from vtk_segdeform.widgets.editor import About, Autosaves, preparing
 from vtk_segdeform.widgets.handle_dragger import LiveSolve
 from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 
@@ -573,34 +573,6 @@ def test_a_picture_shows_the_view_without_status_line_and_gizmo(
 # Autosave.
 
 
-def test_an_ongoing_drag_is_autosaved_too_and_by_another_thread(
-    start, arm_file, tmp_path, monkeypatch
-):
-    threads, views, write = [], [], Slot.write
-
-    def watched(slot, session, view):
-        threads.append(threading.current_thread())
-        views.append(view)
-        write(slot, session, view)
-
-    monkeypatch.setattr(Slot, "write", watched)
-    hand = start(arm_file, interval=0.05)
-    mouse, way = hand.view_hand(), hand.way(steps=30)
-    mouse.press(way[0])
-    seen = set()
-    for place in [*way, *reversed(way)]:
-        mouse.move(place)
-        seen.add(digest(hand.window.session))
-        if len(threads) > 2:
-            break
-    until(lambda: len(threads) > 2, "three times")
-    assert hand.window.session.is_dragging
-    mouse.release(place)
-    assert threading.main_thread() not in threads
-    controller = hand.window.editor.controller
-    assert views[-1] == controller.camera.settings(controller.mode)
-
-
 @BLANK
 def test_abandoned_work_is_offered_and_recovered(start, bent, arm_file, tmp_path, boxes):
     view = {"mode": "HANDLES", "locked": ["handle 1"], "hidden": []}
@@ -658,22 +630,6 @@ def test_unreadable_work_is_reported_and_kept(start, tmp_path, boxes):
     assert slots(tmp_path) == []
 
 
-@BLANK
-def test_a_failing_autosave_is_reported_once_and_work_continues(start, ball_file, tmp_path):
-    (tmp_path / "unsaved").write_text("in the way")
-    hand = start(ball_file, interval=0.05)
-    window, told = hand.window, []
-    say = window.editor.controller.say
-    window.editor.controller.say = lambda text: told.append(text) or say(text)
-    window.session.handles.add([40, 41], "knob")
-    until(lambda: told, "the word")
-    assert "Could not autosave" in window.editor.status
-    (tmp_path / "unsaved").unlink()
-    until(lambda: slots(tmp_path), "another attempt")
-    assert len(told) == 1
-    hand.settle()
-
-
 def left(tmp_path, session, about, view=None):
     """Leave an autosave; return its file."""
     slot = Autosaves(tmp_path / "unsaved").new(about)
@@ -684,37 +640,6 @@ def left(tmp_path, session, about, view=None):
 
 
 # Closing.
-
-
-def test_a_file_is_prepared_for_pulls_without_a_change_and_closed_meanwhile_at_once(
-    start, ball_file, tmp_path, monkeypatch
-):
-    monkeypatch.setattr(preparing, "lacking", PREPARED)
-    hand = start(ball_file)
-    until(lambda: hand.window.session.is_bound, "the preparation")
-    hand.settle()
-    assert hand.title == "ball.vtp - segdeform"
-    assert slots(tmp_path) == []
-    hand.window.editor.mode = Mode.CAGES
-    drawn = []
-    hand.window.editor.view.window.AddObserver("StartEvent", lambda *_: drawn.append(1))
-    assert hand.window.close()  # no question
-    assert len(drawn) <= 1
-    go_on, waiting = threading.Event(), threading.Event()
-
-    def lacking(*_):
-        def work(progress):
-            waiting.set()
-            assert go_on.wait(30.0)
-            progress(1.0, "")  # cancelled
-
-        return work
-
-    monkeypatch.setattr(preparing, "lacking", lacking)
-    hand = start(ball_file)
-    until(waiting.is_set, "another preparation")
-    assert hand.window.close()
-    go_on.set()
 
 
 @pytest.mark.parametrize("times", [1, pytest.param(30, marks=pytest.mark.campaign)])
@@ -741,19 +666,6 @@ def test_closed_windows_leave_nothing_in_memory(ball_file, tmp_path, boxes, time
     assert threading.active_count() <= threads  # one of an earlier test may end meanwhile
     assert len(os.listdir("/proc/self/fd")) <= files + 2
     assert [each for each in application().topLevelWidgets() if each not in windows] == []
-
-
-def test_a_window_deleted_by_qt_receives_no_more_calls(tmp_path, ball_file, boxes):
-    hand = AppHand(Window(settings_in(tmp_path), Autosaves(tmp_path / "unsaved")))
-    hand.window.open(ball_file)
-    hand.settle()
-    session, editor = hand.window.session, hand.window.editor
-    hand.window.deleteLater()
-    application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)
-    application().processEvents()
-    assert not editor.GetEnabled()
-    session.handles.add([40, 41], "knob")  # no error in a former listener
-    application().processEvents()
 
 
 @pytest.mark.skipif(sys.version_info >= (3, 12), reason="None is immortal")

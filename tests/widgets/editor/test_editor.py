@@ -358,25 +358,6 @@ def test_one_key_cycles_through_shaded_edges_and_wireframe(bench):
         assert np.mean(np.any(seen[k][1] != seen[k - 1][1], axis=2)) > 0.02
 
 
-def test_a_refit_is_one_step_and_keeps_the_pose(bench):
-    session = bench.session
-    up = np.eye(4)
-    up[2, 3] = 0.3
-    session.move_handle(next(iter(session.handles)), up)
-    session.commit()
-    before, count = session.vertices, len(session.history.labels)
-    bench.editor.do(lambda controller: actions.fit_cages(controller, 60))
-    bench.settle()
-    assert sum(cage.n_vertices for cage in session.cages) == 60
-    assert len(session.history.labels) == count + 1
-    assert np.linalg.norm(session.vertices - before, axis=1).max() < 0.01 * session.mesh.diagonal
-    assert abs(session.volume_change) < 1e-12
-    assert session.options.n_cage_vertices == 60
-    bench.type("ctrl+z")
-    assert session.options.n_cage_vertices != 60
-    assert_array_equal(session.vertices, before)
-
-
 def test_a_pose_that_new_cages_cannot_have_is_reset_and_that_is_said(bench, monkeypatch):
     session = bench.session
     session.move_handle(next(iter(session.handles)), np.diag([1.0, 1.0, 1.2, 1.0]))
@@ -475,48 +456,6 @@ def test_painting_a_region_in_a_pose_resets_it_and_says_so(bench):
     assert "Pose reset" not in bench.editor.status
 
 
-def test_regions_are_merged_split_grown_and_shrunk(bench):
-    hand, selector = bench.hand, bench.editor.widgets.selector
-    size = np.count_nonzero(bench.session.regions.membership[0])
-    bench.type("plus")
-    assert np.count_nonzero(bench.session.regions.membership[0]) > size
-    bench.type("ctrl+z", "minus")
-    assert np.count_nonzero(bench.session.regions.membership[0]) < size
-    bench.type("ctrl+z")
-    hand.hover(hand.at([2.0, 0.0, 0.0]))  # on region 1
-    bench.type("m")
-    assert bench.session.regions.n_regions == 1
-    bench.type("x")
-    assert bench.session.regions.n_regions == 2
-    bench.type("n")
-    assert selector.region == 1
-    bench.type("ctrl+z")
-    bench.type("n")
-    assert selector.region == 0  # only one region is left
-
-
-def test_all_vertices_are_selected_for_a_region(bench):
-    bench.type("ctrl+a")
-    assert bench.session.regions.membership[0].all()
-
-
-def test_handles_are_selected_and_removed(bench):
-    bench.type("3", "d", "a", "t")
-    x = bench.session.mesh.vertices[:, 0]
-    corners = bench.around((x > 0.0) & (x < 0.7))
-    bench.hand.drag([corners[0], corners[2]])
-    assert list(bench.session.handles) == ["handle 1", "handle 2"]
-    bench.type("4", "n")
-    first = bench.editor.widgets.dragger.handle
-    bench.type("Tab")
-    assert {first, bench.editor.widgets.dragger.handle} == {"handle 1", "handle 2"}
-    gone = bench.editor.widgets.dragger.handle
-    bench.type("Delete")
-    assert {*bench.session.handles, gone} == {"handle 1", "handle 2"}
-    assert len(bench.session.handles) == 1
-    assert f"Removed {gone}" in bench.editor.status
-
-
 def test_keys_make_a_pull_more_or_less_local(bench):
     puller = bench.editor.widgets.puller
     bench.type("0", "plus")
@@ -611,21 +550,6 @@ def test_keys_for_axes_the_pivot_and_pins(bench):
     ]
 
 
-def test_resetting_the_pose_and_turning_volume_preservation_off(bench):
-    bench.type("4")
-    pull_handle(bench)
-    assert bench.session.state.pose is not None
-    bench.type("Home")
-    assert bench.session.state.pose is None
-    bench.type("p")
-    assert not bench.session.options.preserve_volume
-    assert bench.session.is_bound  # still
-    assert "Volume preservation off" in bench.editor.status
-    assert "(P to turn on)" in bench.editor.status
-    pull_handle(bench)
-    assert abs(bench.session.volume_change) > 1e-6
-
-
 def test_z_constrains_while_a_handle_is_dragged_and_ctrl_z_undoes(bench):
     bench.type("4")
     before = bench.session.state
@@ -654,20 +578,6 @@ def test_a_key_of_another_mode_is_explained_and_withheld_from_vtk(bench):
     assert said in bench.editor.status
     bench.type("j")
     assert heard == ["char"]
-
-
-def test_the_help_card_is_shown_and_hidden(bench):
-    without, card = picture(bench.view), bench.editor.controller.help
-    bench.type("h")
-    assert (picture(bench.view) != without).any()
-    bench.type("h")
-    assert not card.is_shown
-    assert_array_equal(picture(bench.view), without)
-    for key in ("question", "F1"):
-        bench.type(key)
-        assert card.is_shown
-        bench.type("Escape")
-        assert not card.is_shown
 
 
 def test_without_numba_the_status_line_says_so_until_the_first_action(monkeypatch):
@@ -854,16 +764,6 @@ def test_cages_fitted_to_outdated_regions_are_rejected(bare):
     assert len(bare.session.cages) == bare.session.regions.n_regions
 
 
-def test_a_failed_job_shows_its_error_and_the_editor_continues(bench):
-    bench.session.change_options(n_cage_vertices=8, offset=1e-9)
-    bench.type("f")
-    assert len(bench.hand.failures) == 1
-    assert bench.editor.status == " ".join(str(bench.hand.failures.pop()).split())
-    bench.type("4")
-    pull_handle(bench)
-    assert bench.session.history.undo_label == "drag handle 1"
-
-
 def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
     bare.hand.key("g")
     bare.editor.Off()
@@ -879,17 +779,6 @@ def test_switching_off_or_removing_the_editor_cancels_its_job(bare):
 
 
 # Files.
-
-
-@pytest.mark.parametrize("end", ["Off", "remove"])
-def test_the_editor_can_be_left_while_a_job_is_about_to_fail(bare, tmp_path, end):
-    bare.editor.path = tmp_path / "none.segdeform"
-    bare.hand.key("o", control=True)
-    time.sleep(0.1)  # the job has failed but has not been delivered
-    getattr(bare.editor, end)()
-    assert not bare.editor.is_busy
-    assert not bare.editor.GetEnabled()
-    assert bare.hand.failures == []
 
 
 def test_a_posed_session_is_bound_as_it_is_read_and_not_by_the_first_drag(bench, tmp_path):

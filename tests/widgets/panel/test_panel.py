@@ -117,11 +117,13 @@ def everything(editor: DeformEditor) -> tuple:
     return all_sections(editor), toolbar(editor), status(editor), history(editor)
 
 
-# In mode HANDLES as in mode REGIONS; and in mode DEFORM as in mode HANDLES.
+# In mode HANDLES as in mode REGIONS; and in mode DEFORM as in modes HANDLES, CAGES and PULL.
 TOOLS = ("brush", "lasso", "rectangle", "connected_part", "whole_region", "radius", "through")
+VOLUMES = ("name", "change", "goal", "keep_part", "grow_part", "symmetry")
 SAME = {
     Mode.HANDLES: {f"paint.{name}" for name in TOOLS},
-    Mode.DEFORM: {"handles.remove", "handles.convert"},
+    Mode.DEFORM: {"handles.remove", "handles.convert", "regions.stiffness", "poses.save"}
+    | {f"volumes.{name}" for name in VOLUMES},
 }
 
 
