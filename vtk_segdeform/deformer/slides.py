@@ -7,9 +7,9 @@ a finish places them on it exactly, where they are nearest to the pose of the ca
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,14 +59,16 @@ class Guide(NamedTuple):
     """Of these, in their order."""
 
 
-def checked_slides(mesh: Mesh, slides: object) -> tuple[Slide, ...]:
+def checked_slides(mesh: Mesh, slides: Any) -> tuple[Slide, ...]:
     """Return *slides* with their vertices as numbers; ConstraintError if they are none."""
     if slides is None:
         return ()
-    if not isinstance(slides, Iterable):
-        raise ConstraintError(f"slides must be a sequence of Slide; got {shown(slides)}")
+    try:
+        every = list(slides)
+    except TypeError:  # numbers, and arrays without dimensions, which claim to be iterable
+        raise ConstraintError(f"slides must be a sequence of Slide; got {shown(slides)}") from None
     found = []
-    for each in slides:
+    for each in every:
         slide = require(each, Slide, "slides")
         if not isinstance(slide.along, str) or slide.along not in Slide.KINDS:
             kinds = f"{', '.join(Slide.KINDS[:-1])} or {Slide.KINDS[-1]}"
