@@ -177,7 +177,7 @@ def test_many_sliding_vertices_need_little_memory():
     ("slides", "text"),
     [
         (5, "slides must be a sequence of Slide; got 5"),
-        (np.array(5), "slides must be a sequence of Slide; got array"),
+        (np.array(5), "slides must be a sequence of Slide; got an array of int64 and shape ()"),
         ([5], "slides must be"),
         ([sd.Slide([0], "curve")], "along a plane, line or surface; got 'curve'"),
         ([sd.Slide([len(HEIGHT)])], f"vertices of a slide must index 0..{len(HEIGHT) - 1}"),

@@ -7,7 +7,7 @@ a finish places them on it exactly, where they are nearest to the pose of the ca
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
