@@ -79,26 +79,51 @@ def add_corner_products(ids, hats, terms, moves, out, start, stop):
     """Add the product of the Hessian and *moves* (p, 3) to *out* (p, 3), of corners start..stop."""
     for c in range(start, stop):
         hat, term = hats[c], terms[c]
-        i0, i1, i2, i3 = ids[c, 0], ids[c, 1], ids[c, 2], ids[c, 3]
-        along = align = 0.0
-        for j in range(3):
-            h0, h1, h2, h3 = hat[j], hat[3 + j], hat[6 + j], hat[9 + j]
-            for i in range(3):
-                change = (
-                    h0 * moves[i0, i] + h1 * moves[i1, i] + h2 * moves[i2, i] + h3 * moves[i3, i]
-                )
-                along += term[9 + 3 * j + i] * change
-                align += term[3 * j + i] * change
-        a, of_own = term[18], term[20] * along
-        of_other = term[20] * align + term[21] * along
-        for j in range(3):
-            h0, h1, h2, h3 = hat[j], hat[3 + j], hat[6 + j], hat[9 + j]
-            for i in range(3):
-                change = (
-                    h0 * moves[i0, i] + h1 * moves[i1, i] + h2 * moves[i2, i] + h3 * moves[i3, i]
-                )
-                force = a * change + of_own * term[3 * j + i] + of_other * term[9 + 3 * j + i]
-                out[i0, i] += h0 * force
-                out[i1, i] += h1 * force
-                out[i2, i] += h2 * force
-                out[i3, i] += h3 * force
+        p, q, r, s = ids[c, 0], ids[c, 1], ids[c, 2], ids[c, 3]
+        # Everything is read before anything is written, so that it stays in registers.
+        u, v, w, t = moves[p], moves[q], moves[r], moves[s]
+        x, y, z, o = (u[0], u[1], u[2]), (v[0], v[1], v[2]), (w[0], w[1], w[2]), (t[0], t[1], t[2])
+        f = (hat[0], hat[3], hat[6], hat[9])
+        g = (hat[1], hat[4], hat[7], hat[10])
+        h = (hat[2], hat[5], hat[8], hat[11])
+        k, l, m = _change(f, x, y, z, o), _change(g, x, y, z, o), _change(h, x, y, z, o)
+        own = _dot(term, 0, k) + _dot(term, 3, l) + _dot(term, 6, m)
+        other = _dot(term, 9, k) + _dot(term, 12, l) + _dot(term, 15, m)
+        a, of_own, of_other = term[18], term[20] * other, term[20] * own + term[21] * other
+        k = _force(term, 0, a, of_own, of_other, k)
+        l = _force(term, 3, a, of_own, of_other, l)
+        m = _force(term, 6, a, of_own, of_other, m)
+        _spread(out[p], f[0], g[0], h[0], k, l, m)
+        _spread(out[q], f[1], g[1], h[1], k, l, m)
+        _spread(out[r], f[2], g[2], h[2], k, l, m)
+        _spread(out[s], f[3], g[3], h[3], k, l, m)
+
+
+@_compile()
+def _change(h, x, y, z, o):
+    return (
+        h[0] * x[0] + h[1] * y[0] + h[2] * z[0] + h[3] * o[0],
+        h[0] * x[1] + h[1] * y[1] + h[2] * z[1] + h[3] * o[1],
+        h[0] * x[2] + h[1] * y[2] + h[2] * z[2] + h[3] * o[2],
+    )
+
+
+@_compile()
+def _dot(term, j, row):
+    return term[j] * row[0] + term[j + 1] * row[1] + term[j + 2] * row[2]
+
+
+@_compile()
+def _force(term, j, a, of_own, of_other, row):
+    return (
+        a * row[0] + of_own * term[j] + of_other * term[j + 9],
+        a * row[1] + of_own * term[j + 1] + of_other * term[j + 10],
+        a * row[2] + of_own * term[j + 2] + of_other * term[j + 11],
+    )
+
+
+@_compile()
+def _spread(out, f, g, h, k, l, m):
+    out[0] += f * k[0] + g * l[0] + h * m[0]
+    out[1] += f * k[1] + g * l[1] + h * m[1]
+    out[2] += f * k[2] + g * l[2] + h * m[2]
