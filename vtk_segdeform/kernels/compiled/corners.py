@@ -86,17 +86,17 @@ def add_corner_products(ids, hats, terms, moves, out, start, stop):
         f = (hat[0], hat[3], hat[6], hat[9])
         g = (hat[1], hat[4], hat[7], hat[10])
         h = (hat[2], hat[5], hat[8], hat[11])
-        k, l, m = _change(f, x, y, z, o), _change(g, x, y, z, o), _change(h, x, y, z, o)
-        own = _dot(term, 0, k) + _dot(term, 3, l) + _dot(term, 6, m)
-        other = _dot(term, 9, k) + _dot(term, 12, l) + _dot(term, 15, m)
+        r0, r1, r2 = _change(f, x, y, z, o), _change(g, x, y, z, o), _change(h, x, y, z, o)
+        own = _dot(term, 0, r0) + _dot(term, 3, r1) + _dot(term, 6, r2)
+        other = _dot(term, 9, r0) + _dot(term, 12, r1) + _dot(term, 15, r2)
         a, of_own, of_other = term[18], term[20] * other, term[20] * own + term[21] * other
-        k = _force(term, 0, a, of_own, of_other, k)
-        l = _force(term, 3, a, of_own, of_other, l)
-        m = _force(term, 6, a, of_own, of_other, m)
-        _spread(out[p], f[0], g[0], h[0], k, l, m)
-        _spread(out[q], f[1], g[1], h[1], k, l, m)
-        _spread(out[r], f[2], g[2], h[2], k, l, m)
-        _spread(out[s], f[3], g[3], h[3], k, l, m)
+        r0 = _force(term, 0, a, of_own, of_other, r0)
+        r1 = _force(term, 3, a, of_own, of_other, r1)
+        r2 = _force(term, 6, a, of_own, of_other, r2)
+        _spread(out[p], f[0], g[0], h[0], r0, r1, r2)
+        _spread(out[q], f[1], g[1], h[1], r0, r1, r2)
+        _spread(out[r], f[2], g[2], h[2], r0, r1, r2)
+        _spread(out[s], f[3], g[3], h[3], r0, r1, r2)
 
 
 @_compile()
@@ -123,7 +123,7 @@ def _force(term, j, a, of_own, of_other, row):
 
 
 @_compile()
-def _spread(out, f, g, h, k, l, m):
-    out[0] += f * k[0] + g * l[0] + h * m[0]
-    out[1] += f * k[1] + g * l[1] + h * m[1]
-    out[2] += f * k[2] + g * l[2] + h * m[2]
+def _spread(out, f, g, h, r0, r1, r2):
+    out[0] += f * r0[0] + g * r1[0] + h * r2[0]
+    out[1] += f * r0[1] + g * r1[1] + h * r2[1]
+    out[2] += f * r0[2] + g * r1[2] + h * r2[2]
