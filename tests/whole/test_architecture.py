@@ -55,9 +55,8 @@ GRANTED = {
     "io.array_names": VTK,
     "io.convert": VTK,
     "io.grids": VTK,
-    "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
-    "io.reading_child": VTK | {"h5py", "pymeshlab"},
+    "io.reading_child": VTK | {"pymeshlab"},
     "io.vtk_arrays": VTK,
     "io.vtk_formats": VTK,
     "inside": {"pyvista"},
@@ -374,10 +373,9 @@ def test_public_functions_take_at_most_four_positional_arguments():
     none(offences)
 
 
-# Ctrl+C ends them, and so the process; ParaView loads its file before the package; PyMeshLab has to
-# be imported in the main thread.
+# Ctrl+C ends them, and so the process; ParaView loads its file before the package.
 MAY_BE_INTERRUPTED = (
-    "cli", "benchmarks", "io.reading_child", "io.meshlab", "filters.paraview_plugin",
+    "cli", "benchmarks", "io.reading_child", "filters.paraview_plugin",
 )  # fmt: skip
 
 

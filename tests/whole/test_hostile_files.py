@@ -17,15 +17,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
+from foreign_files import HAS_PYMESHLAB, save_foreign
 from given_surfaces import save_raw
 from gltf_files import octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
 
 import vtk_segdeform as sd
-from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import to_polydata, write_mesh
-from vtk_segdeform.io.meshlab_project import write_project
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and memory limits")
 
@@ -47,7 +46,7 @@ end_header
 7 0 1 2 3 0 1 -1
 """
 MATRIX = "1 0 0 0.5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
-MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp", ".vtkhdf"]
+MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp"]
 HUGE = [b"4294967295", b"2147483647", b"99999999999999999999", b"-1", b"1e308", b"nan", b"0"]
 
 
@@ -79,9 +78,9 @@ def originals(folder, foreign=FOREIGN):
     files.append(("mesh", folder / "sound.vtu"))
     for suffix in (".glb", ".gltf"):
         files.append(("mesh", octahedron(*OCTAHEDRON).save(folder / f"sound{suffix}")))
-    if meshlab.available():
+    if HAS_PYMESHLAB:
         for suffix in foreign:
-            write_mesh(folder / f"sound{suffix}", mesh)
+            save_foreign(folder / f"sound{suffix}", mesh)
             files.append(("mesh", folder / f"sound{suffix}"))
     files.append(("mesh", folder / "strips.ply"))
     files[-1][1].write_text(STRIPS)
@@ -91,8 +90,6 @@ def originals(folder, foreign=FOREIGN):
     files.append(("session", folder / "sound.segdeform"))
     sd.save_session(folder / "surface.segdeform", surface_session())
     files.append(("session", folder / "surface.segdeform"))
-    write_project(folder / "sound.mlp", mesh)
-    files.append(("project", folder / "sound.mlp"))
     for name, text, reader in [
         ("sound.def", MATRIX, "matrix"),
         ("sound.sel", "0 0 1 1 2 2\n", "selection"),

@@ -1,4 +1,4 @@
-"""Meshes from and to files, pyvista and MeshLab.
+"""Meshes from and to files and pyvista.
 
 The files, in reading order:
 
@@ -23,9 +23,7 @@ The files, in reading order:
     groups             named groups of cells
     array_names        names, arrays and digits that a format cannot store
     repaired           repair of PolyData with its polygons and arrays
-    meshlab            PyMeshLab: conversion, simplification, file formats
-    meshlab_layers     MeshLab's layers as PolyData
-    meshlab_project    MeshLab projects: a mesh and its cages, coloured and as wires
+    meshlab            further file formats, by PyMeshLab
 """
 
 from .array_names import IS_ROUNDING
@@ -45,36 +43,30 @@ from .convert import (
 from .fields import follow
 from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
-from .meshlab import from_meshset, simplify, to_meshset
-from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
-from .vtk_formats import read_data_sets, write_with_vtk
+from .vtk_formats import read_data_set, write_with_vtk
 
 __all__ = [
     "IS_ROUNDING",
     "Surface",
     "as_polydata",
     "follow",
-    "from_meshset",
     "from_polydata",
     "is_mesh_file",
     "loss_of",
     "of_its_kind",
     "polydata_of",
-    "read_data_sets",
+    "read_data_set",
     "read_mesh",
     "read_points",
     "read_polydata",
-    "read_project",
     "repair_surface",
     "require_writable",
-    "simplify",
     "stored_vertices",
     "surface_of",
-    "to_meshset",
     "to_polydata",
     "triangles_of",
     "volume_change",
@@ -83,6 +75,5 @@ __all__ = [
     "write_gltf_motion",
     "write_mesh",
     "write_points",
-    "write_project",
     "write_with_vtk",
 ]

@@ -36,7 +36,7 @@ from ..errors import ArgumentError, MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
-from .array_names import set_names, warn_left_out, warn_of_rounding, with_storable_texts
+from .array_names import set_names, with_storable_texts
 from .confined import read_confined
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
@@ -46,13 +46,13 @@ from .off import read_off, write_off
 from .ply import ply_points, read_ply, write_ply
 from .polygons import polydata_of, triangles_of
 from .stl import read_stl, write_stl
-from .vtk_arrays import data_sets
+from .vtk_arrays import data_set
 from .vtk_formats import read_with_vtk, write_with_vtk
 from .wavefront import read_obj, write_obj
 
 _log = logging.getLogger(__name__)
 
-_VTK = dict.fromkeys((".vtk", ".vtp", ".vtu", ".vtkhdf"), (read_with_vtk, write_with_vtk))
+_VTK = dict.fromkeys((".vtk", ".vtp", ".vtu"), (read_with_vtk, write_with_vtk))
 _Format: TypeAlias = tuple[Callable[[Path], pv.PolyData], Callable[[Path, pv.PolyData], None]]
 # The reader and the writer of each format; PyMeshLab has others.
 _FORMATS: dict[str, _Format] = {
@@ -74,7 +74,7 @@ def is_mesh_file(path: str | Path) -> bool:
 
 
 def writable_suffixes() -> tuple[str, ...]:
-    """Return the suffixes that `write_mesh` can write without PyMeshLab, in order."""
+    """Return the suffixes that `write_mesh` can write, in order."""
     return tuple(sorted(_FORMATS))
 
 
@@ -87,7 +87,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf; with PyMeshLab also .3ds,
         .dae, .x3d, .wrl and others.
 
     Raises
@@ -151,7 +151,7 @@ def read_points(path: str | Path) -> pv.PolyData | pv.UnstructuredGrid:
             if path.suffix.lower() == ".ply":
                 others = [pv.PolyData(ply_points(path))]
             elif path.suffix.lower() in (".vtp", ".vtu"):
-                others = [*data_sets(read_confined("vtk", path))]
+                others = [data_set(read_confined("vtk", path))]
         if len(others) == 1 and others[0].n_points:
             return others[0]
         raise fault
@@ -185,11 +185,10 @@ def write_mesh(
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab .3ds, .dae,
-        .x3d, .wrl, .ctm.  All formats except .stl, .glb, .gltf and those of PyMeshLab store every
-        digit; .vtk, .vtp, .vtu and .vtkhdf store every array.  An .stl is text, with named solids,
-        if its cells have groups, and binary otherwise.  A warning is logged for each array that is
-        left out or renamed.
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf.  All formats except .stl,
+        .glb and .gltf store every digit; .vtk, .vtp and .vtu store every array.  An .stl
+        is text, with named solids, if its cells have groups, and binary otherwise.  A warning is
+        logged for each array that is left out or renamed.
     mesh : Mesh or pyvista.PolyData
         The mesh to write.  A surface that was read from glTF is written to glTF with the nodes,
         materials and textures of that file.
@@ -209,12 +208,8 @@ def write_mesh(
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
-            if suffix in _FORMATS:
-                _, write = _FORMATS[suffix]
-                write(draft, surface)
-            else:
-                warn_left_out(f"{suffix} written by PyMeshLab", surface, {})
-                _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
+            _, write = _FORMATS[suffix]
+            write(draft, surface)
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
@@ -222,23 +217,6 @@ def write_mesh(
         raise MeshError(
             f"{path}: cannot be written ({reason}); free disk space or choose another folder"
         ) from fault
-
-
-def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
-    """Write by PyMeshLab; OSError if the file is incomplete, which PyMeshLab does not report."""
-    try:
-        meshlab.write(draft, mesh)
-        vertices, faces = meshlab.read_faces(draft)
-        complete = len(faces) == mesh.n_faces
-    except MeshError as fault:
-        raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
-    if not complete:
-        raise OSError("the written file is incomplete")
-    place = np.zeros(mesh.n_vertices, dtype=np.int64)  # some formats renumber or merge vertices
-    place[mesh.faces] = faces
-    if np.array_equal(place[mesh.faces], faces):
-        what = f"{draft.suffix} rounds coordinates"
-        warn_of_rounding(what, mesh.faces, mesh.vertices, vertices[place])
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:
@@ -249,7 +227,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
     path = as_path(path)
     suffix = path.suffix.lower()
     as_flag(arrays, "arrays")
-    known = {*_STORE_ARRAYS} if arrays else {*_FORMATS, *meshlab.WRITES}
+    known = {*_STORE_ARRAYS} if arrays else {*_FORMATS}
     if suffix not in known:
         verb = "cannot store arrays and colours" if arrays else "cannot be written"
         raise MeshError(f"{path}: {_files(suffix)} {verb}; use one of {_listed(known)}")
@@ -346,7 +324,7 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
         return data
     if isinstance(data, pv.UnstructuredGrid):
         try:
-            return surface_of_grid(data, only_as_grid=False)
+            return surface_of_grid(data)
         except MeshError:
             line = "Surface(mesh.extract_surface(algorithm=None))"
             raise MeshError(f"{name} has cells that are not of a surface: {line}") from None

@@ -211,10 +211,6 @@ class Session(Described):
         """Write `deformed` to a mesh file, as `write_mesh` does."""
         output.write_deformed(path, self.mesh, self.surface, self.vertices)
 
-    def layers(self) -> dict[str, pv.PolyData]:
-        """Return the surface and its cages in the current pose; see `output.layers`."""
-        return output.layers(self.mesh, self.surface, self.state, self.vertices)
-
     @property
     def regions(self) -> Regions | None:
         """The regions, or None if there are none yet."""
