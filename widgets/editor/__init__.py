@@ -38,7 +38,6 @@ from .notices import Notice, Notices, notices_of
 from .queue import Kind, Queue, Task
 from .session_file import (
     SessionFile,
-    WrittenMesh,
     file_types,
     is_mesh,
     read_session,
@@ -67,7 +66,6 @@ __all__ = [
     "SessionFile",
     "Slot",
     "Task",
-    "WrittenMesh",
     "actions",
     "error_text",
     "exporting",

@@ -9,11 +9,10 @@ Of the tasks that may begin, the one of the first kind begins first:
     SETTLE    the end of a pose that converges after its release
     PREPARE   what the first pull needs: `preparing`
     FINISH    a pose on the mesh itself, once the hand has rested: `finishing`
-    CHECK     reading a written mesh again
     LOAD      loading kernels, once the hand has rested
 
-PREPARE, FINISH and CHECK share one worker: each begins once the thread of the last one has ended,
-even if that was cancelled.  Everything but the work itself happens in the window's thread, and no
+PREPARE and FINISH share one worker: each begins once the thread of the last one has ended, even if
+that was cancelled.  Everything but the work itself happens in the window's thread, and no
 result is delivered while the hand is active.
 """
 
@@ -56,11 +55,10 @@ class Kind(enum.IntEnum):
     SETTLE = 4
     PREPARE = 5
     FINISH = 6
-    CHECK = 7
-    LOAD = 8
+    LOAD = 7
 
 
-_BY_THE_WORKER = Kind.PREPARE, Kind.FINISH, Kind.CHECK
+_BY_THE_WORKER = Kind.PREPARE, Kind.FINISH
 _JOINED = Kind.JOB, Kind.AUTOSAVE  # when cancelled, they remain until their thread has ended
 
 
