@@ -60,9 +60,6 @@ RIGHT = {
     "editor_in_a_plotter": lambda names: (
         names["moved"] > 0.2 and abs(names["session"].volume_change) < 1e-12
     ),
-    "editor_by_itself": lambda names: (
-        names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
-    ),
     "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
     "fit_an_atlas": lambda names: names["errors"]["fitted"] < 0.9 * names["errors"]["spline"],
     "bend_a_solid": lambda names: (
@@ -82,14 +79,13 @@ LEAVES = {
     "bend_a_solid": ["bent.vtu", "solids.png"],
     "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"],
 }  # the others' pictures: `make docs`
-# In the campaign only.  Of the two editors, the one in a plotter runs always; test_numbers bends
-# the cactus.
+# In the campaign only.  test_numbers bends the cactus.
 LONG = {
-    "beat_a_ventricle", "bend_the_cactus", "dinosaur", "editor_by_itself", "film_a_drag",
+    "beat_a_ventricle", "bend_the_cactus", "dinosaur", "film_a_drag",
     "one_cage_or_several", "with_and_without_volume",
 }  # fmt: skip
 FEW = {"cactus": 600, "dinosaur": 1000}  # vertices
-DRAW = {"bend_a_solid", "carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
+DRAW = {"bend_a_solid", "carry_a_grid", "editor_in_a_plotter", "film_a_drag"}
 ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
 
 
