@@ -62,7 +62,6 @@ GRANTED = {
     "inside": {"pyvista"},
     "any_mesh": {"pyvista"},
     "batches.store": {"pyarrow"},
-    "session.output": {"pyvista"},
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
