@@ -1,4 +1,7 @@
-"""The widget that shows cages and lets their vertices be dragged: `cage_display`."""
+"""The widget that shows cages and lets their vertices be dragged.
+
+    cage_display      `CageDisplay`
+"""
 
 from .cage_display import CageDisplay
 
