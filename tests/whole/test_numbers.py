@@ -24,7 +24,7 @@ PAGES = [
     *(
         ROOT / "docs" / f"{name}.rst"
         for name in (
-            "batch", "comparison", "constraints", "landmarks", "mathematics", "speed", "volumes",
+            "comparison", "constraints", "landmarks", "mathematics", "speed", "volumes",
         )
     ),
 ]  # fmt: skip
