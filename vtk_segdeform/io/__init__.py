@@ -25,6 +25,7 @@ The files, in reading order:
     meshlab            further file formats, by PyMeshLab
 """
 
+from .array_names import IS_ROUNDING
 from .convert import (
     as_polydata,
     from_polydata,
@@ -47,6 +48,7 @@ from .surface import Surface, read_mesh
 from .vtk_formats import read_data_set, write_with_vtk
 
 __all__ = [
+    "IS_ROUNDING",
     "Surface",
     "as_polydata",
     "follow",

@@ -91,23 +91,30 @@ def pose_remark(session: Session) -> str:
     return ". The pose had not settled" if session.is_unsettled else ""
 
 
-def write_posed(session: Session, path: Path) -> tuple[str, ...]:
-    """Write the surface of *session* in its pose; return what the format cannot store."""
+def write_posed(session: Session, path: Path) -> tuple[tuple[str, ...], bool]:
+    """Write the surface of *session* in its pose.
+
+    Return what the format cannot store, in sentences, and whether it rounds visibly.
+    """
+    imported("vtk_segdeform.io")
+    from vtk_segdeform.io import IS_ROUNDING
+
     with _warnings() as warnings:
         session.write_deformed(path)
-    return tuple(map(_shortened, warnings))
+    remarks = tuple(_shortened(each.getMessage()) for each in warnings)
+    return remarks, any(hasattr(each, IS_ROUNDING) for each in warnings)
 
 
 @contextmanager
-def _warnings() -> Iterator[list[str]]:
+def _warnings() -> Iterator[list[logging.LogRecord]]:
     """Collect what writing a file in this thread logs inside a ``with`` block."""
-    found: list[str] = []
+    found: list[logging.LogRecord] = []
     handler, logger = logging.Handler(logging.WARNING), logging.getLogger("vtk_segdeform.io")
     thread = threading.get_ident()
 
     def collect(record: logging.LogRecord) -> None:
         if record.thread == thread:
-            found.append(record.getMessage())
+            found.append(record)
 
     handler.emit = collect  # type: ignore[method-assign]
     logger.addHandler(handler)
