@@ -98,7 +98,8 @@ def words_per_line(lines: bytes) -> tuple[IntArray, IntArray]:
 def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     """Return the numbers (k,) of *text*; None if it has anything else, or k is not *count*."""
     if count is None:
-        count = len(words_per_line(text)[0])
+        is_word = np.frombuffer(text, dtype=np.uint8) > _SPACE
+        count = np.count_nonzero(is_word[:1]) + np.count_nonzero(is_word[1:] & ~is_word[:-1])
     try:
         numbers = np.fromstring(text, dtype=dtype, sep=" ")
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
