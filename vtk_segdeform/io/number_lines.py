@@ -99,7 +99,7 @@ def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     """Return the numbers (k,) of *text*; None if it has anything else, or k is not *count*."""
     if count is None:
         is_word = np.frombuffer(text, dtype=np.uint8) > _SPACE
-        count = np.count_nonzero(is_word[:1]) + np.count_nonzero(is_word[1:] & ~is_word[:-1])
+        count = int(is_word[:1].sum()) + int((is_word[1:] & ~is_word[:-1]).sum())
     try:
         numbers = np.fromstring(text, dtype=dtype, sep=" ")
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
