@@ -11,6 +11,7 @@ from volumes import TYPES, bar, bent
 import vtk_segdeform as sd
 from vtk_segdeform.inside.cells import Corners
 from vtk_segdeform.inside.untangling import _Energy, inner_points
+from vtk_segdeform.kernels import dispatch
 
 
 def corners_of(grid):
@@ -87,6 +88,32 @@ def test_the_slope_is_that_of_the_energy(eps):
     one = np.zeros_like(move)
     one[2, 1] = 1.0
     assert_allclose(hessian(one)[2, 1], diagonal[2, 1])
+
+
+@pytest.mark.parametrize("eps", [0.0, 0.1])
+def test_compiled_and_plain_energies_agree(eps, monkeypatch):
+    pytest.importorskip("numba")
+    grid = bar("hexahedron", 3, 5)
+    corners, rest = corners_of(grid), np.array(grid.points, dtype=float)
+    free, rng = inner(corners, len(rest)), np.random.default_rng(9)
+    x = rest + (0.2 if eps else 0.02) * rng.normal(size=rest.shape)
+    moves = rng.normal(size=(int(free.sum()), 3))
+
+    def found():
+        energy = _Energy(corners, rest, free)
+        state = energy.at(x, eps)
+        product, diagonal = energy.hessian(state)
+        return state.value, state.d, state.terms, energy.slope(state), diagonal, product(moves)
+
+    dispatch.wait_until_compiled()
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
+    quick = found()
+    monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+    plain = found()
+    assert (quick[1].min() < 0.0) == (eps > 0.0)
+    assert not np.array_equal(quick[2], plain[2])  # by two programs
+    for own, other in zip(quick, plain, strict=True):
+        assert_allclose(own, other, rtol=1e-9, atol=1e-12 * np.abs(other).max())
 
 
 def test_the_hessian_of_tetrahedra_is_exact_at_rest():

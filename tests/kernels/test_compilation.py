@@ -99,12 +99,14 @@ def test_whoever_waits_has_them(folder):
 
 def test_without_numba_nothing_is_compiled(folder, monkeypatch):
     monkeypatch.setenv("SEGDEFORM_NUMBA", "0")
+    dispatch._is_enabled.cache_clear()
     with monkeypatch.context() as nowhere:
         nowhere.setattr(compilation, "wait", None)
         wait_until_compiled()
     assert compiled_kernels() is None
     assert not dispatch.is_compiling()
     monkeypatch.delenv("SEGDEFORM_NUMBA")
+    dispatch._is_enabled.cache_clear()
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     begin()
     assert not is_pending()

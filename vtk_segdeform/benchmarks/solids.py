@@ -6,12 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 import pyvista as pv
+from scipy import sparse
 from scipy.interpolate import RBFInterpolator
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arrays import BoolArray, FloatArray
 from ..deformer import deform
-from ..inside import VolumeMesh, gradient_operator
+from ..inside import VolumeMesh, edges, hat_gradients
 from ..io import to_polydata
 from ..mesh import Mesh
 from ..models import cactus, random_limbs
@@ -111,7 +112,9 @@ def by_elasticity(
     """Return *start* (p, 3) with the *inner* points in balance, in linear elasticity."""
     corners = volume.corners
     used = corners.volumes > 0.0
-    _, gradient = gradient_operator(rest, corners.points[used])
+    ids, hats = corners.points[used], hat_gradients(edges(rest, corners.points[used]))
+    places = np.repeat(np.arange(hats.size // 4), 4), np.repeat(ids, 3, axis=0).ravel()
+    gradient = sparse.csr_array((hats.ravel(), places), (hats.size // 4, len(rest)))
     back, volumes = gradient.T.tocsr(), corners.volumes[used][:, None, None]
     lame = 2.0 * _POISSON / (1.0 - 2.0 * _POISSON)
     n_inner = int(np.count_nonzero(inner))

@@ -251,7 +251,7 @@ class Constraints:
         changes = {each.name: each.change(x) for each in volumes if each.name}
         return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
 
-    @property
+    @cached_property
     def unmoved(self) -> IntArray:
         """`Solution.unmoved`."""
         ids = np.concatenate([self.handle, self.fixed])

@@ -138,11 +138,13 @@ def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
     m = len(p)
     total = np.zeros((3 * m, 3 * m))  # its upper half; the transpose is in BLAS's order
     twists = _twists(energy.covariances(p))
+    size = sum((3 * len(columns)) ** 2 for _, columns, _ in energy.nonzero_rows)
+    kernels = compiled_kernels(size // NUMBERS_PER_FACE)
     for clusters, columns, reduced in energy.nonzero_rows:
         rows = (twists[clusters] @ reduced).reshape(-1, 3 * len(columns))  # T^T in M's own axes
         part = blas.dsyrk(1.0, rows.T, lower=1).T
         places = (m * np.arange(3)[:, None] + columns).ravel()
-        if kernels := compiled_kernels(part.size // NUMBERS_PER_FACE):
+        if kernels:
             kernels.add_upper(total, part, places)
         else:
             total[np.ix_(places, places)] += part
@@ -155,10 +157,31 @@ def _twists(covariances: FloatArray) -> FloatArray:
     stretched = rotations @ covariances
     symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
     trace = np.trace(symmetric, axis1=1, axis2=2)
-    stiffness, axes = np.linalg.eigh(trace[:, None, None] * np.eye(3) - symmetric)
-    stiffness = np.maximum(
-        stiffness, LEAST_STIFFNESS * np.abs(stiffness).max(axis=1, keepdims=True)
-    )
-    root = axes / np.sqrt(np.maximum(stiffness, np.finfo(float).tiny))[:, None]  # M^-1/2
+    root = _roots(trace[:, None, None] * np.eye(3) - symmetric)
     turned = (_EPSILON @ rotations).reshape(-1, 3, 9)  # T^T for each axis c of dp: eps_kic R_i.
-    return np.asarray((np.swapaxes(root, 1, 2) @ turned).reshape(-1, 9, 3))
+    return np.asarray((root @ turned).reshape(-1, 9, 3))
+
+
+def _roots(stiffness: FloatArray) -> FloatArray:
+    """Return U with U^T U = M^-1, (G, 3, 3), for each *stiffness* M; the least ones are raised."""
+    (a, _, _), (p, b, _), (q, r, c) = stiffness.transpose(1, 2, 0)
+    root = np.zeros(stiffness.shape)
+    trace = a + b + c
+    with np.errstate(all="ignore"):  # M = L L^T and U = L^-1, where M is firm
+        a = np.sqrt(a)
+        p, q = p / a, q / a
+        b = np.sqrt(b - p * p)
+        r = (r - p * q) / b
+        c = np.sqrt(c - q * q - r * r)
+        root[:, 0, 0], root[:, 1, 1], root[:, 2, 2] = 1.0 / a, 1.0 / b, 1.0 / c
+        root[:, 1, 0], root[:, 2, 1] = -p / (a * b), -r / (b * c)
+        root[:, 2, 0] = (p * r / b - q) / (a * c)
+        # The determinant is at most the least eigenvalue times trace^2.
+        is_firm = (a * b * c) ** 2 >= LEAST_STIFFNESS * trace**3
+    weak = np.flatnonzero(~is_firm)
+    if len(weak):
+        least, axes = np.linalg.eigh(stiffness[weak])
+        floor = LEAST_STIFFNESS * np.abs(least).max(axis=1, keepdims=True)
+        least = np.maximum(np.maximum(least, floor), np.finfo(float).tiny)
+        root[weak] = np.swapaxes(axes / np.sqrt(least)[:, None], 1, 2)
+    return root

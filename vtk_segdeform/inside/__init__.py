@@ -10,7 +10,7 @@ The files, in reading order:
     volume_files grids from and to files
 """
 
-from .cells import Corners, gradient_operator
+from .cells import Corners, edges, hat_gradients
 from .volume_files import require_volume_writable
 from .volume_mesh import VolumeMesh, VolumePose, volume_of
 
@@ -18,7 +18,8 @@ __all__ = [
     "Corners",
     "VolumeMesh",
     "VolumePose",
-    "gradient_operator",
+    "edges",
+    "hat_gradients",
     "require_volume_writable",
     "volume_of",
 ]

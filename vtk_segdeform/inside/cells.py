@@ -19,7 +19,6 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import sparse
 
 from ..arrays import FloatArray, IntArray
 
@@ -180,26 +179,10 @@ def determinants(rows: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ci,ci->c", rows[:, 0], np.cross(rows[:, 1], rows[:, 2])))
 
 
-def gradient_operator(rest: FloatArray, corners: IntArray) -> tuple[FloatArray, sparse.csr_array]:
-    """Return the gradients at corners of functions of the points, linear between them.
+def hat_gradients(rows: FloatArray) -> FloatArray:
+    """Return the derivatives (c, 3, 4), by each coordinate, of the functions that are 1 at a point.
 
-    Parameters
-    ----------
-    rest : (p, 3) float
-        The points at rest.
-    corners : (c, 4) int
-        Each with its three neighbours.
-
-    Returns
-    -------
-    hats : (c, 3, 4) float
-        The derivative by each coordinate of the function that is 1 at one of the four points.
-    operator : (3 c, p) sparse
-        Its rows 3 k + j give the derivative by coordinate j at corner k.
+    They are linear, and 0 at the other three points; *rows* (c, 3, 3) are the edges from the first.
     """
-    inverse = np.linalg.inv(edges(rest, corners))
-    hats = np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)
-    rows = np.repeat(np.arange(3 * len(corners)), 4)
-    columns = np.repeat(corners, 3, axis=0).ravel()
-    shape = 3 * len(corners), len(rest)
-    return hats, sparse.csr_array((hats.ravel(), (rows, columns)), shape)
+    inverse = np.linalg.inv(rows)
+    return np.concatenate([-inverse.sum(axis=2, keepdims=True), inverse], axis=2)

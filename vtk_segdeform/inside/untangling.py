@@ -32,11 +32,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
-from ..arrays import BoolArray, FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
+from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs
 from ..progress import Progress, tell
-from .cells import Corners, cofactors, determinants, edges, gradient_operator
+from .cells import Corners, cofactors, determinants, edges, hat_gradients
 
 _FLAT = 1e-9  # determinant, relative to the product of the lengths
 _STEPS, _HALVINGS = 60, 15
@@ -45,6 +45,8 @@ _HARMONIC, _DIRECTION = 1e-4, 0.1  # residuals of conjugate gradients, relative
 _ROUNDS = 1000
 _SLOPE = 1e-4  # share of the predicted decrease that a step must reach
 _EPS, _TIMES = 1e-4, 0.04  # eps^2
+_FACES_PER_CORNER = 20  # of a volume, that take as long
+_SUMS = 4  # of parts of the corners, so that results do not depend on the number of threads
 _Linear = Callable[[FloatArray], FloatArray]
 
 
@@ -115,13 +117,10 @@ class _State(NamedTuple):
 
     value: float
     d: FloatArray
-    gradients: FloatArray
-    cofactors: FloatArray
-    chi: FloatArray
-    slope: FloatArray
-    """chi'."""
-    angles: FloatArray
-    """|J|^2 / (3 chi^(2/3))."""
+    terms: FloatArray
+    """(c, 22): J, its cofactors C, and a, s, b, k.  The slope of the energy is a J + s C, and the
+    positive part of its Hessian is a |P|^2 + 2 b (J : P) (C : P) + k (C : P)^2 for a change P of J.
+    """
 
 
 class _Energy:
@@ -132,55 +131,43 @@ class _Energy:
         found, lengths = determinants(spanned), np.linalg.norm(spanned, axis=2)
         used = corners.signs * found > _FLAT * lengths.prod(axis=1)
         used &= (corners.volumes > 0.0) & free[corners.points].any(axis=1)
-        ids = corners.points[used]
-        self._hats, self._gradient = gradient_operator(rest, ids)
-        self._ids, self._volumes = ids, corners.volumes[used]
+        hats = np.swapaxes(hat_gradients(spanned[used]), 1, 2).reshape(-1, 12)
+        self._ids, self._hats, self._volumes = inputs(
+            corners.points[used], hats, corners.volumes[used]
+        )
         self._rest, self._free = rest, free
-        self._back = self._gradient.T.tocsr()
+        self._rough = hats.astype(np.float32)  # enough for directions, whose products take longest
 
     def harmonic(self, start: FloatArray) -> FloatArray:
         """Return *start* with harmonic displacements at the free points."""
-        weights = sparse.diags_array(np.repeat(self._volumes, 3))
-        laplacian = (self._back @ weights @ self._gradient).tocsr()
+        terms = np.zeros((len(self._ids), 22))
+        terms[:, 18] = self._volumes
+        laplacian, diagonal = self._hessian(terms)
         moves = np.where(self._free[:, None], 0.0, start - self._rest)
-        own = laplacian[self._free]
-        inner = own[:, self._free]
-        scale = _inverted(inner.diagonal())[:, None]
-        found = np.stack(
-            [
-                _conjugate_gradients(lambda p: inner @ p, scale, right[:, None], _HARMONIC)[:, 0]
-                for right in -(own @ moves).T
-            ],
-            axis=1,
+        moves[self._free] = _conjugate_gradients(
+            lambda p: self._spread(laplacian, p),
+            _inverted(diagonal),
+            -laplacian(moves)[self._free],
+            _HARMONIC,
         )
-        moves[self._free] = found
         return np.asarray(self._rest + moves)
 
     def at(self, x: FloatArray, eps: float) -> _State:
         """Return E at *x* (p, 3); its value is infinite if *eps* is 0 and a corner is inverted."""
-        gradients = (self._gradient @ x).reshape(-1, 3, 3)
-        cofactor = cofactors(gradients)
-        d = np.einsum("ci,ci->c", gradients[:, 0], cofactor[:, 0])
-        root = np.sqrt(d**2 + eps**2)
-        chi, slope = d, np.ones_like(d)
-        if eps:
-            with np.errstate(divide="ignore"):
-                chi = np.where(d > 0.0, 0.5 * (d + root), 0.5 * eps**2 / (root - d))
-            slope = chi / root
-        elif d.min(initial=1.0) <= 0.0:
-            return _State(np.inf, d, gradients, cofactor, chi, slope, chi)
-        angles = np.einsum("cij,cij->c", gradients, gradients) / (3.0 * chi ** (2.0 / 3.0))
-        value = float(self._volumes @ (angles + 0.5 * (d**2 + 1.0) / chi))
-        return _State(value, d, gradients, cofactor, chi, slope, angles)
+        terms, found = np.empty((len(self._ids), 22)), np.empty((len(self._ids), 2))
+        kernels = compiled_kernels(_FACES_PER_CORNER * len(self._ids))
+        compute = kernels.corner_terms if kernels else _corner_terms
+        given = self._ids, self._hats, self._volumes, *inputs(x)
+        in_parallel(
+            lambda start, stop: compute(*given, eps, terms, found, start, stop),
+            len(terms),
+            ROWS_AT_ONCE,
+        )
+        return _State(float(found[:, 1].sum()), found[:, 0], terms)
 
     def slope(self, state: _State) -> FloatArray:
         """Return the derivative of E by the free points (k, 3)."""
-        _, d, gradients, cofactor, chi, slope, angles = state
-        by_gradient = self._volumes * (2.0 / 3.0) * chi ** (-2.0 / 3.0)
-        by_volume = d / chi - slope / chi * (2.0 / 3.0 * angles + 0.5 * (d**2 + 1.0) / chi)
-        forces = by_gradient[:, None, None] * gradients
-        forces += (self._volumes * by_volume)[:, None, None] * cofactor
-        return np.asarray((self._back @ forces.reshape(-1, 3))[self._free])
+        return self._forces(state.terms)[self._free, :3]
 
     def direction(self, state: _State, slope: FloatArray) -> FloatArray:
         """Return a step of Newton's method, (k, 3), from the derivative *slope*."""
@@ -188,42 +175,117 @@ class _Energy:
         return _conjugate_gradients(hessian, _inverted(diagonal), -slope, _DIRECTION)
 
     def hessian(self, state: _State) -> tuple[_Linear, FloatArray]:
-        """Return the positive part of the Hessian as a function, and its diagonal (k, 3).
+        """Return the positive part of the Hessian as a function, and its diagonal (k, 3)."""
+        product, diagonal = self._hessian(state.terms)
+        return lambda moves: self._spread(product, moves), diagonal
 
-            a |P|^2 + 2 b (J : P) (C : P) + k (C : P)^2        for a change P of J
-
-        C are the cofactors of J.
-        """
-        _, d, gradients, cofactor, chi, slope, angles = state
-        a = self._volumes * (2.0 / 3.0) * chi ** (-2.0 / 3.0)
-        b = -2.0 / 3.0 * a * slope / chi
-        k = (10.0 / 9.0) * angles * (slope / chi) ** 2
-        k += (1.0 - d * slope / chi) ** 2 / chi + slope**2 / chi**3
-        k *= self._volumes
-        own, other = gradients.reshape(-1, 9), cofactor.reshape(-1, 9)
+    def _spread(self, product: _Linear, moves: FloatArray) -> FloatArray:
+        """Return *product* at the free points for *moves* (k, 3) of them alone."""
         whole = np.zeros_like(self._rest)
+        whole[self._free] = moves
+        return product(whole)[self._free]
 
-        def times(moves: FloatArray) -> FloatArray:
-            whole[self._free] = moves
-            change = (self._gradient @ whole).reshape(-1, 9)
-            along = np.einsum("ci,ci->c", other, change)
-            forces = a[:, None] * change
-            forces += (b * along)[:, None] * own
-            forces += (b * np.einsum("ci,ci->c", own, change) + k * along)[:, None] * other
-            return np.asarray((self._back @ forces.reshape(-1, 3))[self._free])
+    def _hessian(self, terms: FloatArray) -> tuple[_Linear, FloatArray]:
+        """Return the Hessian of all points (p, 3) as a function, and its diagonal (k, 3)."""
+        hats, read = inputs(self._rough, terms.astype(np.float32))
 
-        diagonal = np.zeros_like(self._rest)
-        for corner in range(4):
-            hat = self._hats[:, :, corner]
-            j = np.einsum("cji,cj->ci", gradients, hat)
-            c = np.einsum("cji,cj->ci", cofactor, hat)
-            values = a[:, None] * np.einsum("cj,cj->c", hat, hat)[:, None]
-            values = values + 2.0 * b[:, None] * j * c + k[:, None] * c**2
-            for axis in range(3):
-                diagonal[:, axis] += np.bincount(
-                    self._ids[:, corner], values[:, axis], len(diagonal)
-                )
-        return times, diagonal[self._free]
+        def product(moves: FloatArray) -> FloatArray:
+            kernels = compiled_kernels(_FACES_PER_CORNER * len(self._ids))
+            add = kernels.add_corner_products if kernels else _add_corner_products
+            (given,) = inputs(moves)
+            return self._sum(lambda *part: add(self._ids, hats, read, given, *part), 3)
+
+        return product, self._forces(terms)[self._free, 3:]
+
+    def _forces(self, terms: FloatArray) -> FloatArray:
+        """Return the slope and the diagonal of the Hessian at all points, (p, 6)."""
+        kernels = compiled_kernels(_FACES_PER_CORNER * len(self._ids))
+        add = kernels.add_corner_forces if kernels else _add_corner_forces
+        given = self._ids, self._hats, *inputs(terms)
+        return self._sum(lambda *part: add(*given, *part), 6)
+
+    def _sum(self, add: Callable[[FloatArray, int, int], None], columns: int) -> FloatArray:
+        """Return the sum (p, columns) over all corners of what *add* adds for some of them."""
+        share = -(-len(self._ids) // _SUMS)
+        sums = np.zeros((_SUMS, len(self._rest), columns))
+        in_parallel(
+            lambda start, stop: add(sums[start // share], start, stop), len(self._ids), share
+        )
+        return np.asarray(sums.sum(axis=0))
+
+
+def _corner_terms(
+    ids: IntArray,
+    hats: FloatArray,
+    volumes: FloatArray,
+    x: FloatArray,
+    eps: float,
+    terms: FloatArray,
+    found: FloatArray,
+    start: int,
+    stop: int,
+) -> None:
+    """Do `kernels.compiled.corners.corner_terms`."""
+    some = slice(start, stop)
+    own = np.einsum("cqj,cqi->cji", hats[some].reshape(-1, 4, 3), x[ids[some]])
+    other, v = cofactors(own), volumes[some]
+    d = np.einsum("ci,ci->c", own[:, 0], other[:, 0])
+    chi, rate = d, 1.0 / d
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if eps:
+            root = np.sqrt(d**2 + eps**2)
+            chi = np.where(d > 0.0, 0.5 * (d + root), 0.5 * eps**2 / (root - d))
+            rate = 1.0 / root
+        angles = np.einsum("cij,cij->c", own, own) / (3.0 * chi ** (2.0 / 3.0))
+        bulk = 0.5 * (d**2 + 1.0) / chi
+        a = v * (2.0 / 3.0) * chi ** (-2.0 / 3.0)
+        found[some, 0] = d
+        found[some, 1] = np.where(chi > 0.0, v * (angles + bulk), np.inf)
+        terms[some, :9], terms[some, 9:18] = own.reshape(-1, 9), other.reshape(-1, 9)
+        terms[some, 18] = a
+        terms[some, 19] = v * (d / chi - rate * (2.0 / 3.0 * angles + bulk))
+        terms[some, 20] = -2.0 / 3.0 * a * rate
+        k = (10.0 / 9.0) * angles * rate**2 + ((1.0 - d * rate) ** 2 + rate**2) / chi
+        terms[some, 21] = v * k
+
+
+def _add_corner_forces(
+    ids: IntArray, hats: FloatArray, terms: FloatArray, out: FloatArray, start: int, stop: int
+) -> None:
+    """Do `kernels.compiled.corners.add_corner_forces`."""
+    some = slice(start, stop)
+    hat = hats[some].reshape(-1, 4, 3)
+    own, other = (terms[some, k : k + 9].reshape(-1, 3, 3) for k in (0, 9))
+    a, s, b, k = terms[some, 18:, None, None].swapaxes(0, 1)
+    j, c = hat @ own, hat @ other
+    square = (hat**2).sum(axis=2, keepdims=True)
+    diagonal = a * square + 2.0 * b * j * c + k * c**2
+    _add(out, ids[some], np.concatenate([a * j + s * c, diagonal], axis=2))
+
+
+def _add_corner_products(
+    ids: IntArray,
+    hats: FloatArray,
+    terms: FloatArray,
+    moves: FloatArray,
+    out: FloatArray,
+    start: int,
+    stop: int,
+) -> None:
+    """Do `kernels.compiled.corners.add_corner_products`."""
+    some = slice(start, stop)
+    hat, own, other = hats[some].reshape(-1, 4, 3), terms[some, :9], terms[some, 9:18]
+    change = np.einsum("cqj,cqi->cji", hat, moves[ids[some]]).reshape(-1, 9)
+    a, _, b, k = terms[some, 18:, None].swapaxes(0, 1)
+    along, align = ((each * change).sum(axis=1, keepdims=True) for each in (other, own))
+    forces = a * change + b * along * own + (b * align + k * along) * other
+    _add(out, ids[some], hat @ forces.reshape(-1, 3, 3))
+
+
+def _add(out: FloatArray, ids: IntArray, values: FloatArray) -> None:
+    """Add *values* (c, 4, k) to the rows *ids* (c, 4) of *out* (p, k)."""
+    for column in range(out.shape[1]):
+        out[:, column] += np.bincount(ids.ravel(), values[:, :, column].ravel(), len(out))
 
 
 def _inverted(diagonal: FloatArray) -> FloatArray:

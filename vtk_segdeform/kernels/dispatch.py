@@ -150,6 +150,7 @@ def _load() -> None:
         _is_late[0] = _is_late[0] and bool(_does_without[0])
 
 
+@functools.cache
 def _is_enabled() -> bool:
     return os.environ.get("SEGDEFORM_NUMBA", "1") != "0"
 

@@ -15,6 +15,8 @@ H. F. Walker, P. Ni, "Anderson acceleration for fixed-point iterations", SIAM J.
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 
 from ..arrays import FloatArray
@@ -30,6 +32,10 @@ class Anderson:
     def __init__(self, window: int) -> None:
         self.window = window
         self.forget()
+
+    def copy(self) -> Anderson:
+        """Return another with the same steps."""
+        return copy.copy(self)  # lists and arrays are replaced, never changed
 
     def forget(self) -> None:
         """Discard all steps."""

@@ -15,6 +15,8 @@ show.
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,14 +77,14 @@ class Way:
             return None
         pairs = zip(self.ends[1:], self.ends, strict=False)
         lengths = [float(np.linalg.norm(b.targets - a.targets)) for b, a in pairs]
-        t = np.concatenate([[0.0], np.cumsum(lengths)])
+        t = list(itertools.accumulate(lengths, initial=0.0))
         p = [end.p for end in self.ends]
         degree = _best_degree(p, t)
         there = _extrapolated(p, t, t[-1] + share * lengths[-1], degree)
         return there, last.directions
 
 
-def _best_degree(p: Sequence[FloatArray], t: FloatArray) -> int:
+def _best_degree(p: Sequence[FloatArray], t: Sequence[float]) -> int:
     """Return the degree that comes closest to the last of *p* at *t* (k,) from those before it."""
     off = [
         float(np.linalg.norm(_extrapolated(p[:-1], t[:-1], t[-1], degree) - p[-1]))
@@ -91,10 +93,12 @@ def _best_degree(p: Sequence[FloatArray], t: FloatArray) -> int:
     return 1 + int(np.argmin(off)) if off else 1
 
 
-def _extrapolated(p: Sequence[FloatArray], t: FloatArray, at: float, degree: int) -> FloatArray:
+def _extrapolated(
+    p: Sequence[FloatArray], t: Sequence[float], at: float, degree: int
+) -> FloatArray:
     """Return the polynomial of *degree* through the last of *p* at *t* (Lagrange), there *at*."""
     own, found = t[-degree - 1 :], np.zeros_like(p[-1])
     for k, each in enumerate(p[-degree - 1 :]):
-        others = np.delete(own, k)
-        found += np.prod((at - others) / (own[k] - others)) * each
+        others = [other for j, other in enumerate(own) if j != k]
+        found += math.prod((at - other) / (own[k] - other) for other in others) * each
     return found

@@ -30,8 +30,8 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    and rotations follow one step behind: where much turns, hundreds of steps are needed, and a small
    step does not mean that the minimum is near.  With the derivatives of the rotations and of the
    volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
-   takes as long as some 12 steps.  So the paper's H is used first, and H is computed at the present
-   pose if steps at the present rate would not converge within 12 steps, or those that are left, and
+   takes as long as some 4 steps.  So the paper's H is used first, and H is computed at the present
+   pose if steps at the present rate would not converge within 4 steps, or those that are left, and
    if no share of a step lowers the objective.  An H of the same call serves 5 steps at least, which
    fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
    rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
@@ -78,7 +78,7 @@ from .volume_constraints import Volumes, gradients, violations
 
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
-_COST = 12  # of computing H again, in steps
+_COST = 4  # of computing H again, in steps
 _SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
@@ -166,7 +166,7 @@ class _State:
 
     def copy(self) -> _State:
         """Return a state from which another solver continues."""
-        return replace(self, acceleration=copy.deepcopy(self.acceleration))
+        return replace(self, acceleration=self.acceleration.copy())
 
 
 @dataclass(eq=False)

@@ -126,15 +126,28 @@ class VolumeConstraint:
         The Hessian is d^2 g / dx_ia dx_jb = sum_c eps_abc (U_c - U_c^T)_ij; U_c of
         det(x_i, x_j, x_k) / 6 is the axis c of x_k / 6.  *weights* (m,) multiply it for each face.
         """
+        points = self.extended(x) / 6.0
+        face, tail, columns, opposite = self._half_edges
+        starts = np.searchsorted(tail, np.arange(len(points) + 1))
+        values = points[opposite].T
+        if weights is not None:
+            values = weights[face] * values
+        n = len(points)
+        if self.extension is None:
+            begins = len(face) * np.arange(3)[:, None] + starts[:-1]
+            rows = np.append(begins.ravel(), values.size)
+            return sparse.csr_array((values.ravel(), np.tile(columns, 3), rows), (3 * n, n))
+        halves = (sparse.csr_array((each, columns, starts), (n, n)) for each in values)
+        return sparse.csr_array(
+            sparse.vstack([self.extension.T @ half @ self.extension for half in halves])
+        )
+
+    @cached_property
+    def _half_edges(self) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+        """The half-edges of the faces by their first end: face, both ends, the third corner."""
         i, j, k = (np.concatenate(np.roll(self.faces.T, -turn, axis=0)) for turn in range(3))
-        points, weight = self.extended(x) / 6.0, 1.0 if weights is None else np.tile(weights, 3)
-        halves = [
-            sparse.coo_array((weight * axis[k], (i, j)), (len(points), len(points))).tocsr()
-            for axis in points.T
-        ]
-        if self.extension is not None:
-            halves = [self.extension.T @ half @ self.extension for half in halves]
-        return sparse.csr_array(sparse.vstack(halves))
+        order = np.argsort(i, kind="stable")
+        return order % len(self.faces), i[order], j[order], k[order]
 
     def exact_step(self, path: FloatArray) -> float:
         """Return the smallest t with g(x + t d) = 0, to rounding; x and d side by side (n, 6)."""

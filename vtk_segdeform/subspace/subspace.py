@@ -79,6 +79,16 @@ class Subspace(Frozen):
         return compiled_kernels(size) is not None
 
     @cached_property
+    def _pieces(self) -> list[tuple[IntArray, FloatArray | InterpolatedBlock, slice]]:
+        """The rows, the block, as a kernel takes them, and the columns of each region."""
+        pieces = []
+        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+            if not isinstance(block, InterpolatedBlock):
+                rows, block = inputs(rows, block)
+            pieces.append((rows, block, columns))
+        return pieces
+
+    @cached_property
     def _rows_of(self) -> sparse.csr_array:
         """(n, r) int: 1 + the row of each vertex in the block of each region; 0 is outside."""
         each = [np.arange(1, len(rows) + 1) for rows in self.rows]
@@ -93,7 +103,7 @@ class Subspace(Frozen):
         """
         make = np.zeros if base is None else np.empty
         x = make((self.n_vertices, p.shape[1]))
-        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+        for rows, block, columns in self._pieces:
             if isinstance(block, InterpolatedBlock):
                 _add_interpolated(x, rows, block, p[columns], base)
             else:
@@ -104,11 +114,16 @@ class Subspace(Frozen):
     def adjoint(self, y: FloatArray) -> FloatArray:
         """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
         p = np.empty((self.n_columns, y.shape[1]))
-        for rows, block, columns in zip(self.rows, self.blocks, self.columns, strict=True):
+        kernels = compiled_kernels() if self._is_compiled and y.shape[1] == 3 else None
+        y = writable(y) if kernels else y
+        for rows, block, columns in self._pieces:
             if isinstance(block, InterpolatedBlock):
                 p[columns] = block.adjoint(y[rows])
+            elif kernels:
+                kernels.add_adjoint(total := np.zeros((3, block.shape[1])), rows, block, y)
+                p[columns] = total.T
             else:
-                p[columns] = _adjoint_product(rows, block, y, compiled=self._is_compiled)
+                p[columns] = _adjoint_product(rows, block, y)
         return p
 
     def at(self, vertices: IntArray) -> FloatArray:
@@ -207,19 +222,21 @@ def _add_product(
 ) -> None:
     """Add block @ p to the *rows* of x, in double precision whatever the block is in.
 
+    *rows* and *block* are as `inputs` returns them.
+
     With *base* (n, 3), the first three columns of x (n, k) are first set to it and the others to
     0: piece by piece, while a piece is in the cache.
     """
     kernels = compiled_kernels() if compiled and p.shape[1] % 3 == 0 else None
     size = max(_CACHED_NUMBERS // block.shape[1], 1)
     if kernels:
-        arguments = *inputs(rows, block), writable(p.T)
+        by_column = writable(p.T)
         size = max(8 * size, -(-len(rows) // 16))  # a call takes some microseconds
 
     def add(start: int, stop: int) -> None:
         _begin_rows(x, rows, base, start, stop)
         if kernels:
-            kernels.add_product(x, *arguments, start, stop)
+            kernels.add_product(x, rows, block, by_column, start, stop)
         else:
             x[rows[start:stop]] += _double(block[start:stop]) @ p
 
@@ -267,15 +284,8 @@ def _begin_rows(
         x[first:last, :3] = base[first:last]
 
 
-def _adjoint_product(
-    rows: IntArray, block: FloatArray, y: FloatArray, *, compiled: bool
-) -> FloatArray:
+def _adjoint_product(rows: IntArray, block: FloatArray, y: FloatArray) -> FloatArray:
     """Return block.T @ y[rows], in double precision."""
-    kernels = compiled_kernels() if compiled and y.shape[1] == 3 else None
-    if kernels:
-        total = np.zeros((3, block.shape[1]))
-        kernels.add_adjoint(total, *inputs(rows, block), writable(y))
-        return total.T
     p = np.zeros((block.shape[1], y.shape[1]))
     for piece in row_pieces(len(rows), block.shape[1]):
         p += _double(block[piece]).T @ y[rows[piece]]

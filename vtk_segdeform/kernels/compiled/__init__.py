@@ -8,6 +8,7 @@
     normals         `normals.VertexNormals`
     rotations       `rotations.closest_rotations`, `cell_energy.CellEnergy`
     cells           `cell_energy.CellEnergy`
+    corners         `untangling.inner_points`
     factor          `hessian.Factor`, `finish.factor.factored`
     collapses       `simplify.simplify`
     half_edges      `topology.HalfEdges`, `grouping.connected`, `grouping.first_equal_row`
@@ -21,6 +22,7 @@ are positional, as numba requires, and outputs are arrays passed as arguments.
 
 from .cells import cell_forces, cell_sums, spread_cells
 from .collapses import collapse_costs, independent_edges, sorted_edges, valid_collapses
+from .corners import add_corner_forces, add_corner_products, corner_terms
 from .crossings import grow_tree, may_meet, touching_boxes
 from .factor import add_upper, solve_factored, solve_sparse
 from .half_edges import (
@@ -53,6 +55,8 @@ from .volumes import (
 
 __all__ = [
     "add_adjoint",
+    "add_corner_forces",
+    "add_corner_products",
     "add_interpolated",
     "add_interpolated_adjoint",
     "add_product",
@@ -63,6 +67,8 @@ __all__ = [
     "cell_forces",
     "cell_sums",
     "collapse_costs",
+    "corner_terms",
+    "corners_of_lines",
     "determinants",
     "facing_pairs",
     "first_equal_points",
