@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vtk_segdeform.benchmarks import (
+    batching,
     constrained,
     drags,
     felt,
@@ -27,7 +28,7 @@ from vtk_segdeform.widgets.handle_dragger import STEPS
 
 TINY = Scale(
     "tiny", paper_size=500, n_cage_vertices=60, drag_sizes=(600,), repeats=1, regions=(2,),
-    peer_sizes=(500,), mechanism_bodies=1,
+    peer_sizes=(500,), mechanism_bodies=1, batch=(2, 2, 600),
 )  # fmt: skip
 
 
@@ -171,6 +172,22 @@ def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
     assert (still.steps, still.early) == (1, still.volume_change)
     assert still.handle_error < 1e-9
     assert still.distortion < 1e-6
+
+
+@pytest.mark.campaign
+def test_batches_are_measured(monkeypatch):
+    monkeypatch.setenv("SEGDEFORM_CACHE", "")  # restored, since it changes
+    monkeypatch.setattr(batching, "_LARGE", 700)
+    monkeypatch.setattr(batching, "_TASKS", 3)
+    monkeypatch.setattr(batching, "in_own_process", lambda work, *given: work(*given))
+    (table,) = batching.run(TINY).tables
+    found = dict(table.rows)
+    assert found["same bytes"] == "yes"
+    assert found["poses without vertices"] == 0
+    assert found["largest volume change"] < 1e-12
+    assert found["bytes of a pose"] % 24 == 0
+    assert found["bytes of the file for each pose"] > found["bytes of a pose"]
+    assert found["one process / two"] == found["one process, s"] / found["two processes, s"]
 
 
 def test_iterations_end_near_their_limit_and_not_where_they_are_slow():

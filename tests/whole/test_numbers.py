@@ -24,7 +24,7 @@ PAGES = [
     *(
         ROOT / "docs" / f"{name}.rst"
         for name in (
-            "comparison", "constraints", "landmarks", "mathematics", "speed", "volumes",
+            "batch", "comparison", "constraints", "landmarks", "mathematics", "speed", "volumes",
         )
     ),
 ]  # fmt: skip

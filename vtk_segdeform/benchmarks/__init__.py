@@ -12,6 +12,7 @@ The files, in reading order:
     opening       from opening a file to a surface that follows the pointer
     atlas         bodies fitted to landmarks, beside a thin-plate spline
     mechanisms    what each mechanism of the solver buys
+    batching      batches by one process and by two
     paper         tables 1 and 2 of the paper
     peers         the same poses by libigl
     solids        volume meshes, beside radial basis functions and linear elasticity

@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import Cancelled, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import atlas, constrained, felt, mechanisms, opening, paper, peers, solids
+from . import atlas, batching, constrained, felt, mechanisms, opening, paper, peers, solids
 from .measuring import conditions
 from .results import Scale, Section
 from .tasks import warm_up
@@ -22,6 +22,7 @@ EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "open": opening.run,
     "landmarks": atlas.run,
     "mechanisms": mechanisms.run,
+    "batch": batching.run,
     "paper": paper.run,
     "peers": peers.run,
     "solids": solids.run,

@@ -21,6 +21,7 @@ class Scale:
     regions: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 12, 16, 24)  # of the paper's table 2
     peer_sizes: tuple[int, ...] = (5430,)
     mechanism_bodies: int = 3
+    batch: tuple[int, int, int] = (10, 20, 5430)  # meshes, poses of each, vertices
 
 
 QUICK = Scale("quick", repeats=3, regions=(1, 3, 6, 12, 24), mechanism_bodies=1)
