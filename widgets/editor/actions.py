@@ -121,7 +121,7 @@ def opening(path: Path) -> Action:
     return lambda controller: controller.open(path)
 
 
-def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
+def saving(path: Path, then: Callable[[bool], object] = bool) -> Action:
     """Return the action that saves the session to *path*, which becomes its file.
 
     A pose that still converges is saved once it has settled, and *then* is called.
