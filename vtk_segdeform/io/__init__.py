@@ -25,7 +25,6 @@ The files, in reading order:
     meshlab            further file formats, by PyMeshLab
 """
 
-from .array_names import IS_ROUNDING
 from .convert import (
     as_polydata,
     from_polydata,
@@ -48,7 +47,6 @@ from .surface import Surface, read_mesh
 from .vtk_formats import read_data_set, write_with_vtk
 
 __all__ = [
-    "IS_ROUNDING",
     "Surface",
     "as_polydata",
     "follow",

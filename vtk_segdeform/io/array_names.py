@@ -27,7 +27,6 @@ from ..geometry import signed_volume
 
 HEADER = "Header"  # a field array with the title of a file, in formats that have one
 COMMENTS = "Comments"  # a field array with the comments of a file, likewise
-IS_ROUNDING = "segdeform_rounding"  # an attribute of the log records of rounded coordinates
 _log = logging.getLogger(__name__)
 # Of the size, and of the volume: the command line tells errors to 0.001 % of the size.
 _VISIBLE = 1e-5
@@ -259,8 +258,7 @@ def warn_of_rounding(what: str, faces: IntArray, meant: FloatArray, stored: Floa
     share = f" ({100.0 * moved / size:.2g} % of model size)" if size else ""
     _log.warning(
         "%s: vertices moved by up to %.2g%s%s; .ply and .vtp keep all digits, or move the model "
-        "to the origin",
-        what, moved, share, volume, extra={IS_ROUNDING: True},
+        "to the origin", what, moved, share, volume,
     )  # fmt: skip
 
 

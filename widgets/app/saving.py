@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +44,7 @@ def save_mesh(window: Any) -> bool:
     path = window.document.mesh_path
     if path is None:
         return save_mesh_as(window)
-    return _done(window, exporting(path, partial(_mesh_saved, window, path)))
+    return _done(window, exporting(path, lambda: _mesh_saved(window, path)))
 
 
 def save_mesh_as(window: Any) -> bool:
@@ -53,7 +52,7 @@ def save_mesh_as(window: Any) -> bool:
     source = window.document.source
     suffix = ".ply" if source is None else source.suffix
     path = _path(window, "Save mesh", file_types(sessions=False), suffix)
-    return path is not None and _done(window, exporting(path, partial(_mesh_saved, window, path)))
+    return path is not None and _done(window, exporting(path, lambda: _mesh_saved(window, path)))
 
 
 def export_picture(window: Any) -> bool:
@@ -92,7 +91,7 @@ def _mesh_saved_now(window: Any) -> bool:
 
 
 def _mesh_is_saved(window: Any) -> bool:
-    """Return whether a file contains the mesh as it is, without visible rounding."""
+    """Return whether a file contains the mesh as it is."""
     return bool(window.mesh_state is window.session.state)
 
 
@@ -111,9 +110,9 @@ def _session_saved(window: Any, path: Path) -> None:
     window.recent.add(path)
 
 
-def _mesh_saved(window: Any, path: Path, is_rounded: bool) -> None:
+def _mesh_saved(window: Any, path: Path) -> None:
     window.editor.controller.file.is_new = False
-    window.mesh_state = None if is_rounded else window.session.state
+    window.mesh_state = window.session.state
     window.set_document(replace(window.document, mesh_path=path))
 
 

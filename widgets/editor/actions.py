@@ -121,7 +121,7 @@ def opening(path: Path) -> Action:
     return lambda controller: controller.open(path)
 
 
-def saving(path: Path, then: Callable[[bool], object] = bool) -> Action:
+def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that saves the session to *path*, which becomes its file.
 
     A pose that still converges is saved once it has settled, and *then* is called.
@@ -135,12 +135,12 @@ def saving(path: Path, then: Callable[[bool], object] = bool) -> Action:
     return once_settled(save)
 
 
-def exporting(path: Path, then: Callable[[bool], object] = bool) -> Action:
+def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
     The suffix selects the format, which may not support all arrays and digits: see `io.write_mesh`;
-    what is lost is said.  A pose that still converges is written once it has settled.  *then* is
-    called with whether positions are visibly rounded.
+    what is lost is said.
+    A pose that still converges is written once it has settled, and *then* is called.
     """
 
     def export(controller: Controller) -> None:
@@ -148,10 +148,10 @@ def exporting(path: Path, then: Callable[[bool], object] = bool) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        remarks, is_rounded = write_posed(session, path)
+        remarks = write_posed(session, path)
         saved = f"Mesh saved to {path}{pose_remark(session)}"
         controller.say(". ".join([saved, *remarks]))
-        then(is_rounded)
+        then()
 
     return once_settled(export)
 

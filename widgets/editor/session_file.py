@@ -91,30 +91,23 @@ def pose_remark(session: Session) -> str:
     return ". The pose had not settled" if session.is_unsettled else ""
 
 
-def write_posed(session: Session, path: Path) -> tuple[tuple[str, ...], bool]:
-    """Write the surface of *session* in its pose.
-
-    Return what the format cannot store, in sentences, and whether it rounds visibly.
-    """
-    imported("vtk_segdeform.io")
-    from vtk_segdeform.io import IS_ROUNDING
-
+def write_posed(session: Session, path: Path) -> tuple[str, ...]:
+    """Write the surface of *session* in its pose; return what the format cannot store."""
     with _warnings() as warnings:
         session.write_deformed(path)
-    remarks = tuple(_shortened(each.getMessage()) for each in warnings)
-    return remarks, any(hasattr(each, IS_ROUNDING) for each in warnings)
+    return tuple(map(_shortened, warnings))
 
 
 @contextmanager
-def _warnings() -> Iterator[list[logging.LogRecord]]:
+def _warnings() -> Iterator[list[str]]:
     """Collect what writing a file in this thread logs inside a ``with`` block."""
-    found: list[logging.LogRecord] = []
+    found: list[str] = []
     handler, logger = logging.Handler(logging.WARNING), logging.getLogger("vtk_segdeform.io")
     thread = threading.get_ident()
 
     def collect(record: logging.LogRecord) -> None:
         if record.thread == thread:
-            found.append(record)
+            found.append(record.getMessage())
 
     handler.emit = collect  # type: ignore[method-assign]
     logger.addHandler(handler)

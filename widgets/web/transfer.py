@@ -168,7 +168,7 @@ class Transfer:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if place.suffix != _SESSION:
-            return write_posed(session, place)[0]
+            return write_posed(session, place)
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
         return ()

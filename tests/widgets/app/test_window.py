@@ -219,21 +219,18 @@ def test_a_mesh_that_lost_digits_is_told_of_and_closes_no_window(
     words = hand.window.editor_widget.panel.status.words
     choose_file(monkeypatch, tmp_path / "posed.stl")
     hand.choose("File", "Save mesh as")
-    until(
-        lambda: "STL stores single precision: vertices moved by up to 0.25" in words.text(),
-        "the loss",
-    )
+    until(lambda: "In the file, vertices moved by up to 0.25" in words.text(), "the loss")
     assert ", the volume changed by " in words.text()
     boxes.answers.append("Save mesh ...")
     assert not hand.window.close()
     assert "regions, cages and handles" not in boxes.seen[-1]  # the mesh itself is not saved
-    assert "STL stores" in words.text()
+    assert "In the file" in words.text()
     choose_file(monkeypatch, tmp_path / "posed.ply")
     hand.choose("File", "Save mesh as")
     boxes.answers.append("Cancel")
     assert not hand.window.close()
     assert "regions, cages and handles" in boxes.seen[-1]
-    until(lambda: "STL stores" not in words.text(), "the new message")
+    until(lambda: "In the file" not in words.text(), "the new message")
 
 
 @BLANK
