@@ -98,11 +98,11 @@ def deform(options: Namespace, say: Say, progress: Progress) -> bool:
     solution = solved_along(deformer, path, progress=part(progress, 0.9, 0.95))
     solution = finished(deformer, solution, options.refine, progress=part(progress, 0.95, 1.0))
     seconds = time.perf_counter() - start
-    inside = written(surface, solution, options, volume=volume)
-    report_solution(solution, seconds, say, has_handle=len(handle) > 0)
-    report_goals(solution, surface, options.input, say)
-    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
-    report_approximate(solution, options, say)
+    stored, inside = written(surface, solution, options, volume=volume)
+    report_solution(stored, seconds, say, has_handle=len(handle) > 0)
+    report_goals(stored, surface, options.input, say)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(options.picture, mesh, solution.vertices, fixed=fixed, handle=handle)

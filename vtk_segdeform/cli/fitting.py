@@ -12,7 +12,7 @@ import numpy as np
 from .. import io
 from ..arrays import FloatArray
 from ..errors import ArgumentError, ConstraintError
-from ..io import Surface
+from ..io import Surface, stored_vertices, volume_change
 from ..landmarks import (
     LANDMARK_SUFFIXES,
     LandmarkFit,
@@ -63,7 +63,8 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
         raise ConstraintError(f"--{error}") from None
     seconds = time.perf_counter() - start
     surface.write(options.output, fit.vertices)
-    report_volume(fit.volume_change, say)
+    x = stored_vertices(surface, fit.vertices, options.output)
+    report_volume(volume_change(surface.mesh, x, None), say)
     _report(fit, pairs, say)
     say(f"fit             {seconds:.1f} s including regions and cages")
     say(f"written         {options.output}")

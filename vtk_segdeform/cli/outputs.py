@@ -1,9 +1,16 @@
-"""Printed lines and written surfaces of the commands."""
+"""Printed lines and written surfaces of the commands.
+
+What is told of a result is told of the file as it is read again: formats round coordinates, and
+some of them to single precision.
+"""
 
 from __future__ import annotations
 
+import logging
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +26,9 @@ from ..io import (
     Surface,
     polydata_of,
     require_writable,
+    stored_vertices,
+    to_polydata,
+    volume_change,
 )
 from ..mesh import Kind, Mesh
 from ..pictures import COLOURS, rgb
@@ -122,7 +132,7 @@ def require_met(
 ) -> None:
     """Raise a MeshError if *what* is moved misses its target, a volume its goal, or cells invert.
 
-    It was written to *path*.
+    *solution* is that in memory; the one in the file at *path* may be rounded.
     """
     if inside is not None and len(inside.inverted):
         raise MeshError(f"{path} was written, but {inside.summary()}")
@@ -159,22 +169,22 @@ def surface_and_volume(options: Namespace) -> tuple[Surface, VolumeMesh | None]:
 
 def written(
     surface: Surface, solution: Solution, options: Namespace, *, volume: VolumeMesh | None
-) -> VolumePose | None:
-    """Write *surface* in a pose to the file of *options*.
+) -> tuple[Solution, VolumePose | None]:
+    """Write *surface* in a pose, and return the pose as it is in the file of *options*.
 
-    Of a *volume* mesh all of it is written, and the pose of its points is returned.
+    Of a *volume* mesh all of it is written; the second result is the pose of its points.
 
     Raises
     ------
     MeshError
-        If the file cannot be written.
+        If the file cannot be written, or not be read again.
     """
-    path = options.output
+    path, lids = options.output, LIDS[options.lids]
     if volume is not None:
         pose = volume.pose(solution.vertices)
         fields = {name: getattr(options, name) for name in ("turn", "push", "displacement")}
         volume.write(path, pose, **fields)
-        return pose
+        return solution, pose
     surface.write(
         path,
         solution.vertices,
@@ -182,7 +192,24 @@ def written(
         push=options.push,
         displacement=options.displacement,
     )
-    return None
+    with _without_warnings():
+        x = stored_vertices(surface, solution.vertices, path)
+    if np.array_equal(x, solution.vertices):
+        return solution, None
+    change = volume_change(surface.mesh, x, lids)
+    return replace(solution, vertices=x, volume=lambda: change), None
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Log no warnings of reading: writing has logged them."""
+    logger = logging.getLogger("vtk_segdeform.io")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 LIDS = {"auto": None, "on": True, "off": False}
@@ -196,9 +223,15 @@ def report_volume(change: float, say: Say) -> None:
 
 def report_session(session: Session, path: Path | None, say: Say) -> None:
     """Write the surface of a session in its pose, if to a *path*, and print its volume change."""
+    change = session.volume_change
     if path is not None:
         session.write_deformed(path)
-    report_volume(session.volume_change, say)
+        surface = session.surface or Surface(to_polydata(session.mesh))
+        with _without_warnings():
+            x = stored_vertices(surface, session.vertices, path)
+        if not np.array_equal(x, session.vertices):
+            change = volume_change(session.mesh, x, session.options.lids)
+    report_volume(change, say)
     if path is not None:
         say(f"written         {path}")
 

@@ -58,13 +58,13 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         progress=progress,
     )
     seconds = time.perf_counter() - start
-    inside = written(surface, solution, options, volume=volume)
-    report_volume(solution.volume_change, say)
-    report_goals(solution, surface, options.input, say)
-    say(f"handle error    {100 * solution.handle_error:.3f} % of model size")
+    stored, inside = written(surface, solution, options, volume=volume)
+    report_volume(stored.volume_change, say)
+    report_goals(stored, surface, options.input, say)
+    say(f"handle error    {100 * stored.handle_error:.3f} % of model size")
     say(f"pull            {solution.steps} steps, {seconds:.1f} s including regions and cages")
-    report_pose(solution, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
-    report_approximate(solution, options, say)
+    report_pose(stored, mesh, say, avoids_contact=options.avoid_contact, inside=inside)
+    report_approximate(stored, options, say)
     say(f"written         {options.output}")
     if options.picture is not None:
         picture_before_after(

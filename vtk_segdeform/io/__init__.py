@@ -4,6 +4,7 @@ The files, in reading order:
 
     surface            `Surface`: what is given, and the mesh that is deformed
     kinds              what was given, of its own type
+    stored             what a file has lost, as it is read again
     convert            `read_polydata`, `write_mesh`, `from_polydata`, `to_polydata`
     polygons           polygons as two flat arrays
     moving             a PolyData at other positions, with its normals and tangents
@@ -25,6 +26,7 @@ The files, in reading order:
     meshlab            further file formats, by PyMeshLab
 """
 
+from .array_names import IS_ROUNDING
 from .convert import (
     as_polydata,
     from_polydata,
@@ -43,15 +45,18 @@ from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
+from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
 from .vtk_formats import read_data_set, write_with_vtk
 
 __all__ = [
+    "IS_ROUNDING",
     "Surface",
     "as_polydata",
     "follow",
     "from_polydata",
     "is_mesh_file",
+    "loss_of",
     "of_its_kind",
     "polydata_of",
     "read_data_set",
@@ -60,9 +65,11 @@ __all__ = [
     "read_polydata",
     "repair_surface",
     "require_writable",
+    "stored_vertices",
     "surface_of",
     "to_polydata",
     "triangles_of",
+    "volume_change",
     "with_vertices",
     "writable_suffixes",
     "write_gltf_motion",

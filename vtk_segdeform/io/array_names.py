@@ -27,6 +27,7 @@ from ..geometry import signed_volume
 
 HEADER = "Header"  # a field array with the title of a file, in formats that have one
 COMMENTS = "Comments"  # a field array with the comments of a file, likewise
+IS_ROUNDING = "segdeform_rounding"  # an attribute of the log records of rounded coordinates
 _log = logging.getLogger(__name__)
 # Of the size, and of the volume: the command line tells errors to 0.001 % of the size.
 _VISIBLE = 1e-5
@@ -252,14 +253,30 @@ def warn_of_rounding(what: str, faces: IntArray, meant: FloatArray, stored: Floa
     away = after - before
     moved = float(np.sqrt(np.einsum("ij,ij->i", away, away).max()))
     change = _volume_change(faces, before, after, size)
+    if text := rounding_text(moved, size, change):
+        _log.warning("%s: %s", what, text, extra={IS_ROUNDING: True})
+
+
+def rounding_text(moved: float, size: float, change: float) -> str:
+    """Return what a file loses by rounding, and what keeps it; "" if nothing visible is lost.
+
+    Parameters
+    ----------
+    moved : float
+        The largest displacement of a vertex.
+    size : float
+        The diagonal of the model.
+    change : float
+        The relative change of its volume.
+    """
     if not (moved > _VISIBLE * size or abs(change) > _VISIBLE):
-        return
+        return ""
     volume = f", the volume changed by {100.0 * change:+.3g} %" if change else ""
     share = f" ({100.0 * moved / size:.2g} % of model size)" if size else ""
-    _log.warning(
-        "%s: vertices moved by up to %.2g%s%s; .ply and .vtp keep all digits, or move the model "
-        "to the origin", what, moved, share, volume,
-    )  # fmt: skip
+    return (
+        f"vertices moved by up to {moved:.2g}{share}{volume}; .ply and .vtp keep all digits, "
+        "or move the model to the origin"
+    )
 
 
 def _volume_change(faces: IntArray, before: FloatArray, after: FloatArray, size: float) -> float:

@@ -91,8 +91,9 @@ def _mesh_saved_now(window: Any) -> bool:
 
 
 def _mesh_is_saved(window: Any) -> bool:
-    """Return whether a file contains the mesh as it is."""
-    return bool(window.mesh_state is window.session.state)
+    """Return whether a file contains the mesh as it is, without a loss that would be unseen."""
+    is_written = window.mesh_state is window.session.state
+    return is_written and window.editor.controller.saved_intact()
 
 
 def _settle(window: Any) -> None:

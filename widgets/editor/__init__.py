@@ -38,6 +38,7 @@ from .notices import Notice, Notices, notices_of
 from .queue import Kind, Queue, Task
 from .session_file import (
     SessionFile,
+    WrittenMesh,
     file_types,
     is_mesh,
     read_session,
@@ -66,6 +67,7 @@ __all__ = [
     "SessionFile",
     "Slot",
     "Task",
+    "WrittenMesh",
     "actions",
     "error_text",
     "exporting",

@@ -138,8 +138,8 @@ def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
 def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
-    The suffix selects the format, which may not support all arrays and digits: see `io.write_mesh`;
-    what is lost is said.
+    The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
+    left out is said.  The file is then read again in another thread, see `Controller.read_again`.
     A pose that still converges is written once it has settled, and *then* is called.
     """
 
@@ -148,9 +148,10 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        remarks = write_posed(session, path)
+        written = write_posed(session, path)
         saved = f"Mesh saved to {path}{pose_remark(session)}"
-        controller.say(". ".join([saved, *remarks]))
+        controller.say(". ".join([saved, *written.remarks]))
+        controller.read_again(written)
         then()
 
     return once_settled(export)

@@ -19,6 +19,7 @@ from typing import TypeVar
 import numpy as np
 
 from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.errors import SessionError
 from vtk_segdeform.kernels import advice, is_compiling, load_early, load_for, load_late
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Change, Preparation, Session, pulls, saved_view
@@ -33,7 +34,7 @@ from .messages import Messages
 from .notices import Notices
 from .preparing import Preparing
 from .queue import Kind, Queue, Task
-from .session_file import SessionFile, is_mesh, pose_remark, read_session
+from .session_file import SessionFile, WrittenMesh, is_mesh, pose_remark, read_session
 from .session_history import SessionHistory
 from .widget_set import Mode, Spot, WidgetSet
 
@@ -117,6 +118,7 @@ class Controller:
         self.file = SessionFile(Path("session.segdeform"), session)
         self.history = SessionHistory(session, self._enter)
         self._files: dict[Session, SessionFile] = {}  # of the other sessions in the history
+        self._is_intact = True  # the mesh file that was saved last, as far as is known
         self._has_failed = False  # since the last move of a gesture
         self._stop_failures = view.on_failure(self._show_error)
 
@@ -532,6 +534,35 @@ class Controller:
         self.finishing.interrupt()
         self.file.write(self.session, self.camera.settings(self._mode))
         self.say(f"Saved to {self.file.path}{pose_remark(self.session)}")
+
+    def read_again(self, written: WrittenMesh) -> None:
+        """Read a mesh again in another thread, and say what the file has lost, if anything.
+
+        It is said once nothing is dragged or computed, which would replace the message.
+        """
+
+        def read(_: Progress) -> str | SessionError:
+            try:
+                return written.loss()
+            except SessionError as error:
+                return error
+
+        def tell(loss: str | SessionError) -> None:
+            self._is_intact = not loss
+            if isinstance(loss, SessionError):
+                self._show_error(loss)
+            elif loss:
+                self.say(". ".join([f"Mesh saved to {written.path}", loss, *written.remarks]))
+
+        self.queue.cancel(Kind.CHECK)
+        self._is_intact = True
+        task = Task(kind=Kind.CHECK, begin=lambda: read, done=tell, may_end=self.is_free)
+        self.queue.add(task)
+
+    def saved_intact(self) -> bool:
+        """Wait until the mesh that was saved last is read again; return whether nothing is lost."""
+        self.queue.wait(Kind.CHECK)
+        return self._is_intact
 
     def open(self, path: Path) -> None:
         """Read the session or the mesh in *path* as a job, and then edit that."""

@@ -9,10 +9,11 @@ Of the tasks that may begin, the one of the first kind begins first:
     SETTLE    the end of a pose that converges after its release
     PREPARE   what the first pull needs: `preparing`
     FINISH    a pose on the mesh itself, once the hand has rested: `finishing`
+    CHECK     reading a written mesh again
     LOAD      loading kernels, once the hand has rested
 
-PREPARE and FINISH share one worker: each begins once the thread of the last one has ended, even if
-that was cancelled.  Everything but the work itself happens in the window's thread, and no
+PREPARE, FINISH and CHECK share one worker: each begins once the thread of the last one has ended,
+even if that was cancelled.  Everything but the work itself happens in the window's thread, and no
 result is delivered while the hand is active.
 """
 
@@ -55,10 +56,11 @@ class Kind(enum.IntEnum):
     SETTLE = 4
     PREPARE = 5
     FINISH = 6
-    LOAD = 7
+    CHECK = 7
+    LOAD = 8
 
 
-_BY_THE_WORKER = Kind.PREPARE, Kind.FINISH
+_BY_THE_WORKER = Kind.PREPARE, Kind.FINISH, Kind.CHECK
 _JOINED = Kind.JOB, Kind.AUTOSAVE  # when cancelled, they remain until their thread has ended
 
 

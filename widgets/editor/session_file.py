@@ -1,6 +1,6 @@
 """The file that the editor saves to and opens from, and whether the session has changed since.
 
-Also the meshes that it writes: the person is told what a format cannot store.
+Also the meshes that it writes, which are read again: the person is told what a format has lost.
 """
 
 from __future__ import annotations
@@ -11,18 +11,24 @@ import re
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zipfile import is_zipfile
 
-from vtk_segdeform.errors import MeshError
+from vtk_segdeform.arrays import FloatArray
+from vtk_segdeform.errors import MeshError, SegDeformError, SessionError
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.importing import imported
 from vtk_segdeform.kernels import load_early
+from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session, load_session, save_session
 
 from ..scene import drawn_triangles
+
+if TYPE_CHECKING:
+    from vtk_segdeform.io import Surface
 
 _SUFFIX = ".segdeform"
 _LARGE = 8 << 20  # bytes of a file for whose mesh compiled kernels pay before the first picture
@@ -86,27 +92,79 @@ class SessionFile:
         self._written, self._saved, self.is_new = self.path, session.state, False
 
 
+@dataclass(frozen=True, eq=False)
+class WrittenMesh:
+    """A surface in a pose that was written to a file; later changes of the session change nothing.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh at rest.
+    surface : Surface or None
+        The surface that it was made of.
+    vertices : (n, 3) float
+        The pose.
+    path : Path
+        The file.
+    lids : bool or None
+        The option of the session.
+    remarks : tuple of str
+        What the format cannot store, except digits, in sentences.
+    """
+
+    mesh: Mesh
+    surface: Surface | None
+    vertices: FloatArray
+    path: Path
+    lids: bool | None
+    remarks: tuple[str, ...]
+
+    def loss(self) -> str:
+        """Read the file again, in any thread; return what it has lost, in a sentence, or "".
+
+        Raises
+        ------
+        SessionError
+            If it cannot be read again.
+        """
+        imported("vtk_segdeform.io")
+        from vtk_segdeform.io import Surface, loss_of, to_polydata
+
+        surface = self.surface or Surface(to_polydata(self.mesh))
+        try:
+            loss = loss_of(surface, self.vertices, self.path, self.lids)
+        except SegDeformError as error:
+            advice = "save the mesh again, in another format or folder"
+            raise SessionError(f"The file cannot be read again: {advice} ({error})") from error
+        return loss and f"In the file, {loss}"
+
+
 def pose_remark(session: Session) -> str:
     """Return what to say about a saved pose; "" if it has settled."""
     return ". The pose had not settled" if session.is_unsettled else ""
 
 
-def write_posed(session: Session, path: Path) -> tuple[str, ...]:
-    """Write the surface of *session* in its pose; return what the format cannot store."""
+def write_posed(session: Session, path: Path) -> WrittenMesh:
+    """Write the surface of *session* in its pose."""
     with _warnings() as warnings:
         session.write_deformed(path)
-    return tuple(map(_shortened, warnings))
+    remarks = tuple(map(_shortened, warnings))
+    lids = session.options.lids
+    return WrittenMesh(session.mesh, session.surface, session.vertices, path, lids, remarks)
 
 
 @contextmanager
 def _warnings() -> Iterator[list[str]]:
-    """Collect what writing a file in this thread logs inside a ``with`` block."""
+    """Collect what writing a file in this thread logs inside a ``with`` block, except rounding."""
+    imported("vtk_segdeform.io")
+    from vtk_segdeform.io import IS_ROUNDING
+
     found: list[str] = []
     handler, logger = logging.Handler(logging.WARNING), logging.getLogger("vtk_segdeform.io")
     thread = threading.get_ident()
 
     def collect(record: logging.LogRecord) -> None:
-        if record.thread == thread:
+        if record.thread == thread and not hasattr(record, IS_ROUNDING):
             found.append(record.getMessage())
 
     handler.emit = collect  # type: ignore[method-assign]

@@ -25,9 +25,10 @@ from aiohttp.http import HttpProcessingError
 from vtk_segdeform.errors import SegDeformError, SessionError
 from vtk_segdeform.files import replacing
 from vtk_segdeform.io import is_mesh_file, writable_suffixes
+from vtk_segdeform.kernels import quick_turns
 from vtk_segdeform.session import save_session
 
-from ..editor import DeformEditor, opening, write_posed
+from ..editor import DeformEditor, WrittenMesh, opening, write_posed
 
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
@@ -145,9 +146,10 @@ class Transfer:
         place = self._new_folder() / f"download{suffix}"
         self._downloads.add(place.parent)
         try:
-            if remarks := self._write(place):
-                self._editor.controller.say(". ".join(remarks))
+            written = self._write(place)
             data = place.read_bytes()
+            if written is not None:
+                self._tell(await asyncio.to_thread(quick_turns()(written.loss)), *written.remarks)
         except SegDeformError as error:
             return _refusal(409, str(error).replace(f"{place}: ", ""))
         finally:
@@ -161,8 +163,13 @@ class Transfer:
         self._folder.mkdir(mode=0o700, exist_ok=True)
         return Path(tempfile.mkdtemp(dir=self._folder))
 
-    def _write(self, place: Path) -> tuple[str, ...]:
-        """Write the session, or the surface in its pose; return what its format cannot store."""
+    def _tell(self, *remarks: str) -> None:
+        """Say what the format of a download has lost."""
+        if text := ". ".join(filter(None, remarks)):
+            self._editor.controller.say(text)
+
+    def _write(self, place: Path) -> WrittenMesh | None:
+        """Write the session, or the surface in its pose, which is returned."""
         editor, session = self._editor, self._editor.session
         if editor.is_busy or session.is_dragging:
             raise SessionError("Finish the drag or the work before downloading.")
@@ -171,7 +178,7 @@ class Transfer:
             return write_posed(session, place)
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
-        return ()
+        return None
 
     def _too_large(self, name: str) -> web.Response:
         most = f"{self.limit / 1e6:,.0f} MB"

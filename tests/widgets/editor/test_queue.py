@@ -63,7 +63,7 @@ def bench():
 
 
 def test_the_worker_runs_one_task_at_a_time_in_the_order_of_kinds(bench):
-    bench.add(Kind.FINISH, "check")
+    bench.add(Kind.CHECK, "check")
     bench.add(Kind.FINISH, "finish")
     bench.add(Kind.PREPARE, "prepare")
     assert bench.heard == ["begin check"]
@@ -254,10 +254,10 @@ def test_the_timer_is_slow_while_no_thread_runs(bench, monkeypatch):
     monkeypatch.setattr(view, "every", lambda period, _: periods.append(period) or periods.pop)
     bench.queue.add(Task(kind=Kind.SETTLE, begin=bench.heard.clear, may_begin=lambda: False))
     assert periods == [100]
-    bench.add(Kind.FINISH, "check")
+    bench.add(Kind.CHECK, "check")
     assert periods == [20]
     bench.gates["check"].set()
-    bench.queue.wait(Kind.FINISH)
+    bench.queue.wait(Kind.CHECK)
     assert periods == [100]
     bench.queue.cancel(Kind.SETTLE)
     assert periods == []

@@ -1,11 +1,13 @@
 """Uploads of a page: each arrives as a whole, apart from all others, or is refused.
 
-And its downloads.
+And its downloads, which are read again.
 """
 
 from __future__ import annotations
 
 import asyncio
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,7 +20,8 @@ from web_hands import Served
 from yarl import URL
 
 from vtk_segdeform import Mesh, models
-from vtk_segdeform.io import read_polydata
+from vtk_segdeform.io import read_polydata, stored
+from vtk_segdeform.widgets.editor import write_posed
 from vtk_segdeform.widgets.panel import status as panel_status
 from vtk_segdeform.widgets.web import transfer
 from vtk_segdeform.widgets.web.transfer import Transfer
@@ -199,7 +202,7 @@ def download(served, suffix):
 
 
 @pytest.mark.parametrize(("suffix", "is_told"), [("ply", False), ("stl", True), ("vtp", False)])
-def test_what_a_download_loses_is_told(served, tmp_path, suffix, is_told):
+def test_a_download_is_read_again_and_its_loss_is_told(served, tmp_path, suffix, is_told):
     served.call(lambda: served.web.editor.controller.say(""))
     status, data = download(served, suffix)
     assert status == 200
@@ -208,5 +211,56 @@ def test_what_a_download_loses_is_told(served, tmp_path, suffix, is_told):
     points = read_polydata(tmp_path / f"download.{suffix}").points
     assert (cKDTree(points).query(far.vertices)[0].max() > 0.2) == is_told
     shown = served.call(lambda: panel_status(served.web.editor).text)
-    assert shown.startswith("STL stores single precision: vertices moved by up to 0.25") == is_told
+    assert shown.startswith("In the file, vertices moved by up to 0.25") == is_told
     assert ("the volume changed by" in shown) == is_told
+
+
+@pytest.mark.parametrize("suffix", ["stl", "vtp"])
+def test_a_download_that_cannot_be_read_again_is_refused_with_the_reason(
+    served, monkeypatch, suffix
+):
+    def damaged(session, path):
+        written = write_posed(session, path)
+        path.write_bytes(path.read_bytes()[:500])
+        return written
+
+    monkeypatch.setattr(transfer, "write_posed", damaged)
+    status, text = download(served, suffix)
+    assert status == 409
+    assert text.startswith(b"The file cannot be read again: save the mesh again")
+    assert b"/" not in text
+
+
+def upload(served, data):
+    """Return the status of an upload."""
+
+    async def story():
+        url = f"http://127.0.0.1:{served.port}/upload?name=new.ply"
+        async with (
+            ClientSession(headers=HEADERS) as session,
+            session.post(url, data=data) as answer,
+        ):
+            return answer.status
+
+    return asyncio.run(asyncio.wait_for(story(), 60.0))
+
+
+def test_the_server_goes_on_while_a_download_is_read_again(served, monkeypatch):
+    data = download(served, "ply")[1]
+    go_on, read = threading.Event(), stored.read_polydata
+
+    def gated(path):
+        assert go_on.wait(30.0)
+        return read(path)
+
+    monkeypatch.setattr(stored, "read_polydata", gated)
+    with ThreadPoolExecutor(1) as other:
+        answer = other.submit(download, served, "stl")
+        served.wait(lambda: [*served.folder.glob("*/download.stl")])
+        assert served.call(lambda: not answer.done())
+        before = served.web.session
+        assert upload(served, data) == 200
+        served.wait(lambda: served.web.session is not before)
+        go_on.set()
+        assert answer.result(60)[0] == 200
+    assert not [*served.folder.glob("*/download.stl")]

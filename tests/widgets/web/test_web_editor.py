@@ -278,7 +278,7 @@ def test_one_finger_pulls_and_two_turn(
     _open(served, cactus_file)
     page, web = served.page(browser, touch=True, size=(390, 700)), served.web
     hint = page.evaluate("document.querySelector('.sd-hint').textContent")
-    assert "Shift" not in hint
+    assert "Shift" not in hint + page.evaluate("document.querySelector('.sd-cards').textContent")
     assert "Choose Pin" in hint
     camera = web.plotter.camera
     where, (x, y) = camera.position, served.seen(page, _top(served))
