@@ -68,7 +68,6 @@ __all__ = [
     "cell_sums",
     "collapse_costs",
     "corner_terms",
-    "corners_of_lines",
     "determinants",
     "facing_pairs",
     "first_equal_points",
