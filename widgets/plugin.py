@@ -1,11 +1,18 @@
-"""The extension of pyvista's plotters, and `edit`.
+"""The extension of pyvista's plotters and meshes, and `edit`.
 
     plotter.segdeform.edit(mesh)                     the editor, in an existing plotter
     plotter.segdeform.add_volume_overlay(session)    the local volume change, in colours
+    mesh.segdeform.deform(fixed, handle, targets)    a deformed copy with all arrays
+    mesh.segdeform.pull(vertex, to)                  the same, by one point
+    mesh.segdeform.regions(3)                        a copy with arrays of its regions
+    mesh.segdeform.check()                           its faults and borders
+    mesh.segdeform.repair()                          a closed copy, with its arrays
 
-pyvista finds this module by its entry point when ``segdeform`` is first used.  pyvistaqt hides it:
-there, and if the package is not installed, ``import vtk_segdeform`` after pyvista or ``import
-vtk_segdeform.widgets.plugin``.
+pyvista finds this module by its entry points when ``segdeform`` is first used.  pyvistaqt hides
+those of plotters: there, and if the package is not installed, ``import vtk_segdeform`` after
+pyvista or ``import vtk_segdeform.widgets.plugin``.
+
+Long because every option of `edit` and of the tools is in their signatures and docstrings.
 """
 
 from __future__ import annotations
@@ -16,22 +23,27 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
+import numpy as np
 import pyvista as pv
 from numpy.typing import ArrayLike
 
 from vtk_segdeform.any_mesh import (
     AnyMesh,
     AsPolyData,
+    Deformed,
     LikeMeshio,
     LikeTrimesh,
     Pair,
+    deform,
+    pull,
+    segment,
 )
 from vtk_segdeform.arrays import FloatArray, IntArray, plain
 from vtk_segdeform.checks import as_callable, as_path, as_text, shown
 from vtk_segdeform.errors import ArgumentError, Cancelled, SegDeformError
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import as_polydata
-from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.io import Surface, as_polydata, repair_surface, triangles_of
+from vtk_segdeform.mesh import Mesh, MeshReport, find_faults
 from vtk_segdeform.pictures import require_screen
 from vtk_segdeform.progress import Progress
 from vtk_segdeform.session import Session
@@ -54,6 +66,8 @@ class Removable(Protocol):
 _Path = str | os.PathLike[str] | None
 _SameType = TypeVar("_SameType", bound=Mesh | pv.PolyData | LikeTrimesh | LikeMeshio | Session)
 _log = logging.getLogger(__name__)
+
+_HANDLE_MET = 1e-3  # of the diagonal
 
 
 @overload
@@ -263,3 +277,150 @@ class PlotterTools:
     def __plotter_close__(self) -> None:
         while self.added:
             self.added.pop().remove()
+
+
+@pv.register_dataset_accessor("segdeform", pv.PolyData)
+class PolyDataTools:
+    """Deformation of any surface; ``mesh.segdeform``.  The surface itself is not changed.
+
+    Points are numbered as in the surface.  Points at a seam follow one vertex of its mesh.
+
+    Parameters
+    ----------
+    surface : pyvista.PolyData
+        The surface.
+    """
+
+    def __init__(self, surface: pv.PolyData) -> None:
+        self._given = surface
+
+    def deform(
+        self,
+        fixed: ArrayLike,
+        handle: ArrayLike,
+        targets: ArrayLike,
+        *,
+        n_regions: int | None = None,
+        n_cage_vertices: int | None = None,
+        preserve_volume: bool = True,
+        lids: bool | None = None,
+        refine: bool | None = None,
+        progress: Progress | None = None,
+    ) -> pv.PolyData:
+        """Return a copy with the handle points at *targets*: coordinates and normals differ.
+
+        Parameters
+        ----------
+        fixed : (f,) int or (p,) bool
+            Points that do not move.
+        handle : (h,) int or (p,) bool
+            Points of the handle.
+        targets : (h, 3) float
+            Where they go.  Points at a seam that are one vertex go to the mean.
+        n_regions, n_cage_vertices, preserve_volume, lids, refine, progress
+            As in `vtk_segdeform.deform`, which also returns the solver's status; here a missed
+            target is only logged.
+
+        Raises
+        ------
+        MeshError, ConstraintError
+            As in `vtk_segdeform.deform`; MeshError if no mesh can be made of the surface.
+        """
+        return self._moved(
+            deform(
+                self._given, fixed, handle, targets,
+                n_regions=n_regions, n_cage_vertices=n_cage_vertices,
+                preserve_volume=preserve_volume, lids=lids, refine=refine, progress=progress,
+            )
+        )  # fmt: skip
+
+    def pull(
+        self,
+        vertex: int | ArrayLike,
+        to: ArrayLike,
+        radius: float | None = None,
+        *,
+        pins: ArrayLike = (),
+        locality: float | None = None,
+        lids: bool | None = None,
+        progress: Progress | None = None,
+    ) -> pv.PolyData:
+        """Return a copy with one point pulled to another place.
+
+        Parameters
+        ----------
+        vertex : int or (3,) float
+            The grabbed point, or a position on the surface.
+        to : (3,) float
+            Where it is pulled to.
+        radius, pins, locality, lids, progress
+            As in `vtk_segdeform.pull`, which has more options and also returns the solver's status;
+            here a missed target is only logged.
+
+        Raises
+        ------
+        MeshError, ConstraintError
+            As in `vtk_segdeform.pull`; MeshError if no mesh can be made of the surface.
+        """
+        return self._moved(
+            pull(
+                self._given, vertex, to, radius,
+                pins=pins, locality=locality, lids=lids, progress=progress,
+            )
+        )  # fmt: skip
+
+    @staticmethod
+    def _moved(solution: Deformed[pv.PolyData]) -> pv.PolyData:
+        if solution.handle_error > _HANDLE_MET:
+            error = 100.0 * solution.handle_error
+            _log.warning("handle error %.2g %% of model size: %s", error, solution.status)
+        return solution.mesh
+
+    def regions(
+        self, n_regions: int | None = None, progress: Progress | None = None
+    ) -> pv.PolyData:
+        """Return a copy with the regions used by a deformation, as point arrays.
+
+        ``region`` (p,) int is the region with the largest weight, ``regions_here`` (p,) int the
+        number of regions at a point, ``region_weights`` (p, r) float their weights, which sum to 1.
+
+        Parameters
+        ----------
+        n_regions : int, optional
+            Number of regions; by default one for each limb and one for the trunk.
+        progress : Progress, optional
+            Called with the fraction done and a text; may raise `Cancelled`.
+        """
+        surface, copy = Surface(self._given), self._given.copy()
+        found = segment(surface.mesh, n_regions, progress=progress)
+        for name, values in (
+            ("regions_here", found.membership.sum(axis=0)),
+            ("region_weights", found.weights.T),
+            ("region", found.labels),
+        ):
+            copy.point_data[name] = surface.at_points(values)
+        return copy
+
+    def check(self) -> MeshReport:
+        """Return what prevents the surface from being a `Mesh` as it is: ``.ok``, ``.faults``.
+
+        A surface with faults can be deformed as well, see ``Surface(polydata).workarounds``; a
+        closed one, ``.is_closed``, preserves its volume without lids.
+        """
+        points = np.asarray(self._given.points, dtype=np.float64)
+        return find_faults(points, triangles_of(self._given))
+
+    def repair(self, *, weld_distance: float = 0.0, largest_hole: int = 100) -> pv.PolyData:
+        """Return a repaired copy with the polygons and arrays of all remaining faces.
+
+        Each repair, loss and remaining hole is logged on a line of its own.  The parameters are
+        those of `vtk_segdeform.repair`.
+        """
+        closed, done = repair_surface(
+            self._given, weld_distance=weld_distance, largest_hole=largest_hole
+        )
+        for step in done.steps:
+            _log.info("repair: %s", step)
+        if done.advice:
+            _log.warning("repair: %s", done.advice)
+        return closed

@@ -102,7 +102,7 @@ def calls(modules: tuple[str, ...]) -> Iterator[Call]:
 def expensive(call: Call) -> bool:
     """Return whether a call takes a second: a window, cages, or a new body."""
     return call.name in {
-        "PlotterTools.edit",
+        "PlotterTools.edit", "PolyDataTools.deform", "PolyDataTools.pull", "PolyDataTools.regions",
         "batch", "random_poses",
         "cactus", "deform", "dinosaur", "edit", "fit_cages", "fit_landmarks", "film",
         "picture_before_after", "picture_distortion", "picture_landmarks",
@@ -326,6 +326,7 @@ def instance(cls: type) -> Any:
         "Options": sd.Options,
         "LocalVolume": lambda: sd.geometry.LocalVolume(mesh()),
         "SegmentedCageDeformFilter": sd.filters.SegmentedCageDeformFilter,
+        "PolyDataTools": lambda: surface().segdeform,
         "PlotterTools": lambda: _plotter().segdeform,
         "Film": _film,
         "LandmarkFit": _fit,

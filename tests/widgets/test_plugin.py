@@ -1,10 +1,11 @@
-"""pyvista's extension point, plotters, and the window of `edit`; PolyData."""
+"""pyvista's extension points: plotters, meshes, and the window of `edit`."""
 
 from __future__ import annotations
 
 import configparser
 import functools
 import importlib
+import logging
 import signal
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ from given_surfaces import GIVEN, require_only_moved, tube
 from hands import Hand, picture
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
+from solids import OCTAHEDRON
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
@@ -69,7 +71,7 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     height = bar.points[:, 2]
     fixed, handle = height < 0.1, height > 0.9
     targets = bar.points[handle] + [0.2, 0.0, -0.05]
-    bent = sd.deform(bar, fixed, handle, targets, n_regions=2, n_cage_vertices=40).mesh
+    bent = bar.segdeform.deform(fixed, handle, targets, n_regions=2, n_cage_vertices=40)
     assert bar == before
     assert np.abs(bent.points[handle] - targets).max() < 1e-3
     assert np.abs(bent.points[fixed] - bar.points[fixed]).max() < 1e-3
@@ -82,18 +84,29 @@ def test_a_surface_is_deformed_into_a_copy_with_its_arrays_and_its_volume(bar):
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
 
 
+def test_a_surface_with_a_pulled_point_is_a_copy_with_its_arrays(bar):
+    to = bar.points[-1] + [0.1, 0.1, 0.2]
+    pulled = bar.segdeform.pull(bar.n_points - 1, to, 0.5, pins=[0])
+    assert np.abs(pulled.points[-1] - to).max() < 1e-6
+    assert np.abs(pulled.points[0] - bar.points[0]).max() < 1e-3
+    assert_array_equal(pulled["number"], bar["number"])
+
+
 @pytest.mark.parametrize("name", every(2, ["soup", "tube"]))
 def test_any_surface_is_deformed_by_its_own_points(name):
     given = GIVEN[name]()
     height = given.points[:, 2]
     fixed, handle = height < 0.3, np.flatnonzero(height > 2.7)[::-1]
     targets = given.points[handle] + np.array([0.2, 0.0, 0.0])
-    bent = sd.deform(
-        given, fixed, handle, targets, n_regions=1, n_cage_vertices=40, refine=False
-    ).mesh
+    bent = given.segdeform.deform(
+        fixed, handle, targets, n_regions=1, n_cage_vertices=40, refine=False
+    )
     require_only_moved(given, bent)
     assert np.abs(bent.points[handle] - targets).max() < 5e-3
     assert np.abs(bent.points[fixed] - given.points[fixed]).max() < 5e-3
+    regions = given.segdeform.regions(2)
+    assert regions["region_weights"].shape == (given.n_points, 2)
+    assert_array_equal(regions["region_weights"].argmax(axis=1), regions["region"])
 
 
 def test_points_at_a_seam_with_different_targets_go_to_the_mean():
@@ -104,6 +117,28 @@ def test_points_at_a_seam_with_different_targets_go_to_the_mean():
     vertices, ends = sd.Surface(given).targets_at([seam, other], targets)
     assert len(vertices) == 1
     assert np.allclose(ends[0] - given.points[seam], [0.15, 0.05, 0.05])
+
+
+def test_a_handle_that_misses_its_target_is_logged(bar, caplog):
+    height = bar.points[:, 2]
+    handle = height > 0.9
+    with caplog.at_level(logging.WARNING, logger="vtk_segdeform.widgets.plugin"):
+        bar.segdeform.deform(
+            height < 0.1, handle, bar.points[handle] + [0, 0, 8.0], n_regions=1,
+            n_cage_vertices=12, refine=False,
+        )  # fmt: skip
+    assert "handle error" in caplog.text
+
+
+def test_check_names_the_faults_of_a_surface(bar):
+    assert bar.segdeform.check().ok
+    vertices, faces = OCTAHEDRON
+    report = pv.make_tri_mesh(vertices, faces[:-1]).segdeform.check()
+    assert report.ok
+    assert not report.is_closed
+    assert "3 open edges" in str(report)
+    with pytest.raises(MeshError, match="face"):
+        pv.PolyData(vertices).segdeform.regions()
 
 
 # Plotters.
@@ -234,13 +269,13 @@ def test_a_second_editor_in_a_subplot_is_refused_until_the_first_one_is_removed(
 # Registration.
 
 
-def test_pyvista_finds_the_plugin_by_its_entry_point():
+def test_pyvista_finds_the_plugin_by_its_entry_points():
     parser = configparser.ConfigParser()
     parser.read(ROOT / "setup.cfg", encoding="utf-8")
-    group = parser["options.entry_points"]["pyvista.plotter_components"]
-    name, module = group.strip().split(" = ")
-    assert name == "segdeform"
-    assert importlib.import_module(module) is plugin
+    for group in ("pyvista.plotter_components", "pyvista.accessors"):
+        name, module = parser["options.entry_points"][group].strip().split(" = ")
+        assert name == "segdeform"
+        assert importlib.import_module(module) is plugin
 
 
 # The window of `edit`.
