@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import pytest
 import pyvista as pv
 from numpy.testing import assert_allclose, assert_array_equal
 
+import vtk_segdeform.widgets.plugin  # noqa: F401  registers mesh.segdeform
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.io import convert
@@ -201,15 +204,17 @@ def test_strips_and_loose_cells_are_reported():
         assert step in done.steps
 
 
-def test_the_advice_names_the_option_that_fills_the_hole():
+def test_the_accessor_repairs_a_copy_and_logs_each_step(caplog):
     surface = box(drop=[5])
-    closed, done = repair_surface(surface)
-    assert done.report.is_closed
+    with caplog.at_level(logging.INFO, logger="vtk_segdeform"):
+        closed = surface.segdeform.repair()
+    assert closed.segdeform.check().is_closed
     assert closed.n_cells > surface.n_cells == 6 * N * N - 1
-    assert any("fill 1 hole of 4 edges" in step for step in done.steps)
-    _, left = repair_surface(surface, largest_hole=3)
-    assert not left.report.is_closed
-    assert "largest_hole=4 (--largest-hole 4 on the command line)" in left.advice
+    assert "fill 1 hole of 4 edges" in caplog.text
+    caplog.clear()
+    left = surface.segdeform.repair(largest_hole=3)
+    assert not left.segdeform.check().is_closed
+    assert "largest_hole=4 (--largest-hole 4 on the command line)" in caplog.text
 
 
 def test_the_command_line_fills_holes_up_to_the_given_size(tmp_path, capsys):
