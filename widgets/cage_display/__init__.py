@@ -1,6 +1,6 @@
 """The widget that shows cages and lets their vertices be dragged.
 
-    cage_display      `CageDisplay`
+cage_display      `CageDisplay`
 """
 
 from .cage_display import CageDisplay
