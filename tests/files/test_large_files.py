@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 import pytest
-from foreign_files import HAS_PYMESHLAB
 from gltf_files import octahedron
 from solids import OCTAHEDRON
 
@@ -18,17 +17,18 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.errors import ArgumentError, SegDeformError
 from vtk_segdeform.files import open_regular, read_regular
 from vtk_segdeform.geometry.motion import read_matrix
-from vtk_segdeform.io import read_polydata, write_mesh
+from vtk_segdeform.io import meshlab, read_polydata, write_mesh
+from vtk_segdeform.io.meshlab_project import read_project
 from vtk_segdeform.mesh.selection import parse_selection
 from vtk_segdeform.session.store import saved_view
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sparse files, pipes")
 POINTS = np.asarray(OCTAHEDRON[0], dtype=float)
 MESHES = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtk", ".vtp", ".vtu"]
-MESHES += [".dae", ".x3d"] if HAS_PYMESHLAB else []
+MESHES += [".dae", ".x3d"] if meshlab.available() else []
 DOORS = {
     **dict.fromkeys(MESHES, read_polydata),
-    ".segdeform": sd.load_session,
+    ".segdeform": sd.load_session, ".mlp": read_project,
     ".def": read_matrix, ".txt": lambda path: parse_selection(str(path), POINTS),
     ".sel": lambda path: parse_selection(str(path), POINTS, role="fixed"),
     ".any": open_regular,

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_files import HAS_PYMESHLAB
 from numpy.testing import assert_array_equal
 from solids import CUBE, icosphere
 from vtkmodules.vtkCommonCore import vtkOutputWindow
@@ -21,7 +20,7 @@ from vtkmodules.vtkCommonCore import vtkOutputWindow
 from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.files import landlock
-from vtk_segdeform.io import confined, reading_child
+from vtk_segdeform.io import confined, meshlab, reading_child
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.surface import read_mesh
 
@@ -63,7 +62,7 @@ def test_the_whole_file_is_read_with_or_without_the_child_process(
 
 
 LANDLOCK = pytest.mark.skipif(not landlock.version(), reason="needs Landlock")
-MESHLAB = pytest.mark.skipif(not HAS_PYMESHLAB, reason="needs PyMeshLab")
+MESHLAB = pytest.mark.skipif(not meshlab.available(), reason="needs PyMeshLab")
 VERTICES, FACES = CUBE
 POINTS = " ".join(map(str, np.ravel(VERTICES)))
 INDICES = " -1 ".join(" ".join(map(str, face)) for face in FACES) + " -1"

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.geometry import signed_volume
-from vtk_segdeform.io import read_polydata, to_polydata, triangles_of, write_mesh
+from vtk_segdeform.io import meshlab, read_polydata, to_polydata, triangles_of, write_mesh
 from vtk_segdeform.io.gltf.buffers import Document
 
 UTM = np.array([500_000.0, 5_400_000.0, 300.0])
@@ -44,7 +44,7 @@ def measured(path, mesh):
     return moved, 100.0 * moved / mesh.diagonal, 100.0 * (after - before) / before
 
 
-@pytest.mark.parametrize("suffix", [".stl"])
+@pytest.mark.parametrize("suffix", [".stl", *([".3ds"] if meshlab.available() else [])])
 def test_a_body_far_from_the_origin_loses_what_is_told(tmp_path, caplog, suffix):
     mesh = at(UTM)
     write_mesh(tmp_path / f"a{suffix}", mesh)

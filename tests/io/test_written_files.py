@@ -13,6 +13,7 @@ from solids import OCTAHEDRON
 import vtk_segdeform as sd
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.io.convert import write_mesh
+from vtk_segdeform.io.meshlab_project import read_project, write_project
 from vtk_segdeform.pictures import canvas
 from vtk_segdeform.pictures.pictures import picture_distortion
 from vtk_segdeform.widgets.films.film_files import write_film
@@ -27,6 +28,7 @@ WRITERS = {
     "session.segdeform": lambda path: sd.save_session(path, sd.Session(MESH)),
     "film.gif": lambda path: write_film(path, PICTURES, 20.0),
     "picture.png": lambda path: picture_distortion(path, MESH, MESH.vertices, np.zeros(8)),
+    "project.mlp": lambda path: write_project(path, MESH),
     **{
         f"mesh{suffix}": lambda path: write_mesh(path, MESH)
         for suffix in (
@@ -64,7 +66,7 @@ def test_anything_but_a_regular_file_is_an_error_that_names_it(tmp_path, name):
             path.rmdir()
         else:
             path.unlink()
-    assert not os.listdir(tmp_path)
+    assert not [each for each in os.listdir(tmp_path) if not each.endswith(".layers")]
 
 
 @pytest.mark.parametrize("fault", [errno.ENOSPC, errno.EACCES])
@@ -95,3 +97,29 @@ def test_a_picture_has_the_pixels_it_was_given(tmp_path):
     (tmp_path / "a.png").write_bytes(content)
     with Image.open(tmp_path / "a.png") as image:
         assert np.array_equal(np.asarray(image), pixels)
+
+
+def test_projects_with_too_many_or_too_large_layers_are_errors_at_once(tmp_path, monkeypatch):
+    path = tmp_path / "work.mlp"
+    write_project(path, MESH)
+    (layer,) = (tmp_path / "work.layers").iterdir()
+    one = f'<MLMesh label="a" filename="work.layers/{layer.name}"/>'
+
+    def read(name):
+        raise AssertionError(f"{name} was read")
+
+    monkeypatch.setattr("vtk_segdeform.io.meshlab_project.read_polydata", read)
+    for count in (1001, 20_000):
+        group = f"<MeshGroup>{one * count}</MeshGroup>"
+        path.write_text(f"<MeshLabProject>{group}</MeshLabProject>")
+        with pytest.raises(
+            sd.errors.MeshError, match=rf"work\.mlp: has {count} layers; the limit is 1000"
+        ):
+            read_project(path)
+    path.write_text("<MeshLabProject>" + "<a>" * 100_000)
+    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: .*nested more than 32 deep"):
+        read_project(path)
+    os.truncate(layer, 45_000_000_000)
+    path.write_text(f"<MeshLabProject><MeshGroup>{one}</MeshGroup></MeshLabProject>")
+    with pytest.raises(sd.errors.MeshError, match=r"work\.mlp: its layers have 4\.5e\+10 bytes"):
+        read_project(path)

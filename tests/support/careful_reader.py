@@ -25,6 +25,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.geometry.motion import read_matrix
 from vtk_segdeform.io.convert import read_polydata
+from vtk_segdeform.io.meshlab_project import read_project
 from vtk_segdeform.mesh.selection import parse_selection
 
 SECONDS, MEMORY = 60, 2 << 30  # for each file, in addition to the memory in use
@@ -33,6 +34,7 @@ READERS = {
     "mesh": sd.read_mesh,
     "surface": read_polydata,
     "session": sd.load_session,
+    "project": read_project,
     "matrix": read_matrix,
     "selection": lambda path: parse_selection(path, MESH.vertices, role="handle"),
 }

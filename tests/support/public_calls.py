@@ -25,6 +25,8 @@ import pyvista as pv
 import vtk_segdeform as sd
 import vtk_segdeform.filters
 import vtk_segdeform.geometry.local_volume
+import vtk_segdeform.io.meshlab
+import vtk_segdeform.io.meshlab_project
 import vtk_segdeform.widgets
 import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
@@ -40,9 +42,11 @@ CORE = (
     "vtk_segdeform",
     "vtk_segdeform.models",
     "vtk_segdeform.io.convert",
+    "vtk_segdeform.io.meshlab",
     "vtk_segdeform.geometry.distortion",
     "vtk_segdeform.subspace.passengers",
     "vtk_segdeform.geometry.local_volume",
+    "vtk_segdeform.io.meshlab_project",
     "vtk_segdeform.pictures.pictures",
     "vtk_segdeform.filters.deform_filter",
     "vtk_segdeform.widgets.plugin",
@@ -265,6 +269,10 @@ def view() -> Any:
 
 
 @functools.cache
+def meshset() -> Any:
+    return sd.io.to_meshset(mesh())
+
+
 @functools.cache
 def shared_session() -> Session:
     """Return the session of the widgets, which live as long as the tests."""
@@ -392,6 +400,8 @@ def _file(name: str) -> Path:
         sd.save_session(path, session())
     elif path.suffix == ".vtu":
         volume().grid.save(path)
+    elif path.suffix == ".mlp":
+        sd.io.write_project(path, mesh())
     else:
         sd.write_mesh(path, mesh())
     return path
@@ -449,6 +459,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "max_steps": lambda: 3,
     "membership": lambda: regions().membership,
     "mesh": mesh,
+    "meshset": meshset,
     "minor": lambda: 0.3,
     "motion": lambda: np.eye(4),
     "n_cage_vertices": lambda: 24,
@@ -620,6 +631,8 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "picture_distortion.path": lambda: Path("a.png"),
     "picture_regions_and_cages.path": lambda: Path("a.png"),
     "picture_volume_change.path": lambda: Path("a.png"),
+    "read_project.path": lambda: _file("project.mlp"),
+    "write_project.path": lambda: Path("written.mlp"),
     "Session.write_deformed.path": lambda: Path("written.vtp"),
     "SegmentedCageDeformFilter.SetFixed.points": _left,
     "SegmentedCageDeformFilter.SetHandle.points": _right,
@@ -675,6 +688,9 @@ SAID_AS: dict[str, tuple[str, ...]] = {
     "board.cages": ("weights",),
     "mean_value_coordinates.cage_vertices": ("cage_faces",),
     "film.scene": ("view",),
+    "from_meshset.arrays": ("attribute",),
     "repair.faces": ("cannot be repaired",),
     "repair.vertices": ("cannot be repaired",),
+    "to_meshset.what": ("Mesh",),
+    "write_project.what": ("Mesh",),
 }

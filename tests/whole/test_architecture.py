@@ -55,6 +55,7 @@ GRANTED = {
     "io.array_names": VTK,
     "io.convert": VTK,
     "io.grids": VTK,
+    "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
     "io.reading_child": VTK | {"pymeshlab"},
     "io.vtk_arrays": VTK,
@@ -62,6 +63,7 @@ GRANTED = {
     "inside": {"pyvista"},
     "any_mesh": {"pyvista"},
     "batches.store": {"pyarrow"},
+    "session.output": {"pyvista"},
     "session.session": {"pyvista"},
     "session.surface_store": VTK | {"pyvista"},
     "pictures": VTK | {"pyvista"},
@@ -372,9 +374,10 @@ def test_public_functions_take_at_most_four_positional_arguments():
     none(offences)
 
 
-# Ctrl+C ends them, and so the process; ParaView loads its file before the package.
+# Ctrl+C ends them, and so the process; ParaView loads its file before the package; PyMeshLab has to
+# be imported in the main thread.
 MAY_BE_INTERRUPTED = (
-    "cli", "benchmarks", "io.reading_child", "filters.paraview_plugin",
+    "cli", "benchmarks", "io.reading_child", "io.meshlab", "filters.paraview_plugin",
 )  # fmt: skip
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 import doctest
-import importlib.util
 import linecache
 import re
 import shlex
@@ -19,6 +18,7 @@ import vtk_segdeform as sd
 from vtk_segdeform import widgets
 from vtk_segdeform.cli.main import _parser, _with_signed_vectors, command
 from vtk_segdeform.errors import MissingDependencyError
+from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import is_mesh_file
 from vtk_segdeform.pictures.canvas import require_offscreen
 from vtk_segdeform.widgets.editor.bindings import DEFAULT_KEYS
@@ -163,7 +163,7 @@ def test_python_on_a_page_comes_from_a_program_or_runs(page):
 @pytest.mark.parametrize("page", [name for name, text in PAGES.items() if ">>> " in text])
 def test_the_examples_on_a_page_print_what_they_say(page, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    if page in NEED_MESHLAB and importlib.util.find_spec("pymeshlab") is None:
+    if page in NEED_MESHLAB and not meshlab.available():
         pytest.skip("needs PyMeshLab")
     if page in DRAW:
         try:

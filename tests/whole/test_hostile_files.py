@@ -17,14 +17,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from foreign_files import HAS_PYMESHLAB, save_foreign
 from given_surfaces import save_raw
 from gltf_files import octahedron
 from scenes import sausage
 from solids import OCTAHEDRON, icosphere
 
 import vtk_segdeform as sd
+from vtk_segdeform.io import meshlab
 from vtk_segdeform.io.convert import to_polydata, write_mesh
+from vtk_segdeform.io.meshlab_project import write_project
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="needs fork and memory limits")
 
@@ -78,9 +79,9 @@ def originals(folder, foreign=FOREIGN):
     files.append(("mesh", folder / "sound.vtu"))
     for suffix in (".glb", ".gltf"):
         files.append(("mesh", octahedron(*OCTAHEDRON).save(folder / f"sound{suffix}")))
-    if HAS_PYMESHLAB:
+    if meshlab.available():
         for suffix in foreign:
-            save_foreign(folder / f"sound{suffix}", mesh)
+            write_mesh(folder / f"sound{suffix}", mesh)
             files.append(("mesh", folder / f"sound{suffix}"))
     files.append(("mesh", folder / "strips.ply"))
     files[-1][1].write_text(STRIPS)
@@ -90,6 +91,8 @@ def originals(folder, foreign=FOREIGN):
     files.append(("session", folder / "sound.segdeform"))
     sd.save_session(folder / "surface.segdeform", surface_session())
     files.append(("session", folder / "surface.segdeform"))
+    write_project(folder / "sound.mlp", mesh)
+    files.append(("project", folder / "sound.mlp"))
     for name, text, reader in [
         ("sound.def", MATRIX, "matrix"),
         ("sound.sel", "0 0 1 1 2 2\n", "selection"),

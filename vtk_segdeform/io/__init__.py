@@ -1,4 +1,4 @@
-"""Meshes from and to files and pyvista.
+"""Meshes from and to files, pyvista and MeshLab.
 
 The files, in reading order:
 
@@ -23,7 +23,9 @@ The files, in reading order:
     groups             named groups of cells
     array_names        names, arrays and digits that a format cannot store
     repaired           repair of PolyData with its polygons and arrays
-    meshlab            further file formats, by PyMeshLab
+    meshlab            PyMeshLab: conversion, simplification, file formats
+    meshlab_layers     MeshLab's layers as PolyData
+    meshlab_project    MeshLab projects: a mesh and its cages, coloured and as wires
 """
 
 from .array_names import IS_ROUNDING
@@ -43,6 +45,8 @@ from .convert import (
 from .fields import follow
 from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
+from .meshlab import from_meshset, simplify, to_meshset
+from .meshlab_project import read_project, write_project
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
@@ -54,6 +58,7 @@ __all__ = [
     "Surface",
     "as_polydata",
     "follow",
+    "from_meshset",
     "from_polydata",
     "is_mesh_file",
     "loss_of",
@@ -63,10 +68,13 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_polydata",
+    "read_project",
     "repair_surface",
     "require_writable",
+    "simplify",
     "stored_vertices",
     "surface_of",
+    "to_meshset",
     "to_polydata",
     "triangles_of",
     "volume_change",
@@ -75,5 +83,6 @@ __all__ = [
     "write_gltf_motion",
     "write_mesh",
     "write_points",
+    "write_project",
     "write_with_vtk",
 ]

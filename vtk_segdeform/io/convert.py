@@ -36,7 +36,7 @@ from ..errors import ArgumentError, MeshError
 from ..files import excess_of, fault_of, replacing, require_place
 from ..mesh import Mesh, conversion_of
 from . import meshlab
-from .array_names import set_names, with_storable_texts
+from .array_names import set_names, warn_left_out, warn_of_rounding, with_storable_texts
 from .confined import read_confined
 from .gltf import read_gltf, write_gltf
 from .grids import surface_of_grid
@@ -74,7 +74,7 @@ def is_mesh_file(path: str | Path) -> bool:
 
 
 def writable_suffixes() -> tuple[str, ...]:
-    """Return the suffixes that `write_mesh` can write, in order."""
+    """Return the suffixes that `write_mesh` can write without PyMeshLab, in order."""
     return tuple(sorted(_FORMATS))
 
 
@@ -185,10 +185,11 @@ def write_mesh(
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf.  All formats except .stl,
-        .glb and .gltf store every digit; .vtk, .vtp and .vtu store every array.  An .stl
-        is text, with named solids, if its cells have groups, and binary otherwise.  A warning is
-        logged for each array that is left out or renamed.
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf; with PyMeshLab .3ds, .dae,
+        .x3d, .wrl, .ctm.  All formats except .stl, .glb, .gltf and those of PyMeshLab store every
+        digit; .vtk, .vtp and .vtu store every array.  An .stl is text, with named solids,
+        if its cells have groups, and binary otherwise.  A warning is logged for each array that is
+        left out or renamed.
     mesh : Mesh or pyvista.PolyData
         The mesh to write.  A surface that was read from glTF is written to glTF with the nodes,
         materials and textures of that file.
@@ -208,8 +209,12 @@ def write_mesh(
     suffix = path.suffix.lower()
     try:
         with replacing(path) as draft:
-            _, write = _FORMATS[suffix]
-            write(draft, surface)
+            if suffix in _FORMATS:
+                _, write = _FORMATS[suffix]
+                write(draft, surface)
+            else:
+                warn_left_out(f"{suffix} written by PyMeshLab", surface, {})
+                _write_with_meshlab(draft, mesh if is_mesh else from_polydata(surface))
     except MeshError as fault:
         raise MeshError(f"{path}: {str(fault).removeprefix(f'{path}: ')}") from None
     except OSError as fault:
@@ -217,6 +222,23 @@ def write_mesh(
         raise MeshError(
             f"{path}: cannot be written ({reason}); free disk space or choose another folder"
         ) from fault
+
+
+def _write_with_meshlab(draft: Path, mesh: Mesh) -> None:
+    """Write by PyMeshLab; OSError if the file is incomplete, which PyMeshLab does not report."""
+    try:
+        meshlab.write(draft, mesh)
+        vertices, faces = meshlab.read_faces(draft)
+        complete = len(faces) == mesh.n_faces
+    except MeshError as fault:
+        raise OSError(str(fault).removeprefix(f"{draft}: ")) from None
+    if not complete:
+        raise OSError("the written file is incomplete")
+    place = np.zeros(mesh.n_vertices, dtype=np.int64)  # some formats renumber or merge vertices
+    place[mesh.faces] = faces
+    if np.array_equal(place[mesh.faces], faces):
+        what = f"{draft.suffix} rounds coordinates"
+        warn_of_rounding(what, mesh.faces, mesh.vertices, vertices[place])
 
 
 def require_writable(path: str | Path, *, arrays: bool = False) -> None:
@@ -227,7 +249,7 @@ def require_writable(path: str | Path, *, arrays: bool = False) -> None:
     path = as_path(path)
     suffix = path.suffix.lower()
     as_flag(arrays, "arrays")
-    known = {*_STORE_ARRAYS} if arrays else {*_FORMATS}
+    known = {*_STORE_ARRAYS} if arrays else {*_FORMATS, *meshlab.WRITES}
     if suffix not in known:
         verb = "cannot store arrays and colours" if arrays else "cannot be written"
         raise MeshError(f"{path}: {_files(suffix)} {verb}; use one of {_listed(known)}")

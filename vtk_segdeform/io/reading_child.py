@@ -333,11 +333,7 @@ def _bytes(text: str | bytes) -> bytes:
 
 
 def _with_meshlab(path: Path) -> Iterator[tuple[str, Any]]:
-    try:
-        pymeshlab = _module("pymeshlab")
-    except ImportError as error:
-        packages = "libgl1 libopengl0 libglib2.0-0"
-        raise ValueError(f"{error}; on Debian: apt-get install {packages}") from None
+    pymeshlab = _module("pymeshlab")
     meshset = pymeshlab.MeshSet(verbose=False)
     try:
         meshset.load_new_mesh(str(path))

@@ -55,7 +55,7 @@ from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
-from . import finishing, handles, naming, painting, preparing, pulls, separating, solving
+from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .listeners import Listener
@@ -205,19 +205,15 @@ class Session(Described):
 
         Without a surface, the triangles of the mesh.
         """
-        if self.surface is not None:
-            return self.surface.moved(self.vertices)
-        imported("vtk_segdeform.io")  # imports pyvista
-        from ..io import to_polydata
-
-        return to_polydata(self.mesh.with_vertices(self.vertices))
+        return output.deformed(self.mesh, self.surface, self.vertices)
 
     def write_deformed(self, path: str | Path) -> None:
         """Write `deformed` to a mesh file, as `write_mesh` does."""
-        imported("vtk_segdeform.io")  # imports pyvista
-        from ..io import write_mesh
+        output.write_deformed(path, self.mesh, self.surface, self.vertices)
 
-        write_mesh(path, self.deformed)
+    def layers(self) -> dict[str, pv.PolyData]:
+        """Return the surface and its cages in the current pose; see `output.layers`."""
+        return output.layers(self.mesh, self.surface, self.state, self.vertices)
 
     @property
     def regions(self) -> Regions | None:

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from vtk_segdeform import Mesh, Session, Surface, models
 from vtk_segdeform.geometry import signed_volume
-from vtk_segdeform.io import read_polydata, stored, to_polydata, triangles_of
+from vtk_segdeform.io import meshlab, read_polydata, stored, to_polydata, triangles_of
 from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.editor import Task, exporting, write_posed
 
@@ -107,7 +107,7 @@ def test_nothing_is_said_where_all_digits_are_stored(edited, tmp_path, suffix):
     assert f"Mesh saved to {tmp_path / f'far{suffix}'} · " in said
 
 
-@pytest.mark.parametrize("suffix", [".stl"])
+@pytest.mark.parametrize("suffix", [".stl", *([".3ds"] if meshlab.available() else [])])
 def test_nothing_is_said_of_a_loss_that_cannot_be_seen(edited, tmp_path, suffix):
     editor = edited(BALL)
     editor.do(exporting(tmp_path / f"near{suffix}"))
