@@ -24,7 +24,7 @@ from vtk_segdeform.session.store import saved_view
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sparse files, pipes")
 POINTS = np.asarray(OCTAHEDRON[0], dtype=float)
-MESHES = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtk", ".vtp", ".vtu", ".vtkhdf"]
+MESHES = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtk", ".vtp", ".vtu"]
 MESHES += [".dae", ".x3d"] if meshlab.available() else []
 DOORS = {
     **dict.fromkeys(MESHES, read_polydata),
@@ -43,7 +43,7 @@ def suffix(request):
 
 def test_a_sparse_file_of_20_gigabytes_is_refused_at_once(tmp_path, suffix):
     path = tmp_path / f"vast{suffix}"
-    if suffix in MESHES[:10]:
+    if suffix in MESHES[:9]:
         write_mesh(path, models.sphere(30))  # a sound file with a hole after it
     else:
         path.touch()

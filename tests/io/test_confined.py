@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pyvista as pv
 from numpy.testing import assert_array_equal
 from solids import CUBE, icosphere
 from vtkmodules.vtkCommonCore import vtkOutputWindow
@@ -60,12 +59,6 @@ def test_the_whole_file_is_read_with_or_without_the_child_process(
         assert_array_equal(again.cell_data[name], surface.cell_data[name])
     assert list(again.field_data["maker"]) == ["somebody", "<else>"]
     assert again.point_data.active_texture_coordinates_name == "uv"
-
-
-def test_pieces_of_a_file_are_one_surface(tmp_path):
-    parts = [pv.Cube().triangulate(), pv.Cube(center=(5, 0, 0)).triangulate()]
-    pv.MultiBlock(parts).save(tmp_path / "a.vtkhdf")
-    assert read_polydata(tmp_path / "a.vtkhdf").n_cells == 24
 
 
 LANDLOCK = pytest.mark.skipif(not landlock.version(), reason="needs Landlock")
@@ -123,54 +116,6 @@ def test_files_are_read_by_several_threads(tmp_path, fresh):
     for k in range(4):
         assert_array_equal(found[k], np.asarray(CUBE[0]) + k)
     assert len(confined._idle) == 1
-
-
-def hdf(path, **other):
-    """Write a VTKHDF file of a cube whose points are those of *other*, in another file."""
-    h5py = pytest.importorskip("h5py")
-    write_mesh(path, Mesh(*CUBE))
-    with h5py.File(path, "r+") as file:
-        group = file["VTKHDF"]
-        points = group["Points"][...]
-        del group["Points"]
-        if "storage" in other:
-            group.create_dataset(
-                "Points",
-                points.shape,
-                points.dtype,
-                external=[(other["storage"], 0, points.nbytes)],
-            )
-        elif "link" in other:
-            group["Points"] = h5py.ExternalLink(other["link"], "/Points")
-        else:
-            layout = h5py.VirtualLayout(points.shape, points.dtype)
-            layout[...] = h5py.VirtualSource(other["virtual"], "Points", points.shape)
-            group.create_virtual_dataset("Points", layout)
-
-
-@pytest.mark.parametrize(
-    ("how", "checked"),
-    [
-        *((how, True) for how in ("storage", "link", "virtual")),
-        *(pytest.param(how, False, marks=LANDLOCK) for how in ("storage", "virtual")),
-    ],
-)
-def test_data_of_other_files_are_not_read_by_hdf5(tmp_path, monkeypatch, fresh, how, checked):
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "secret", "w") as file:
-        file["Points"] = 7.0 + np.asarray(CUBE[0], dtype=float)
-    hdf(tmp_path / "a.vtkhdf", **{how: str(tmp_path / "secret")})
-    if not checked:  # as if the check did not find it
-        child = tmp_path / "child.py"
-        text = Path(reading_child.__file__).read_text(encoding="utf-8")
-        assert "            _require_own_data(path)" in text
-        child.write_text(text.replace("            _require_own_data(path)", "            pass"))
-        monkeypatch.setattr(reading_child, "__file__", str(child))
-        if how == "virtual":  # HDF5 then returns zeros
-            assert not np.any(read_polydata(tmp_path / "a.vtkhdf").points)
-            return
-    with pytest.raises(MeshError, match="data in another file" if checked else "not a readable"):
-        read_polydata(tmp_path / "a.vtkhdf")
 
 
 @MESHLAB
@@ -316,21 +261,21 @@ def test_replies_are_checked_on_arrival():
 
 
 def test_reading_that_takes_too_long_is_stopped(tmp_path, monkeypatch, fresh):
-    write_mesh(tmp_path / "a.vtkhdf", Mesh(*CUBE))
+    write_mesh(tmp_path / "a.vtp", Mesh(*CUBE))
     monkeypatch.setattr(confined, "_SECONDS", 0.0)
     monkeypatch.setattr(confined, "_PER_MEGABYTE", 0.0)
-    with pytest.raises(MeshError, match=r"a\.vtkhdf: .*reading was stopped after 0 s"):
-        read_mesh(tmp_path / "a.vtkhdf")
+    with pytest.raises(MeshError, match=r"a\.vtp: .*reading was stopped after 0 s"):
+        read_mesh(tmp_path / "a.vtp")
     assert not confined._idle
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs limits of memory")
 def test_reading_that_needs_too_much_memory_is_an_error(tmp_path, monkeypatch):
-    write_mesh(tmp_path / "a.vtkhdf", Mesh(*icosphere(4)))
+    write_mesh(tmp_path / "a.vtp", Mesh(*icosphere(4)))
     monkeypatch.setattr(confined, "_MEMORY", 1)
     monkeypatch.setattr(confined, "_PER_BYTE", 0)
-    with pytest.raises(MeshError, match=r"a\.vtkhdf: "):
-        read_mesh(tmp_path / "a.vtkhdf")
+    with pytest.raises(MeshError, match=r"a\.vtp: "):
+        read_mesh(tmp_path / "a.vtp")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a process that can be stopped")

@@ -22,7 +22,7 @@ from vtk_segdeform.io.convert import (
 from vtk_segdeform.io.surface import read_mesh
 from vtk_segdeform.mesh.mesh import Mesh
 
-EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtu", ".vtkhdf"]
+EXACT = [".obj", ".off", ".ply", ".vtk", ".vtp", ".vtu"]
 
 
 def shuffled(seed: int = 1) -> Mesh:
@@ -66,7 +66,7 @@ def test_strips_and_a_grid_of_triangles_become_the_same_mesh(tmp_path):
     assert_array_equal(read_mesh(tmp_path / "a.vtu").faces, mesh.faces)
 
 
-SUFFIXES = [".obj", ".off", ".ply", ".stl", ".vtk", ".vtp", ".vtu", ".vtkhdf", ".glb"]
+SUFFIXES = [".obj", ".off", ".ply", ".stl", ".vtk", ".vtp", ".vtu", ".glb"]
 RUBBISH = {
     "empty": b"",
     "text": b"hello\nthis is no mesh 1 2 3\n",
@@ -138,7 +138,7 @@ def test_a_file_without_polygons_says_what_it_holds(tmp_path):
         read_polydata(tmp_path / "a.vtp")
 
 
-@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtu", ".vtkhdf"])
+@pytest.mark.parametrize("suffix", [".vtk", ".vtp", ".vtu"])
 def test_a_file_with_the_suffix_of_another_format_says_so(tmp_path, suffix):
     (tmp_path / f"a{suffix}").write_text("v 0 0 0\n")
     with pytest.raises(MeshError, match=f"does not begin as a {suffix} file does"):

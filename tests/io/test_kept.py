@@ -22,7 +22,7 @@ from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.polygons import corner_values, padded_corners, polydata_of, polygons_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "files.rst"
-FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".vtp", ".vtk", ".vtu", ".vtkhdf"]
+FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".vtp", ".vtk", ".vtu"]
 SINGLE = {".stl", ".glb"}
 FOLLOW = ("Normals", "NORMAL", "NormalCorners")
 BEGIN, END = ".. table of kept data: begin\n", ".. table of kept data: end\n"

@@ -179,7 +179,7 @@ def test_a_surface_with_any_arrays_is_read_back_or_losses_are_reported(tmp_path,
     assert not lost_in(tmp_path / f"a{suffix}", surface)
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu", ".vtkhdf"])
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtu"])
 def test_every_special_name_is_read_back_or_losses_are_reported(tmp_path, suffix):
     surface = prism(4)
     for k, name in enumerate(SPECIAL):
@@ -258,7 +258,7 @@ def test_pymeshlab_reads_the_same_surface(tmp_path, suffix, surface):
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp", ".vtkhdf"])
+@pytest.mark.parametrize("suffix", [".ply", ".obj", ".off", ".vtk", ".vtp"])
 def test_a_thousand_surfaces_are_read_back_or_losses_are_reported(tmp_path, suffix):
     @settings(EASY, max_examples=1000 if suffix in (".ply", ".obj", ".off") else 100)
     @given(surface=surfaces())

@@ -20,7 +20,7 @@ import vtk_segdeform as sd
 from vtk_segdeform.io.array_names import set_names, storable
 from vtk_segdeform.io.convert import read_polydata, to_polydata, write_mesh
 
-FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtp", ".vtu", ".vtk", ".vtkhdf"]
+FORMATS = [".ply", ".obj", ".off", ".stl", ".glb", ".gltf", ".vtp", ".vtu", ".vtk"]
 TEXTS = [
     "\0", "a\0b", "a\nb", "a\r\nb", "a\tb", "\x1b[31mred\x1b[0m", "%00", "%41", "\"'<&>", "]]>",
     "&amp;", "&#10;", "😀", "👩\u200d🔬", "\ud800", "a\udcffb", "x" * 300, "é" * 150, "1a", "#",

@@ -15,7 +15,7 @@ from vtk_segdeform.errors import MeshError
 from vtk_segdeform.io.confined import read_confined
 from vtk_segdeform.io.convert import read_polydata, write_mesh
 from vtk_segdeform.io.reading_child import without_ranges
-from vtk_segdeform.io.vtk_arrays import data_sets
+from vtk_segdeform.io.vtk_arrays import data_set
 
 _OLD, _NEW = 42, 51  # versions of the legacy format
 
@@ -122,8 +122,7 @@ def contents(data):
 
 def read_in_child(path):
     """Return the one data set of a file."""
-    (data,) = data_sets(read_confined("vtk", path))
-    return data
+    return data_set(read_confined("vtk", path))
 
 
 @pytest.mark.parametrize("order", ["Little", "Big"])

@@ -39,7 +39,6 @@ WRITERS = {
             ".vtk",
             ".vtp",
             ".vtu",
-            ".vtkhdf",
             ".glb",
             ".gltf",
         )

@@ -30,7 +30,7 @@ from vtk_segdeform.cages.simplify import (
 )
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.energy.hessian import Factor
-from vtk_segdeform.errors import Cancelled, MeshError
+from vtk_segdeform.errors import Cancelled
 from vtk_segdeform.finish import CellEnergy
 from vtk_segdeform.finish.factor import factored
 from vtk_segdeform.geometry.lids import lids_of
@@ -42,11 +42,9 @@ from vtk_segdeform.geometry.volume import (
     volume_along,
     volume_gradient,
 )
-from vtk_segdeform.io.number_lines import Lines, numbers_of
 from vtk_segdeform.io.polygons import (
     triangles_of,
 )
-from vtk_segdeform.io.stl import read_stl
 from vtk_segdeform.kernels import dispatch, threads
 from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
 from vtk_segdeform.regions.regions import Regions
@@ -453,7 +451,6 @@ def test_mean_value_coordinates_agree_at_any_point(twin, rng):
 def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals(rng):
     pytest.importorskip("numba")
     from vtk_segdeform.kernels.compiled import add_adjoint, solve_factored
-    from vtk_segdeform.kernels.compiled.text import _number
 
     rows = np.arange(2500), np.arange(1500, 4000)
     subspace = Subspace(4000, rows, tuple(rng.random((2, 2500, 40))))
@@ -466,8 +463,7 @@ def test_kernels_are_compiled_once_for_copies_read_only_arrays_and_literals(rng)
     for coupled in (True, False):
         Factor(np.eye(180), coupled).solve(np.ones((60 if coupled else 180, 3)))
     closest_rotations(SHAPES["any"])
-    numbers_of(1000 * b"1.5 2\n", float)
-    for kernel in (add_adjoint, solve_factored, _number):
+    for kernel in (add_adjoint, solve_factored):
         # One for each precision; none if in the cache with its caller.
         kinds = {
             tuple(getattr(each, "dtype", each) for each in types) for types in kernel.signatures
@@ -528,60 +524,6 @@ def test_set_up_runs_a_trial_step_so_that_the_first_frame_compiles_nothing(monke
     assert set(loaded) == before
 
 
-def numbers(kind, count=300):
-    """Return words for *count* numbers."""
-    rng = np.random.default_rng(4)
-    values = rng.normal(size=count) * 10.0 ** rng.integers(-60, 60, size=count)
-    if kind == "shortest":
-        return [repr(value) for value in values.tolist()]
-    if kind == "of single precision":
-        return [f"{value:.17g}" for value in rng.normal(size=count).astype(np.float32).tolist()]
-    if kind == "short":
-        return [f"{value:+.6f}" for value in rng.normal(size=count)]
-    if kind == "between two doubles":  # closer to the middle than any table of doubles can tell
-        halves = 2 * rng.integers(2**53, 2**54, size=count) + 1
-        return [f"{value // 10}.{value % 10}e{k % 9}" for k, value in enumerate(halves.tolist())]
-    return [
-        f"{value}E{k % 90 - 45}" for k, value in enumerate(rng.integers(-(2**61), 2**61, count))
-    ]
-
-
-@pytest.mark.parametrize(
-    "kind", ["shortest", "of single precision", "short", "between two doubles", "long"]
-)
-def test_numbers_are_rounded_correctly_or_left(twin, kind):
-    words = numbers(kind)
-    kernel = dispatch.compiled_kernels().plain_numbers
-    n_left = 0
-    for word in words:
-        value = np.empty(1)
-        if kernel(*dispatch.inputs(np.frombuffer(word.encode(), np.uint8)), False, value) == 1:
-            assert value[0] == float(word)
-        else:
-            n_left += 1
-    assert n_left <= {"between two doubles": len(words), "long": 30}.get(kind, 0)
-
-
-@pytest.mark.parametrize(
-    ("text", "dtype"),
-    [("1 -2.50\n\t+3e2 .5 5. 1e-5 -0 -0.0e0", float), ("1 2 3", int), ("", int), ("0x10 1", float),
-     ("1 2 . 3", float), ("1 2e 3", float), ("1 -", float), ("1 2x", float), ("1 nan inf", float),
-     ("1\0 2", float), ("1 2.0", int), ("9007199254740993 4", int), ("1e400 1e-400 1", float),
-     ("12345678901234567890123 1", float), ("1_0 2", int), ("1,2", float),
-     ("12 3\n4\n\n5 6.5 7\n\n8", float), ("12 3\n4 x\n5 6 7\n8\n", float)],
-)  # fmt: skip
-@pytest.mark.parametrize("piece", [1 << 19, 3])
-def test_texts_of_numbers_are_parsed_alike(twin, monkeypatch, text, dtype, piece):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    monkeypatch.setattr("vtk_segdeform.io.number_lines._PIECE", piece)
-    for count in (None, len(text.split()), 3):
-        quick, slow = twin(lambda count=count: numbers_of(text.encode(), dtype, count))
-        assert (quick is None) == (slow is None)
-        if slow is not None:
-            assert quick.dtype == slow.dtype
-            assert quick.tobytes() == slow.tobytes()
-
-
 @pytest.mark.parametrize(("n", "length"), [(4, 1.0), (20, 1.0), (150, 30.0)])
 def test_surfaces_are_simplified_to_the_bit(twin, monkeypatch, n, length):
     monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
@@ -609,73 +551,3 @@ def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
     quick, slow = twin(lambda: _valid(surface, to))
     assert_array_equal(quick, slow)
     assert 0 < quick.sum() < len(quick)
-
-
-@pytest.mark.parametrize(
-    ("text", "is_plain"),
-    [("v 1 2.5 -3e2\nf 1 2 3\nv\t0 0 0 \r\n", True), ("v 1 2\nv 1 2 3\n", False),
-     ("v 1 2 3\nv 1 2\n", False), ("v 1 x\n", False), ("v 1 2 # 3\n", False), ("f 1 2 3\n", False),
-     ("v 1\n 2\n", True)],
-)  # fmt: skip
-@pytest.mark.parametrize("piece", [1 << 14, 1])
-def test_tables_of_lines_are_read_alike(twin, monkeypatch, text, is_plain, piece):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    monkeypatch.setattr("vtk_segdeform.io.number_lines._PIECE_LINES", piece)
-    quick, slow = twin(lambda: Lines(text.encode(), ("v", "f")).table("v"))
-    assert (quick is None, slow is None) == (not is_plain, not is_plain)
-    if is_plain:
-        assert quick.tolist() == slow.tolist()
-
-
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("f 1 2 -3\nv 1 2 3\nf 4 5 6 7", [[1, 0, 0], [2, 0, 0], [-3, 0, 0], [4, 0, 0]]),
-     ("f 1/2 3/4\n", [[1, 2, 0], [3, 4, 0]]), ("f 1//2 3//4", [[1, 0, 2], [3, 0, 4]]),
-     ("f\t1/2/-3 \r\n", [[1, 2, -3]]), ("f 0 1 2", None), ("f 1/0", None), ("f 1/ 2/", None),
-     ("f /1 2", None), ("f 1/2/3/4", None), ("f 1 a", None), ("f 1//", None), ("f 1.0", None),
-     ("f 1/-/2", None), ("f 123456789012345678", None), ("f - 1", None), ("f 1 2 #", None)],
-)  # fmt: skip
-def test_corners_of_lines_are_read_alike(twin, monkeypatch, text, expected):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    quick, slow = twin(lambda: Lines(text.encode(), ("v", "f")).corners("f"))
-    assert (quick is None, slow is None) == (expected is None, expected is None)
-    if expected is not None:
-        assert quick[1][: len(expected)].tolist() == expected
-        assert [each.tolist() for each in quick] == [each.tolist() for each in slow]
-
-
-STL = (
-    "solid a\n"
-    + 30
-    * """ facet normal 0 0 1
-  outer loop
-   vertex 0 0.5 1e-3
-\tVertex -1 2.5 3.25
-   vertex 7 8 0.1
-  endloop
- endfacet
-"""
-    + "endsolid a\n"
-)
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [("", ""), ("\n", "\r\n"), ("facet", "FACET"), ("0.5", "nan"), ("0.5", "0.5x"), ("0.5", ""),
-     ("endsolid a\n", ""), ("endsolid a\n", " endfacet"), ("vertex 7", "vertices 7"),
-     ("0.1", "0.1 5"), ("0.1\n  endloop", "\n0.1"), (" facet", "vertex 1 2 3\n facet"),
-     ("0.1", "123456789012345678901")],
-)  # fmt: skip
-def test_texts_of_triangles_are_parsed_alike(twin, monkeypatch, tmp_path, before, after):
-    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED_CHECKS", 0)
-    (tmp_path / "a.stl").write_text(STL.replace(before, after) if before else STL)
-
-    def read():
-        try:
-            surface = read_stl(tmp_path / "a.stl")
-        except (MeshError, ValueError) as error:
-            return type(error)
-        return surface.points.tobytes(), surface.faces.tobytes()
-
-    quick, slow = twin(read)
-    assert quick == slow

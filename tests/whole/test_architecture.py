@@ -57,7 +57,7 @@ GRANTED = {
     "io.grids": VTK,
     "io.meshlab": {"pymeshlab"},
     "io.polygons": VTK,
-    "io.reading_child": VTK | {"h5py", "pymeshlab"},
+    "io.reading_child": VTK | {"pymeshlab"},
     "io.vtk_arrays": VTK,
     "io.vtk_formats": VTK,
     "inside": {"pyvista"},

@@ -103,16 +103,3 @@ def test_on_a_full_disk_a_mesh_file_is_unchanged_and_the_error_names_it(tmp_path
     require_kept_on_a_full_disk(tmp_path, suffix)
     assert os.getcwd() == here  # PyMeshLab changes the folder when it fails
     capfd.readouterr()
-
-
-@posix
-@pytest.mark.campaign
-def test_on_a_full_disk_a_vtkhdf_file_is_unchanged(tmp_path):
-    call = "import pathlib, sys, test_bad_luck as t; "  # HDF5 prints again at exit
-    call += "t.require_kept_on_a_full_disk(pathlib.Path(sys.argv[1]), '.vtkhdf')"
-    done = subprocess.run(
-        [sys.executable, "-c", call, tmp_path],
-        capture_output=True, text=True, check=False,
-        env={**os.environ, "PYTHONPATH": f"{SUPPORT}:{ROOT}:{Path(__file__).parent}"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr

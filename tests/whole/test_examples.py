@@ -60,9 +60,6 @@ RIGHT = {
     "editor_in_a_plotter": lambda names: (
         names["moved"] > 0.2 and abs(names["session"].volume_change) < 1e-12
     ),
-    "editor_by_itself": lambda names: (
-        names["moved"] > 0.3 and abs(names["session"].volume_change) < 1e-12
-    ),
     "carry_a_grid": lambda names: names["sizes"].min() > 0.2 and len(names["sizes"]) > 1000,
     "fit_an_atlas": lambda names: names["errors"]["fitted"] < 0.9 * names["errors"]["spline"],
     "bend_a_solid": lambda names: (
@@ -82,16 +79,16 @@ LEAVES = {
     "bend_a_solid": ["bent.vtu", "solids.png"],
     "carry_a_grid": ["bent.vtu", "grid.vtu", "grids.png"],
 }  # the others' pictures: `make docs`
-# In the campaign only: pages and the tests of the folders make the same calls every day.  Of both
-# editors, the one in a plotter runs always; test_numbers bends the cactus.
+# In the campaign only: pages and the tests of the folders make the same calls every day.  The
+# editor in a plotter runs always; test_numbers bends the cactus.
 LONG = {
     "an_arm_in_a_sleeve", "beat_a_ventricle", "bend_a_solid", "bend_the_cactus", "carry_a_grid",
-    "dinosaur", "dinosaur_with_constraints", "editor_by_itself", "film_a_drag", "find_the_handles",
+    "dinosaur", "dinosaur_with_constraints", "film_a_drag", "find_the_handles",
     "fit_an_atlas", "many_poses", "one_cage_or_several", "with_and_without_volume",
     "write_a_motion",
 }  # fmt: skip
 FEW = {"cactus": 600, "dinosaur": 1000, "random_limbs": 600}  # vertices
-DRAW = {"bend_a_solid", "carry_a_grid", "editor_by_itself", "editor_in_a_plotter", "film_a_drag"}
+DRAW = {"bend_a_solid", "carry_a_grid", "editor_in_a_plotter", "film_a_drag"}
 ELSEWHERE = {"qt_application"}  # in test_qt_view, which has a screen
 
 

@@ -47,7 +47,7 @@ end_header
 7 0 1 2 3 0 1 -1
 """
 MATRIX = "1 0 0 0.5\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
-MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp", ".vtkhdf"]
+MESHES = [".ply", ".obj", ".off", ".stl", ".vtk", ".vtp"]
 HUGE = [b"4294967295", b"2147483647", b"99999999999999999999", b"-1", b"1e308", b"nan", b"0"]
 
 

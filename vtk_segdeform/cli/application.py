@@ -43,7 +43,7 @@ def app(options: Namespace, say: Say, progress: Progress) -> bool:
     require_screen()
     QtWidgets.QApplication.setApplicationName("segdeform")
     program = QtWidgets.QApplication.instance() or QtWidgets.QApplication(["segdeform"])
-    window = Window(first_run=True)
+    window = Window()
     window.show()
     path: Path | None = options.input
     QtCore.QTimer.singleShot(0, lambda: window.begin(path))

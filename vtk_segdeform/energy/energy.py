@@ -49,6 +49,7 @@ from scipy import sparse
 
 from ..arrays import FloatArray, IntArray, is_number
 from ..errors import ArgumentError
+from ..freezing import Frozen
 from ..geometry import IntrinsicTriangulation, closest_rotations, inner_vertices
 from ..mesh import Mesh
 from ..progress import Progress, tell
@@ -60,7 +61,7 @@ _CAGE_STIFFNESS = 3e-4  # e by traces, as a share of the shape energy: the disto
 
 
 @dataclass(frozen=True, eq=False)
-class Energy:
+class Energy(Frozen):
     """E(p) in the subspace; made by `shape_energy`."""
 
     quadratic: FloatArray  # Q, (m, m)

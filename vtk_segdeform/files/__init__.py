@@ -7,18 +7,17 @@ The files, in reading order:
     lock                lock files, released when their process ends
     regular_file        open regular files only: no pipes, no devices
     landlock            a process gives up its right to open other files
-    referenced_files    files that another file refers to
 """
 
 from . import landlock
 from .atomic import is_draft, replacing, require_place
 from .folders import autosave_folder, cache_folder
 from .lock import hold
-from .referenced_files import file_inside
 from .regular_file import (
     LARGEST_FILE,
     excess_of,
     fault_of,
+    file_inside,
     is_ours,
     open_regular,
     read_regular,

@@ -24,7 +24,6 @@ from pathlib import Path
 from .regular_file import fault_of, is_ours, name_of
 
 _DRAFT = re.compile(r"\.segdeform-[0-9a-f]{16}\.part(\.\w{1,8})?")
-_IN_FOLDER = re.compile(r"\d{4,}\.png")  # the only files written to a folder
 _A_DAY = 86_400.0  # seconds
 
 
@@ -32,7 +31,6 @@ _A_DAY = 86_400.0  # seconds
 def replacing(
     path: str | os.PathLike[str],
     *,
-    folder: bool = False,
     follow: bool = True,
     durable: bool = True,
 ) -> Iterator[Path]:
@@ -43,8 +41,6 @@ def replacing(
     path : path
         The new file keeps the mode of the old one.  If *path* is a symbolic link, its target is
         replaced.
-    folder : bool
-        Create a folder of numbered pictures instead; *path* must not exist yet.
     follow : bool
         If False, replace a symbolic link itself.
     durable : bool
@@ -58,17 +54,17 @@ def replacing(
     target = require_place(path, follow=follow)
     _sweep(target.parent)
     mode = _mode_of(target)
-    draft = _create_draft(target, folder, 0o666 if mode is None else 0o600)
+    draft = _create_draft(target, 0o666 if mode is None else 0o600)
     try:
         yield draft
-        if durable and not folder:
+        if durable:
             _flush(draft)
         if mode not in (None, _mode_of(draft)):  # some file systems have one mode for all
             os.chmod(draft, mode)
         os.replace(draft, target)
     finally:
         with suppress(OSError):  # do not hide the error that led here
-            _delete(draft)
+            draft.unlink(missing_ok=True)
     if durable:
         with suppress(OSError):  # folders cannot be flushed on every system
             _flush(target.parent)
@@ -103,13 +99,10 @@ def is_draft(name: str) -> bool:
     return _DRAFT.fullmatch(name) is not None
 
 
-def _create_draft(target: Path, folder: bool, mode: int) -> Path:
+def _create_draft(target: Path, mode: int) -> Path:
     suffix = target.suffix if re.fullmatch(r"\.\w{1,8}", target.suffix) else ""
     draft = target.with_name(f".segdeform-{secrets.token_hex(8)}.part{suffix}")
-    if folder:
-        draft.mkdir()
-    else:
-        os.close(os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode))
+    os.close(os.open(draft, os.O_RDWR | os.O_CREAT | os.O_EXCL, mode))
     return draft
 
 
@@ -120,21 +113,9 @@ def _sweep(folder: Path) -> None:
         for draft in [folder / entry.name for entry in entries if is_draft(entry.name)]:
             with suppress(OSError):
                 status = os.lstat(draft)
-                is_plain = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
+                is_plain = stat.S_ISREG(status.st_mode)
                 if is_ours(status) and is_plain and time.time() - status.st_mtime > _A_DAY:
-                    _delete(draft)
-
-
-def _delete(draft: Path) -> None:
-    """Delete a draft; of a folder, its pictures, and the folder once it is empty."""
-    if not draft.is_dir():
-        draft.unlink(missing_ok=True)
-        return
-    for each in list(draft.iterdir()):
-        if _IN_FOLDER.fullmatch(each.name) and not each.is_symlink():
-            each.unlink(missing_ok=True)
-    with suppress(OSError):
-        draft.rmdir()
+                    draft.unlink(missing_ok=True)
 
 
 def _mode_of(target: Path) -> int | None:

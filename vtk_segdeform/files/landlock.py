@@ -56,6 +56,6 @@ def advice() -> str:
         return ""
     return (
         "this system cannot keep VTK and PyMeshLab from opening other files than the given one "
-        "(Linux 5.13 or newer with Landlock can): open .vtkhdf, .x3d, .wrl and .dae files only if "
+        "(Linux 5.13 or newer with Landlock can): open .x3d, .wrl and .dae files only if "
         "you trust them"
     )

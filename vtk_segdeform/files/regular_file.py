@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from pathlib import Path
 from typing import BinaryIO
 
 LARGEST_FILE = 2 << 30
@@ -95,3 +96,17 @@ def fault_of(status: os.stat_result, *, own: bool = False) -> str:
 def is_ours(status: os.stat_result) -> bool:
     """Return whether the current user owns the file; always True on Windows."""
     return not hasattr(os, "geteuid") or bool(status.st_uid == os.geteuid())
+
+
+def file_inside(folder: Path, name: str) -> Path | None:
+    """Return the file *name* in *folder* or below, with links resolved; None if there is none.
+
+    Also None for paths that lead outside: absolute, by ``..`` or through a link.
+    """
+    folder = folder.resolve()
+    try:
+        file = (folder / name).resolve()
+        inside = bool(name) and file.is_relative_to(folder) and file.is_file()
+    except (OSError, ValueError, RuntimeError):  # too long, or circular links
+        return None
+    return file if inside else None

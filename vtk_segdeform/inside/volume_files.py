@@ -14,7 +14,7 @@ from ..checks import as_path
 from ..errors import MeshError, MissingDependencyError
 from ..files import excess_of, replacing, require_place
 from ..importing import imported
-from ..io import read_data_sets, require_writable, write_with_vtk
+from ..io import read_data_set, require_writable, write_with_vtk
 
 _log = logging.getLogger(__name__)
 _VTK = (".vtu", ".vtk")
@@ -37,8 +37,8 @@ def read_volume_file(path: str | Path) -> Any:
     suffix = path.suffix.lower()
     size = os.path.getsize(path) if os.path.isfile(path) else 0
     if suffix in _VTK and size and not excess_of(path.stat()):
-        found = list(read_data_sets(path))
-        return found[0] if len(found) == 1 and isinstance(found[0], pv.UnstructuredGrid) else None
+        found = read_data_set(path)
+        return found if isinstance(found, pv.UnstructuredGrid) else None
     if suffix not in _MESHIO:
         return None
     if not size:

@@ -51,7 +51,7 @@ from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
-from .vtk_formats import read_data_sets, write_with_vtk
+from .vtk_formats import read_data_set, write_with_vtk
 
 __all__ = [
     "IS_ROUNDING",
@@ -64,7 +64,7 @@ __all__ = [
     "loss_of",
     "of_its_kind",
     "polydata_of",
-    "read_data_sets",
+    "read_data_set",
     "read_mesh",
     "read_points",
     "read_polydata",

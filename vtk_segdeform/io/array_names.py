@@ -27,7 +27,6 @@ from ..geometry import signed_volume
 
 HEADER = "Header"  # a field array with the title of a file, in formats that have one
 COMMENTS = "Comments"  # a field array with the comments of a file, likewise
-CELL_TYPES = "types of the cells of a grid"  # a field array, see `grids`
 IS_ROUNDING = "segdeform_rounding"  # an attribute of the log records of rounded coordinates
 _log = logging.getLogger(__name__)
 # Of the size, and of the volume: the command line tells errors to 0.001 % of the size.
@@ -214,7 +213,7 @@ def warn_left_out(
     cells : bool
         Whether vertex and line cells are written.
     """
-    silent = (CELL_TYPES, COMMENTS) if get_names(surface, COMMENTS) else (CELL_TYPES,)
+    silent = (COMMENTS,) if get_names(surface, COMMENTS) else ()
     lost = [
         f"{sort} array {name!r}"
         for sort in ("point", "cell", "field")

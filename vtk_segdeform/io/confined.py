@@ -42,7 +42,7 @@ _MAGIC = b"\x93NUMPY\x01\x00"
 _HEAD = re.compile(  # what `reading_child` writes; numpy evaluates a header as an expression
     rb"\{'descr': '([<>|][iuf][1248])', 'fortran_order': False, 'shape': \(([\d, ]{0,60})\), \} *\n"
 )
-_PACKAGES = {"vtk": ("vtkmodules", "numpy", "h5py"), "meshlab": ("pymeshlab", "numpy")}
+_PACKAGES = {"vtk": ("vtkmodules", "numpy"), "meshlab": ("pymeshlab", "numpy")}
 _KEPT = ("LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH", "SYSTEMROOT", "TEMP")
 _START = "import runpy, sys; sys.path += {path!r}; runpy.run_path({child!r}, run_name='__main__')"
 Arrays = dict[str, Any]

@@ -46,13 +46,13 @@ from .off import read_off, write_off
 from .ply import ply_points, read_ply, write_ply
 from .polygons import polydata_of, triangles_of
 from .stl import read_stl, write_stl
-from .vtk_arrays import data_sets
+from .vtk_arrays import data_set
 from .vtk_formats import read_with_vtk, write_with_vtk
 from .wavefront import read_obj, write_obj
 
 _log = logging.getLogger(__name__)
 
-_VTK = dict.fromkeys((".vtk", ".vtp", ".vtu", ".vtkhdf"), (read_with_vtk, write_with_vtk))
+_VTK = dict.fromkeys((".vtk", ".vtp", ".vtu"), (read_with_vtk, write_with_vtk))
 _Format: TypeAlias = tuple[Callable[[Path], pv.PolyData], Callable[[Path, pv.PolyData], None]]
 # The reader and the writer of each format; PyMeshLab has others.
 _FORMATS: dict[str, _Format] = {
@@ -87,7 +87,7 @@ def read_polydata(path: str | Path) -> pv.PolyData:
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab also .3ds,
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf; with PyMeshLab also .3ds,
         .dae, .x3d, .wrl and others.
 
     Raises
@@ -151,7 +151,7 @@ def read_points(path: str | Path) -> pv.PolyData | pv.UnstructuredGrid:
             if path.suffix.lower() == ".ply":
                 others = [pv.PolyData(ply_points(path))]
             elif path.suffix.lower() in (".vtp", ".vtu"):
-                others = [*data_sets(read_confined("vtk", path))]
+                others = [data_set(read_confined("vtk", path))]
         if len(others) == 1 and others[0].n_points:
             return others[0]
         raise fault
@@ -185,9 +185,9 @@ def write_mesh(
     Parameters
     ----------
     path : str or Path
-        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .vtkhdf, .glb, .gltf; with PyMeshLab .3ds, .dae,
+        .obj, .off, .ply, .stl, .vtk, .vtp, .vtu, .glb, .gltf; with PyMeshLab .3ds, .dae,
         .x3d, .wrl, .ctm.  All formats except .stl, .glb, .gltf and those of PyMeshLab store every
-        digit; .vtk, .vtp, .vtu and .vtkhdf store every array.  An .stl is text, with named solids,
+        digit; .vtk, .vtp and .vtu store every array.  An .stl is text, with named solids,
         if its cells have groups, and binary otherwise.  A warning is logged for each array that is
         left out or renamed.
     mesh : Mesh or pyvista.PolyData
@@ -346,7 +346,7 @@ def as_polydata(mesh: object, name: str = "mesh", expected: str = "a PolyData") 
         return data
     if isinstance(data, pv.UnstructuredGrid):
         try:
-            return surface_of_grid(data, only_as_grid=False)
+            return surface_of_grid(data)
         except MeshError:
             line = "Surface(mesh.extract_surface(algorithm=None))"
             raise MeshError(f"{name} has cells that are not of a surface: {line}") from None

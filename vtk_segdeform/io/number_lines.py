@@ -1,9 +1,8 @@
 """Lines of numbers in text, parsed many at once.
 
 Python takes a microsecond for each word, which for a file of a million vertices is many seconds.
-Here numpy finds the lines and words, and numpy parses all numbers in one call, or a compiled kernel
-does so in several threads.  What is not plain numbers is left to the caller: the functions return
-None for it.
+Here numpy finds the lines and words, and parses all numbers in one call.  What is not plain numbers
+is left to the caller: the functions return None for it.
 """
 
 from __future__ import annotations
@@ -15,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import compiled_checks, in_parallel, inputs
 from .array_names import decoded
 
 _LINE_FEED, _SPACE, _TAB, _SLASH = b"\n \t/"
 _LONGEST = 2  # letters of a word that lines are grouped by
 _MOST = 10**17  # an index
 _LEAST_BYTE = 2  # of a colour, that is no fraction
-_PIECE, _PIECE_LINES = 1 << 19, 1 << 14  # bytes, or lines, that a thread parses at a time
 
 
 class Lines:
@@ -49,8 +46,11 @@ class Lines:
 
     def of(self, word: str) -> bytes:
         """Return the lines that begin with *word*."""
-        wanted = np.repeat(self._sort == self._words.index(word), np.diff(self._starts))
-        return bytes(self._letters[wanted])
+        is_one = self._sort == self._words.index(word)
+        turns = np.flatnonzero(np.diff(is_one, prepend=False, append=False))
+        ends = self._starts[turns].tolist()  # of runs of such lines, in turns with their starts
+        parts = zip(ends[::2], ends[1::2], strict=True)
+        return b"".join([self._text[start:end] for start, end in parts])
 
     def above(self, word: str) -> IntArray:
         """Return the number of lines of *word* above each line (n,)."""
@@ -72,35 +72,17 @@ class Lines:
 
     def table(self, word: str) -> FloatArray | None:
         """Return the numbers (k, w) of the lines of *word*; None unless all have w numbers."""
-        at = self.at(word)
-        kernels = compiled_checks(len(at))
-        if kernels is None or not len(at):
-            return _table_of(self.of(word), word)
-        values = np.empty((len(at), len(self._line(at[0]).split()) - 1))
-        text, starts, rows = inputs(self._letters, self._starts, at)
-        is_plain = np.zeros(len(at), dtype=bool)
-
-        def parse(first: int, end: int) -> None:
-            given = text, starts, rows[first:end], len(word)
-            is_plain[first:end] = kernels.numbers_of_lines(*given, values[first:end])
-
-        in_parallel(parse, len(at), _PIECE_LINES, blas=False)
-        return values if is_plain.all() else None
+        lines = self.of(word)
+        _, counts = words_per_line(lines)
+        if not len(counts) or (counts != counts[0]).any():
+            return None
+        width = int(counts[0]) - 1
+        values = numbers_of(lines.replace(word.encode(), b" "), np.float64, len(counts) * width)
+        return None if values is None else values.reshape(-1, width)
 
     def corners(self, word: str) -> tuple[IntArray, IntArray] | None:
-        """Return the corners of faces, the lines of *word*, as `_corners_of` does.
-
-        Corners may be given in different ways.
-        """
-        at = self.at(word)
-        kernels = compiled_checks(len(at))
-        if kernels is None:
-            return _corners_of(self.of(word))
-        most = int((self._starts[at + 1] - self._starts[at]).sum()) // 2
-        counts, corners = np.empty(len(at), dtype=np.int64), np.empty((most, 3), dtype=np.int64)
-        text, starts, rows = inputs(self._letters, self._starts, at)
-        found = kernels.corners_of_lines(text, starts, rows, len(word), counts, corners)
-        return (counts, corners[:found]) if found >= 0 else None
+        """Return the corners of faces, the lines of *word*, as `_corners_of` does."""
+        return _corners_of(self.of(word))
 
 
 def words_per_line(lines: bytes) -> tuple[IntArray, IntArray]:
@@ -115,14 +97,9 @@ def words_per_line(lines: bytes) -> tuple[IntArray, IntArray]:
 
 def numbers_of(text: bytes, dtype: Any, count: int | None = None) -> Any:
     """Return the numbers (k,) of *text*; None if it has anything else, or k is not *count*."""
-    most = len(text) // 2 + 1 if count is None else count
-    kernels = compiled_checks(most)
-    if kernels is not None:
-        numbers = _plain_numbers(kernels, text, np.dtype(dtype).kind == "i")
-        if numbers is not None and count in (None, len(numbers)):
-            return numbers.astype(dtype, copy=False)
     if count is None:
-        count = len(words_per_line(text)[0])
+        is_word = np.frombuffer(text, dtype=np.uint8) > _SPACE
+        count = int(is_word[:1].sum()) + int((is_word[1:] & ~is_word[:-1]).sum())
     try:
         numbers = np.fromstring(text, dtype=dtype, sep=" ")
     except (ValueError, DeprecationWarning):  # a warning before numpy 2.3
@@ -158,36 +135,6 @@ def colour_numbers(colours: Any) -> Any:
     """Return the numbers that `colour_bytes` reads as *colours*, which are bytes."""
     values = np.asarray(colours)
     return values if values.max(initial=0) >= _LEAST_BYTE else values / 255.0
-
-
-def _plain_numbers(kernels: Any, text: bytes, whole: bool) -> FloatArray | None:
-    """Return the numbers (k,) of *text*; None if one is not plain, or not *whole* if it must be."""
-    (characters,) = inputs(np.frombuffer(text, dtype=np.uint8))
-    starts = [0]
-    while starts[-1] < len(text):  # at ends of lines
-        starts.append(text.find(b"\n", starts[-1] + _PIECE) + 1 or len(text))
-    parts: list[FloatArray | None] = [None] * (len(starts) - 1)
-
-    def parse(first: int, end: int) -> None:
-        for k in range(first, end):
-            piece = characters[starts[k] : starts[k + 1]]
-            values = np.empty(len(piece) // 2 + 1)
-            found = kernels.plain_numbers(piece, whole, values)
-            parts[k] = values[:found].copy() if found >= 0 else None
-
-    in_parallel(parse, len(parts), 1, blas=False)
-    plain = [part for part in parts if part is not None]
-    return np.concatenate([np.empty(0), *plain]) if len(plain) == len(parts) else None
-
-
-def _table_of(lines: bytes, word: str) -> FloatArray | None:
-    """Return the numbers (k, w) of lines that begin with *word*; None unless all have w numbers."""
-    _, counts = words_per_line(lines)
-    if not len(counts) or (counts != counts[0]).any():
-        return None
-    width = int(counts[0]) - 1
-    values = numbers_of(lines.replace(word.encode(), b" "), np.float64, len(counts) * width)
-    return None if values is None else values.reshape(-1, width)
 
 
 def _corners_of(lines: bytes) -> tuple[IntArray, IntArray] | None:

@@ -11,7 +11,9 @@ header are checked against the number of bytes after it.
 
 from __future__ import annotations
 
+import math
 import re
+import struct
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
@@ -19,7 +21,6 @@ import numpy as np
 
 from ..arrays import IntArray
 from ..errors import MeshError
-from ..kernels import compiled_checks, inputs
 from .array_names import decoded
 from .number_lines import are_numbers, numbers_of
 
@@ -218,34 +219,26 @@ def _walk(
     Return the position after the rows; -1 if a row is wrong or exceeds the data.
     """
     sizes = [np.dtype(each.kind).itemsize for each in element.properties]
-    words = [np.dtype(each.length or "V0") for each in element.properties]
-    kinds = "".join(word.kind for word in words)
-    doubles = {*sizes, *(word.itemsize for word in words)} <= {0, 8} and not start % 8
-    if ("f" not in kinds or (doubles and order == "<")) and (
-        kernels := compiled_checks(element.count)
-    ):
-        given = inputs(
-            np.frombuffer(data, np.uint8),
-            np.frombuffer(data, "<f8", len(data) // 8),
-            np.array(sizes),
-            np.array([word.itemsize for word in words]),
-            np.frombuffer(kinds.encode(), np.uint8),
-        )
-        return int(kernels.rows_of_lists(begins, lengths, start, order == ">", *given))
-    at = start
-    for row in range(element.count):
-        for k, (size, word) in enumerate(zip(sizes, words, strict=True)):
+    words = [
+        struct.Struct(order + np.dtype(each.length).char) if each.length else None
+        for each in element.properties
+    ]
+    at, places, counts = start, list[int](), list[int]()
+    for _ in range(element.count):
+        for size, word in zip(sizes, words, strict=True):
             n = 1
-            if word.itemsize:
-                if at + word.itemsize > len(data):
+            if word is not None:
+                if at + word.size > len(data):
                     return -1
-                length = np.frombuffer(data, order + word.str[1:], 1, at)
+                (length,) = word.unpack_from(data, at)
                 n = _whole(length)
-                at += word.itemsize
+                at += word.size
             if n < 0 or at + size * n > len(data):
                 return -1
-            begins[row, k], lengths[row, k] = at, n
+            places.append(at)
+            counts.append(n)
             at += size * n
+    begins[:], lengths[:] = (np.reshape(each, begins.shape) for each in (places, counts))
     return at
 
 
@@ -256,7 +249,7 @@ def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[A
         n = 1
         if each.length:
             length = _numbers(data, start, element, (order + each.length, 1))
-            n, start = _whole(length), start + length.itemsize
+            n, start = _whole(length[0]), start + length.itemsize
             if n < 0:
                 raise MeshError(
                     f"a list of {element.name!r} has the length {length[0]:g}; export the file "
@@ -268,8 +261,8 @@ def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[A
 
 
 def _whole(length: Any) -> int:
-    """Return the only number of *length*; -1 if it is not whole, as a damaged text may have it."""
-    return int(length[0]) if np.isfinite(length[0]) and length[0] == np.rint(length[0]) else -1
+    """Return *length* as an int; -1 if it is not whole, as a damaged text may have it."""
+    return int(length) if math.isfinite(length) and length == int(length) else -1
 
 
 def _numbers(data: bytes, start: int, element: _Element, what: tuple[str, int]) -> Any:

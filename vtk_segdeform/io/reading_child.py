@@ -7,15 +7,14 @@ it does not need, reads the file, and writes plain arrays to standard output:
 
     limits of memory, processor time and open files; no files written, no core dumps
     Landlock (Linux 5.13): no file can be opened but the given one, no TCP connection made
-    HDF5 is searched for data in other files before VTK opens it
 
 Where there is no fork, the process reads the file itself, with the limits that exist there.
 
 A reply is a sequence of pairs of arrays in numpy's .npy format: a name, as bytes in UTF-8, and its
-values; it ends with an empty name.  The only name of a failed reply is "error".  A data set k has
+values; it ends with an empty name.  The only name of a failed reply is "error".  A data set has
 
-    k/points  k/verts/offsets  k/verts/corners ... (lines, polys, strips)  k/cells/...  k/types
-    k/point/j/name  /values  /lengths (of texts)  /uses  /ids  /components      (cell, field)
+    points  verts/offsets  verts/corners ... (lines, polys, strips)  cells/...  types
+    point/j/name  /values  /lengths (of texts)  /uses  /ids  /components        (cell, field)
 
 Long because it imports nothing of the package but `landlock`, from its folder, and numpy only where
 it must: so it starts in a fraction of a second.
@@ -38,7 +37,6 @@ _READERS = {
     ".vtk": ("vtkIOLegacy", "vtkDataSetReader"),
     ".vtp": ("vtkIOXML", "vtkXMLPolyDataReader"),
     ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
-    ".vtkhdf": ("vtkIOHDF", "vtkHDFReader"),
 }
 _STRUCTURED = (
     "vtkStructuredGrid", "vtkRectilinearGrid", "vtkStructuredPoints", "vtkImageData",
@@ -176,10 +174,8 @@ def _import_reader(tool: str, path: str) -> None:
         suffix = Path(path).suffix.lower()
         _module("vtkmodules.vtkCommonCore")
         _module(f"vtkmodules.{_READERS[suffix][0]}")
-        if suffix in (".vtk", ".vtkhdf"):
+        if suffix == ".vtk":
             _module("vtkmodules.vtkFiltersCore")
-        if suffix == ".vtkhdf":
-            _module("h5py")
 
 
 _module = importlib.import_module
@@ -193,8 +189,6 @@ def _with_vtk(path: Path) -> Iterator[tuple[str, Any]]:
     window, before = core.vtkStringOutputWindow(), core.vtkOutputWindow.GetInstance()
     core.vtkOutputWindow.SetInstance(window)
     try:
-        if suffix == ".vtkhdf":
-            _require_own_data(path)
         _update(reader, path)
         if _FAILURE.search(window.GetOutput()):
             raise ValueError(window.GetOutput())
@@ -203,11 +197,11 @@ def _with_vtk(path: Path) -> Iterator[tuple[str, Any]]:
             core.vtkOutputWindow.SetInstance(own)
             _require_whole(type(reader)(), data, own)
             core.vtkOutputWindow.SetInstance(window)
-        for number, piece in enumerate(_pieces(reader.GetOutputDataObject(0))):
-            if piece.GetClassName() in _STRUCTURED:
-                piece = _unstructured(piece)
-            for key, values in _arrays_of(piece, core):
-                yield f"{number}/{key}", values
+        data = reader.GetOutputDataObject(0)
+        if data is not None and data.GetClassName() in _STRUCTURED:
+            data = _unstructured(data)
+        if data is not None:
+            yield from _arrays_of(data, core)
     finally:
         core.vtkOutputWindow.SetInstance(before)
 
@@ -217,7 +211,7 @@ def _update(reader: Any, path: Path) -> None:
     reader.SetFileName(os.fsencode(path) if os.name == "posix" else str(path))
     if suffix == ".vtk":
         _read_all(reader)
-    elif suffix != ".vtkhdf":
+    else:
         plain = without_ranges(data := path.read_bytes())
         if len(plain) < len(data):
             reader.ReadFromInputStringOn()
@@ -255,37 +249,6 @@ def _require_whole(reader: Any, data: bytes, window: Any) -> None:
         raise ValueError("its numbers do not fit their counts: it is damaged, or was cut off")
 
 
-def _require_own_data(path: Path) -> None:
-    """Raise ValueError if an HDF5 file refers to data in other files.
-
-    Those are external links, external storage and virtual data sets.
-    """
-    try:
-        h5py = _module("h5py")
-    except ImportError:
-        raise ValueError("reading this format needs h5py: pip install h5py") from None
-    with h5py.File(os.fsencode(path), "r") as file:
-
-        def links_out(name: bytes, info: Any) -> bytes | None:
-            is_inside = info.type in (h5py.h5l.TYPE_HARD, h5py.h5l.TYPE_SOFT)
-            return None if is_inside else name
-
-        def is_stored_outside(name: bytes) -> bytes | None:
-            item = h5py.h5o.open(file.id, name)
-            if not isinstance(item, h5py.h5d.DatasetID):
-                return None
-            made = item.get_create_plist()
-            is_outside = made.get_external_count() or made.get_layout() == h5py.h5d.VIRTUAL
-            return name if is_outside else None
-
-        found = file.id.links.visit(links_out, info=True)
-        found = h5py.h5o.visit(file.id, is_stored_outside) if found is None else found
-    if found is not None:
-        raise ValueError(
-            f"{found.decode(errors='replace')!r} is data in another file, which is not read"
-        )
-
-
 def _unstructured(grid: Any) -> Any:
     """Return the cells of a structured *grid*: of two dimensions, quads and pixels."""
     append = _module("vtkmodules.vtkFiltersCore").vtkAppendFilter()
@@ -294,21 +257,6 @@ def _unstructured(grid: Any) -> Any:
     cells = append.GetOutput()
     cells.GetFieldData().ShallowCopy(grid.GetFieldData())
     return cells
-
-
-def _pieces(data: Any) -> Iterator[Any]:
-    """Yield *data*, or the data sets with cells of which it is composed."""
-    if data is None:
-        return
-    if not data.IsA("vtkCompositeDataSet"):
-        yield data
-        return
-    item = data.NewIterator()
-    item.InitTraversal()
-    while not item.IsDoneWithTraversal():
-        if item.GetCurrentDataObject().GetNumberOfCells():
-            yield item.GetCurrentDataObject()
-        item.GoToNextItem()
 
 
 def _arrays_of(piece: Any, core: Any) -> Iterator[tuple[str, Any]]:

@@ -1,11 +1,10 @@
-"""Data sets of VTK from the plain arrays of a `confined` process, each of them checked.
+"""A data set of VTK from the plain arrays of a `confined` process, each of them checked.
 
 VTK does not check that cells and arrays fit the points, and its filters would read outside them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,23 +18,14 @@ from .array_names import storable
 _CELLS = ("verts", "lines", "polys", "strips")
 
 
-def data_sets(arrays: dict[str, Any]) -> Iterator[pv.PolyData | pv.UnstructuredGrid]:
-    """Yield the surfaces and grids whose arrays are named as `reading_child` names them.
+def data_set(part: dict[str, Any]) -> pv.PolyData | pv.UnstructuredGrid:
+    """Return the surface or grid whose arrays are named as `reading_child` names them.
 
     Raises
     ------
     MeshError
-        If the cells or arrays of one do not fit its points.
+        If its cells or arrays do not fit its points.
     """
-    parts: dict[str, dict[str, Any]] = {}
-    for name, values in arrays.items():
-        number, _, key = name.partition("/")
-        parts.setdefault(number, {})[key] = values
-    for part in parts.values():
-        yield _data_set(part)
-
-
-def _data_set(part: dict[str, Any]) -> pv.PolyData | pv.UnstructuredGrid:
     data = pv.UnstructuredGrid() if "types" in part else pv.PolyData()
     points = part.get("points", np.empty((0, 3)))
     if points.shape[1:] != (3,):

@@ -1,34 +1,29 @@
-"""Surfaces through VTK's own readers and writers, for .vtk, .vtp, .vtu and .vtkhdf.
+"""Surfaces through VTK's own readers and writers, for .vtk, .vtp and .vtu.
 
 Reading: the readers of VTK do not validate a file, so they run in a `confined` process; the data
 sets are made of its arrays (`vtk_arrays`), and VTK's error messages become a MeshError.
 
 Writing: names that a format cannot store are changed first.  VTK's XML writer does not escape
-names, so that ``<`` makes the file unreadable.  Its HDF writer changes some names, possibly two to
-the same one.  Its legacy writer uses names as format strings, so that ``{`` aborts the process, and
-the legacy reader fails on long names and on active scalars of more than four components.
+names, so that ``<`` makes the file unreadable.  Its legacy writer uses names as format strings, so
+that ``{`` aborts the process, and the legacy reader fails on long names and on active scalars of
+more than four components.
 """
 
 from __future__ import annotations
 
-import logging
 import re
-import shutil
-import tempfile
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 import pyvista as pv
 from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkUnstructuredGrid
-from vtkmodules.vtkIOHDF import vtkHDFWriter
+from vtkmodules.vtkFiltersCore import vtkAppendFilter
 from vtkmodules.vtkIOLegacy import vtkPolyDataWriter, vtkUnstructuredGridWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 from ..errors import MeshError
 from .array_names import (
-    CELL_TYPES,
     HEADER,
     component_names,
     decoded,
@@ -39,11 +34,10 @@ from .array_names import (
     warn_renamed,
 )
 from .confined import read_confined
-from .grids import grid_of, is_grid, surface_of_grid
+from .grids import surface_of_grid
 from .reading_child import without_ranges
-from .vtk_arrays import data_sets
+from .vtk_arrays import data_set
 
-_log = logging.getLogger(__name__)
 _BEGIN_OF_MESSAGE = ("ERROR: In", "Warning: In", "Generic Warning: In")
 _PREFIX = re.compile(r"^\w+ \(\w+\): ")
 _XML = frozenset({".vtp", ".vtu"})
@@ -52,10 +46,8 @@ _BEGINS = {
     ".vtk": re.compile(rb"# vtk DataFile"),
     ".vtp": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
     ".vtu": re.compile(rb"[^<]*<[\s\S]*<?VTKFile\b"),
-    ".vtkhdf": re.compile(rb"\x89HDF\r\n\x1a\n"),
 }
-_WRITERS = {".vtk": vtkPolyDataWriter, ".vtkhdf": vtkHDFWriter}
-_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"', ".vtkhdf": "/."}
+_REFUSED = {".vtk": "{}", ".vtp": '<>&"', ".vtu": '<>&"'}
 _LONGEST_TITLE = 200  # bytes
 _SCALARS, _MOST = 0, 4  # VTK's attribute index; most components in a legacy file
 
@@ -65,27 +57,20 @@ def read_with_vtk(path: Path) -> pv.PolyData:
     suffix = path.suffix.lower()
     begin = _begin(path, suffix)
     try:
-        surfaces = [_surface(each, suffix) for each in data_sets(read_confined("vtk", path))]
+        surface = _surface(data_set(read_confined("vtk", path)))
     except MeshError as error:
         raise MeshError(f"is not a readable {suffix} file ({_first_message(error)})") from None
-    if len(surfaces) > 1:  # of several grids nothing is restored
-        surfaces = [_without_types(each) for each in surfaces]
-    surface = surfaces[0].append_polydata(*surfaces[1:]) if surfaces else pv.PolyData()
-    if suffix == ".vtkhdf":  # before VTK 9.7 it does not store which arrays are active
-        _activate(surface.point_data, "Normals", "normals", 3)
-        _activate(surface.cell_data, "Normals", "normals", 3)
-        _activate(surface.point_data, "TextureCoordinates", "texture_coordinates", 2)
-    elif suffix == ".vtk":
+    if suffix == ".vtk":
         _set_title(surface, begin)
     return surface
 
 
-def read_data_sets(path: Path) -> list[pv.PolyData | pv.UnstructuredGrid]:
-    """Read all data sets of a file as they are, in a confined process; MeshError if it cannot."""
+def read_data_set(path: Path) -> pv.PolyData | pv.UnstructuredGrid:
+    """Read the data set of a file as it is, in a confined process; MeshError if it cannot."""
     suffix = path.suffix.lower()
     try:
         _begin(path, suffix)
-        return list(data_sets(read_confined("vtk", path)))
+        return data_set(read_confined("vtk", path))
     except (MeshError, OSError) as error:
         raise MeshError(
             f"{path}: is not a readable {suffix} file ({_first_message(error)})"
@@ -113,20 +98,8 @@ def _set_title(surface: pv.PolyData, begin: bytes) -> None:
         set_names(surface, HEADER, [title])
 
 
-def _activate(attributes: pv.DataSetAttributes, name: str, role: str, width: int) -> None:
-    """Give an array the role that its name says, if no other array has it."""
-    values, active = attributes.get(name), f"active_{role}_name"
-    found = values is not None and values.shape[1:] == (width,) and values.dtype.kind == "f"
-    if found and getattr(attributes, active) is None:
-        setattr(attributes, active, name)
-
-
-def _surface(data: pv.DataSet, suffix: str) -> pv.PolyData:
-    if isinstance(data, pv.PolyData):
-        return data
-    if not isinstance(data, pv.UnstructuredGrid):
-        raise MeshError(f"contains a {type(data).__name__}, not a surface")
-    return surface_of_grid(data, only_as_grid=suffix == ".vtk")
+def _surface(data: pv.PolyData | pv.UnstructuredGrid) -> pv.PolyData:
+    return data if isinstance(data, pv.PolyData) else surface_of_grid(data)
 
 
 def _first_message(error: Exception) -> str:
@@ -137,49 +110,44 @@ def _first_message(error: Exception) -> str:
 
 
 def write_with_vtk(path: Path, surface: pv.PolyData | pv.UnstructuredGrid) -> None:
-    """Write a surface, or a grid to .vtu or .vtk; OSError if the file is incomplete.
+    """Write a surface, or a grid to .vtu or .vtk; OSError if the file cannot be written.
 
-    On a full disk VTK's XML writer aborts the process, and its HDF writer leaves an incomplete file
-    without an error.  So the former writes to memory, and the output of the latter is read back.
+    On a full disk VTK's XML writer aborts the process, so it writes to memory.
     """
     suffix = path.suffix.lower()
-    plain, title = _with_plain_names(surface, suffix), ""
+    plain = _with_plain_names(surface, suffix)
     is_cells = isinstance(surface, pv.UnstructuredGrid)
     if suffix == ".vtk":
-        title = _title_of(surface)
-        if title:
+        legacy = vtkUnstructuredGridWriter() if is_cells else vtkPolyDataWriter()
+        if title := _title_of(surface):
             plain.GetFieldData().RemoveArray(HEADER)
-    if suffix in _XML:
-        writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
-        writer.SetInputData(_as_written(plain, is_grid=suffix == ".vtu"))
-        writer.SetDataModeToBinary()
-        writer.WriteToOutputStringOn()
-        writer.Write()
-        path.write_bytes(without_ranges(writer.GetOutputString().encode()))
+            legacy.SetHeader(title)
+        legacy.SetInputData(plain)
+        legacy.SetFileName(str(path))
+        legacy.SetFileTypeToBinary()
+        try:
+            with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
+                legacy.Write()
+        except (RuntimeError, ValueError) as error:
+            raise OSError(" ".join(str(error).split())) from None
         return
-    try:
-        with pv.VtkErrorCatcher(raise_errors=True, send_to_logging=False):
-            is_legacy_grid = is_cells or (suffix == ".vtk" and is_grid(surface))
-            writer = vtkUnstructuredGridWriter() if is_legacy_grid else _WRITERS[suffix]()
-            writer.SetInputData(_as_written(plain, is_grid=is_legacy_grid))
-            again = surface
-            if title:
-                writer.SetHeader(title)
-            if suffix != ".vtkhdf":
-                writer.SetFileName(str(path))
-                writer.SetFileTypeToBinary()
-                writer.Write()
-            else:  # HDF5 locks its file, but *path* is locked already
-                with tempfile.TemporaryDirectory() as folder:
-                    whole = Path(folder) / path.name
-                    writer.SetFileName(str(whole))
-                    writer.Write()
-                    again = pv.read(whole)
-                    shutil.copyfile(whole, path)
-    except (RuntimeError, ValueError) as error:
-        raise OSError(" ".join(str(error).split())) from None
-    if not np.array_equal(again.points, surface.points, equal_nan=True):
-        raise OSError("the file is incomplete")
+    writer = vtkXMLPolyDataWriter() if suffix == ".vtp" else vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(plain if is_cells or suffix == ".vtp" else _grid_of(plain))
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    path.write_bytes(without_ranges(writer.GetOutputString().encode()))
+
+
+def _grid_of(surface: vtkPolyData) -> vtkUnstructuredGrid:
+    """Return the cells of a surface as a grid, in the same order."""
+    append = vtkAppendFilter()
+    append.SetInputData(surface)
+    append.Update()
+    grid = append.GetOutput()
+    for sort in ("Point", "Cell", "Field"):
+        getattr(grid, f"Get{sort}Data")().ShallowCopy(getattr(surface, f"Get{sort}Data")())
+    return grid
 
 
 def _title_of(surface: Any) -> str:
@@ -192,28 +160,12 @@ def _title_of(surface: Any) -> str:
     return title if is_plain and len(title.encode()) <= _LONGEST_TITLE else ""
 
 
-def _as_written(plain: Any, *, is_grid: bool) -> Any:
-    """Return what VTK's writer of surfaces, or of grids, takes."""
-    if plain.IsA("vtkUnstructuredGrid"):
-        return plain
-    return grid_of(plain) if is_grid else _without_types(plain)
-
-
-def _without_types(surface: Any) -> Any:
-    surface.GetFieldData().RemoveArray(CELL_TYPES)
-    return surface
-
-
 def _with_plain_names(surface: Any, suffix: str) -> Any:
     """Return a shallow copy whose arrays have names that the format can store."""
     copy = vtkUnstructuredGrid() if surface.IsA("vtkUnstructuredGrid") else vtkPolyData()
     copy.ShallowCopy(surface)
     for sort in ("Point", "Cell", "Field"):
         attributes = getattr(copy, f"Get{sort}Data")()
-        if suffix == ".vtkhdf":
-            _warn_of_components(attributes, f"{sort.lower()} array")
-        if suffix == ".vtkhdf" and sort != "Field":
-            _remove_texts(attributes, f"{sort.lower()} array")
         arrays = [attributes.GetAbstractArray(k) for k in range(attributes.GetNumberOfArrays())]
         refused, measure = _REFUSED.get(suffix, ""), _quoted if suffix == ".vtk" else len
         names = plain_names((a.GetName() for a in arrays), refused=refused, measure=measure)
@@ -229,26 +181,6 @@ def _with_plain_names(surface: Any, suffix: str) -> Any:
             if scalars is not None and scalars.GetNumberOfComponents() > _MOST:
                 attributes.SetActiveAttribute(-1, _SCALARS)
     return copy
-
-
-def _remove_texts(attributes: Any, what: str) -> None:
-    """Remove arrays of text, which VTK's HDF writer cannot write; log a warning for each."""
-    for k in reversed(range(attributes.GetNumberOfArrays())):
-        array = attributes.GetAbstractArray(k)
-        if array.IsA("vtkStringArray"):
-            _log.warning("VTKHDF cannot store %s %r: left out", what, array.GetName())
-            attributes.RemoveArray(k)
-
-
-def _warn_of_components(attributes: Any, what: str) -> None:
-    """Log a warning for each array whose components have names, which VTKHDF does not store."""
-    for k in range(attributes.GetNumberOfArrays()):
-        array = attributes.GetAbstractArray(k)
-        if any(component_names(array)):
-            _log.warning(
-                "VTKHDF cannot store the names of the components of %s %r: left out",
-                what, array.GetName(),
-            )  # fmt: skip
 
 
 def _renamed(array: Any, name: str, components: dict[str, str]) -> Any:

@@ -81,18 +81,21 @@ def in_parallel(
         return
     with one_blas_thread() if blas else contextlib.nullcontext():
         pool = _pool(threading.current_thread() is threading.main_thread())
-        batch, futures = _Batch(work), list[Future[None]]()
+        futures = list[Future[None]]()
         try:
             for task in tasks:
-                futures.append(pool.submit(batch, *task))
+                futures.append(pool.submit(work, *task))
             if progress is None:  # waking for each task would take time from the other threads
                 wait(futures, return_when=FIRST_EXCEPTION)
             for task, future in zip(tasks, futures, strict=True):
                 future.result()
                 if progress is not None:
                     progress(task[1] / n, message)
-        finally:
-            _surely(batch.end)
+        except BaseException:  # Ctrl+C as well: nothing may run any more
+            for future in futures:
+                future.cancel()
+            _surely(lambda: wait(futures))
+            raise
 
 
 def nearest(
@@ -226,34 +229,7 @@ class _BlasLimit:
                 self._before = None
 
 
-class _Batch:
-    """The tasks of one `in_parallel`; after `end` none of them runs, nor will."""
-
-    def __init__(self, work: Callable[[int, int], None]) -> None:
-        self._work = work
-        self._running, self._is_over = 0, False
-        self._changed = threading.Condition()
-
-    def __call__(self, start: int, stop: int) -> None:
-        with self._changed:
-            if self._is_over:
-                return
-            self._running += 1
-        try:
-            self._work(start, stop)
-        finally:
-            with self._changed:
-                self._running -= 1
-                self._changed.notify_all()
-
-    def end(self) -> None:
-        """Skip tasks that have not begun, and wait for the others."""
-        with self._changed:
-            self._is_over = True
-            self._changed.wait_for(lambda: not self._running)
-
-
-def _surely(action: Callable[[], None]) -> None:
+def _surely(action: Callable[[], object]) -> None:
     """Call *action* again until it completes; it must raise no exception of its own.
 
     Exceptions of signal handlers are raised afterwards.

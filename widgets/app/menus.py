@@ -83,9 +83,6 @@ class Menus:
         self._need_mesh.append(card)
         named = [(card, card.text(), "help")]
         menu.aboutToShow.connect(lambda: name_keys(named, window.keys))
-        self._need_mesh.append(
-            self._add(menu, "&First steps", lambda: window.editor_widget.first_steps.show())
-        )
         self._add(menu, "&About segdeform", lambda: show_about(window, __version__)).setMenuRole(
             _role("AboutRole")
         )

@@ -65,8 +65,6 @@ class Window(QtWidgets.QMainWindow):
         Where unsaved work is stored; by default the user's folder.
     interval : float
         Longest part of an ongoing drag that a crash may lose, in seconds.
-    first_run : bool
-        Whether to show the first steps to users who have not seen them yet.
 
     Attributes
     ----------
@@ -88,12 +86,10 @@ class Window(QtWidgets.QMainWindow):
         autosaves: Autosaves | None = None,
         *,
         interval: float = INTERVAL,
-        first_run: bool = False,
     ) -> None:
         super().__init__()
         self._settings = settings or QtCore.QSettings("vtk_segdeform", "segdeform")
         self.recent = Recent(self._settings)
-        self._first_run = self._settings if first_run else None
         self.keys, self._fault_of_keys = read_keys(self._settings)
         self.autosaves = autosaves or Autosaves()
         self.autosaver: Autosaver | None = None
@@ -235,7 +231,7 @@ class Window(QtWidgets.QMainWindow):
         self.pages.delete_views()
         document, session = opened
         self._documents, self.mesh_state = {session: document}, None
-        widget = self.editor_widget = DeformWidget(session, self, first_run=self._first_run)
+        widget = self.editor_widget = DeformWidget(session, self)
         widget.editor.controller.file = document.file(session, is_new=request.is_new)
         widget.editor.show_cube = True
         widget.editor.keys = self.keys

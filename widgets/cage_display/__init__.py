@@ -1,10 +1,6 @@
 """The widget that shows cages and lets their vertices be dragged.
 
-The files, in reading order:
-
-    cage_display      `CageDisplay`
-    cage_drag         dragging a cage vertex
-    vertex_picking    the cage vertex under the pointer
+cage_display      `CageDisplay`
 """
 
 from .cage_display import CageDisplay

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vtk_segdeform.arrays import is_number, is_whole
+from vtk_segdeform.arrays import FloatArray, IntArray, is_number, is_whole
 from vtk_segdeform.checks import as_flag, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh import face_edges
@@ -21,11 +21,14 @@ from vtk_segdeform.pictures import HANDLE, of_region, rgb
 from vtk_segdeform.session import Change, Session
 
 from ..picking import is_seen
-from ..scene import Gesture, Pointer, Widget, Wireframe
-from .cage_drag import CageVertex, drag_vertex
-from .vertex_picking import points_at_pointer
+from ..scene import Gesture, Phase, Pointer, Projection, Widget, Wireframe
 
 _NO_EDGES = np.empty((0, 2), dtype=np.int64)
+_PICK_RADIUS = 8.0  # pixels
+_DEPTH_PENALTY = 0.1  # pixels of distance for each pixel of additional depth
+
+CageVertex = tuple[int, int]
+"""A region, and a vertex of its cage."""
 
 
 class CageDisplay(Widget):
@@ -119,7 +122,7 @@ class CageDisplay(Widget):
         """Drag the vertex under the pointer, if there is one."""
         vertex = self._vertex_at(press)
         self._highlight(vertex)
-        return None if vertex is None else drag_vertex(self.view, self.session, vertex, press)
+        return None if vertex is None else _drag_vertex(self.view, self.session, vertex, press)
 
     def on_hover(self, pointer: Pointer) -> None:
         """Highlight the vertex under the pointer."""
@@ -133,7 +136,7 @@ class CageDisplay(Widget):
             return None
         numbers = [(r, v) for r in visible for v in range(len(vertices[r]))]
         points = np.concatenate([vertices[r] for r in visible])
-        for k in points_at_pointer(self.view, pointer, points):
+        for k in _points_at_pointer(self.view, pointer, points):
             if self.through or is_seen(self.view, points[k], session.vertices, session.mesh.faces):
                 return numbers[int(k)]
         return None
@@ -195,3 +198,46 @@ def _checked_region(region: int) -> int:
     if not is_whole(region, 0):
         raise ArgumentError(f"region must be a whole number, 0 or more; got {shown(region)}")
     return int(region)
+
+
+def _drag_vertex(
+    projection: Projection, session: Session, cage_vertex: CageVertex, press: Pointer
+) -> Gesture:
+    """Move a cage vertex in the view plane until the release, which records one undo step.
+
+    The vertex keeps its offset from the pointer.  If the gesture is cancelled or a move fails, the
+    state is as before the press.
+    """
+    session.commit()  # keeps an unfinished drag from elsewhere out of our undo step
+    region, vertex = cage_vertex
+    start = session.cage_vertices[region]
+    position = start[vertex : vertex + 1]
+    offset = projection.to_display(position)[0, :2] - press.position
+    committed = False
+    try:
+        while (pointer := (yield)).phase is Phase.MOVE:
+            depth = projection.to_display(position)[0, 2]
+            target = np.array([[*(pointer.position + offset), depth]])
+            moved = start.copy()
+            moved[vertex] = projection.to_world(target)[0]
+            session.move_cage(region, moved)
+        if pointer.phase is Phase.RELEASE:
+            session.commit()
+            committed = True
+    finally:
+        if not committed:
+            session.revert()
+
+
+def _points_at_pointer(projection: Projection, pointer: Pointer, points: FloatArray) -> IntArray:
+    """Return the indices of those of *points* (k, 3) that are under *pointer*, the best first.
+
+    The nearest to the pointer is best, with a penalty for points farther from the camera.
+    """
+    distance = np.linalg.norm(projection.to_display(points)[:, :2] - pointer.position, axis=1)
+    near = np.flatnonzero(distance <= _PICK_RADIUS)  # excludes NaN: points behind the camera
+    if not len(near):
+        return near
+    depth = (points[near] - projection.camera.GetPosition()) @ projection.view_direction
+    behind = (depth - depth.min()) / projection.pixel_at(points[near[depth.argmin()]])
+    return np.asarray(near[np.argsort(distance[near] + _DEPTH_PENALTY * behind)])

@@ -16,7 +16,7 @@ The files, in reading order:
                      autosaved work on disk, recovery after a crash, and when to save
     messages hints status_line help_card
                      messages, hints and the help card
-    session_history step_texts history
+    session_history history
                      the steps of the session and of its repaired copies; what each did and where;
                      jumps and previews
     notices notice_line

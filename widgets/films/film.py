@@ -1,4 +1,4 @@
-"""Films of a deformation: a GIF, an MP4, or a folder of PNG pictures.
+"""Films of a deformation: a GIF or an MP4.
 
     film("bend.gif", session, targets)             a drag, one picture for each of its targets
     film("turn.mp4", view, [turn_camera] * 90)     one picture after each call: a turntable
@@ -81,12 +81,12 @@ class Film:
         fps: float = 20.0,
         progress: Progress | None = None,
     ) -> None:
-        """Write the pictures; an existing file is replaced, an existing folder is not.
+        """Write the pictures; an existing file is replaced.
 
         Parameters
         ----------
         path : path
-            A .gif, an .mp4, or without a suffix a new folder for 0000.png, 0001.png, ...
+            A .gif or an .mp4.
         fps : float
             Pictures per second.
         progress : Progress, optional
@@ -125,7 +125,7 @@ def film(
     Parameters
     ----------
     path : path
-        A .gif, an .mp4, or without a suffix a new folder of PNG pictures.
+        A .gif or an .mp4.
     scene : Session, View, pyvista.Plotter or (vtkRenderer, vtkRenderWindowInteractor)
         A view is filmed as it is.  The mesh of a session is shown with fixed vertices in grey and
         handles in red.

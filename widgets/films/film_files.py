@@ -1,4 +1,4 @@
-"""Film files, written atomically: GIF, MP4, or a folder of PNG pictures.
+"""Film files, written atomically: GIF or MP4.
 
 GIFs have 256 colours, the same for all pictures to avoid flicker.  They are written by Pillow, a
 dependency of pyvista.  MP4s require imageio[ffmpeg].
@@ -19,7 +19,6 @@ from vtk_segdeform.checks import as_path, shown
 from vtk_segdeform.errors import MissingDependencyError, SessionError
 from vtk_segdeform.files import replacing, require_place
 from vtk_segdeform.importing import imported
-from vtk_segdeform.pictures import png_of
 from vtk_segdeform.progress import Progress, tell
 
 Picture = NDArray[np.uint8]  # (h, w, 3), upper row first, all of one size
@@ -51,9 +50,9 @@ def write_film(
     require_film(path, fps)
     if not len(pictures):
         raise SessionError(f"{path}: a film without pictures cannot be written")
-    write = {".gif": _write_gif, ".mp4": _write_mp4}.get(path.suffix.lower(), _write_folder)
+    write = {".gif": _write_gif, ".mp4": _write_mp4}[path.suffix.lower()]
     try:
-        with replacing(path, folder=not path.suffix) as draft:
+        with replacing(path) as draft:
             write(draft, pictures, _reported(pictures, progress), fps)
     except OSError as fault:
         raise SessionError(f"{path}: cannot be written ({fault.strerror or fault})") from fault
@@ -63,18 +62,15 @@ def require_film(path: str | os.PathLike[str], fps: float = 20.0) -> None:
     """Raise the errors of `Film.save` in advance, before the film is made."""
     path = as_path(path)
     suffix = path.suffix.lower()
-    if suffix not in (".gif", ".mp4", ""):
-        raise SessionError(f"{path}: a film is a .gif, an .mp4 or, without a suffix, a folder")
+    if suffix not in _LIBRARIES:
+        raise SessionError(f"{path}: a film is a .gif or an .mp4")
     if not (is_number(fps, 0.1) and fps <= 100.0):
         raise SessionError(f"fps must be 0.1 to 100 pictures per second; got {shown(fps)}")
-    if os.path.isdir(path) or (not suffix and os.path.lexists(path)):
-        raise SessionError(f"{path}: already exists; choose another name")
     try:
         require_place(path)
     except OSError as fault:
         raise SessionError(f"{path}: {fault.strerror or fault}") from fault
-    if suffix in _LIBRARIES:
-        _library(suffix)
+    _library(suffix)
 
 
 def _reported(pictures: Pictures, progress: Progress | None) -> Iterator[Picture]:
@@ -107,18 +103,11 @@ def _write_mp4(path: Path, pictures: Pictures, each: Iterator[Picture], fps: flo
         writer.close()
 
 
-def _write_folder(path: Path, pictures: Pictures, each: Iterator[Picture], fps: float) -> None:
-    del pictures, fps
-    for k, picture in enumerate(each):
-        (path / f"{k:04d}.png").write_bytes(png_of(picture))
-
-
 def _library(suffix: str) -> Any:
     name, package = _LIBRARIES[suffix]
     try:
         return imported(name)
     except ImportError as fault:
         raise MissingDependencyError(
-            f"writing {suffix} files requires a library: pip install {package}.  Or give a name "
-            "without a suffix to write a folder of pictures"
+            f"writing {suffix} files requires a library: pip install {package}"
         ) from fault

@@ -5,7 +5,6 @@
     toolbar(editor)                   the buttons that are the same in every mode
     status(editor)                    the message, the next step, progress
     history(editor)                   the states by name
-    first_steps()                     the cards for the first run
     press(editor, name, value)        use a control: one entry for every skin
 
 Qt and the web page draw these models and call `press`; nothing of a control is written twice.
@@ -18,11 +17,10 @@ The files, in reading order:
                 the sections
     toolbar     the toolbar and the menu about the view
     menu        the menu of the right button
-    status      the status, the history and the first steps
+    status      the status and the history
 """
 
 from .fields import (
-    Card,
     Cell,
     Column,
     Entry,
@@ -38,11 +36,10 @@ from .fields import (
 )
 from .menu import menu
 from .panel import all_sections, press, sections
-from .status import first_steps, history, status
+from .status import history, status
 from .toolbar import toolbar, view_entries
 
 __all__ = [
-    "Card",
     "Cell",
     "Column",
     "Entry",
@@ -55,7 +52,6 @@ __all__ = [
     "Value",
     "Word",
     "all_sections",
-    "first_steps",
     "history",
     "menu",
     "press",

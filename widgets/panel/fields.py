@@ -206,15 +206,6 @@ class Entry:
     is_undone: bool = False
 
 
-@dataclass(frozen=True)
-class Card:
-    """One of the first steps."""
-
-    name: str
-    title: str
-    sentence: str
-
-
 def key_button(keys: Keys, name: str, action: str, label: str = "", **state: Any) -> Field:
     """Return a button for an *action* of the table of *keys*, with its label or *label*.
 

@@ -1,4 +1,4 @@
-"""The status, the history and the first steps."""
+"""The status and the history."""
 
 from __future__ import annotations
 
@@ -6,13 +6,7 @@ import re
 
 from ..editor import DeformEditor, Keys, Mode, key_cap, states_of
 from ..volume_overlay import percent
-from .fields import Card, Entry, Field, Status, Word
-
-_FIRST_STEPS = (
-    Card("pin", "Pin", "Shift-click a point to keep it in place."),
-    Card("pull", "Pull", "Drag the surface: it follows."),
-    Card("done", "Done", "Release. The volume is preserved."),
-)
+from .fields import Entry, Field, Status, Word
 
 
 def status(editor: DeformEditor) -> Status:
@@ -79,8 +73,3 @@ def history(editor: DeformEditor) -> tuple[Entry, ...]:
         Entry(name, is_current=place == here, is_undone=place > here)
         for place, name in enumerate(states_of(editor.controller))
     )
-
-
-def first_steps() -> tuple[Card, ...]:
-    """Return the cards for the first run, in their order."""
-    return _FIRST_STEPS

@@ -6,7 +6,6 @@ The files, in reading order:
     panel       the panel beside the view, which draws `widgets.panel`
     toolbar sections tables status history
                 the parts of the panel
-    first_steps a box with the first steps for the first run
     view_menu   menu entries for the camera
     keys_dialog the keys of all actions
     controls    buttons, fields and layouts of the parts

@@ -26,7 +26,6 @@ from .. import plugin  # noqa: F401 - registers `segdeform` on plotters even wit
 from ..editor import DeformEditor, Keys
 from ..hosting import session_of
 from ..scene import View, set_background, set_lights
-from .first_steps import FirstSteps
 from .keys_dialog import KeysDialog
 from .panel import DeformPanel
 
@@ -42,9 +41,6 @@ class DeformWidget(QtWidgets.QWidget):
         What to edit.
     parent : QWidget, optional
         The parent widget.
-    first_run : QSettings, optional
-        Show the first steps to users who have not seen them yet, which is stored there; by default
-        they are not shown.
 
     Attributes
     ----------
@@ -54,8 +50,6 @@ class DeformWidget(QtWidgets.QWidget):
         The editor in the view.
     panel : DeformPanel
         The panel beside it.
-    first_steps : FirstSteps
-        The box with them; ``first_steps.show()`` shows it again.
     taken_keys : callable
         Returns the keys that no action can have, with labels; the application's menus have them.
     keys_changed : signal
@@ -66,9 +60,7 @@ class DeformWidget(QtWidgets.QWidget):
 
     keys_changed = QtCore.Signal()
 
-    def __init__(self, mesh: Any, parent: Any = None, *, first_run: Any = None) -> None:
-        if first_run is not None:
-            require(first_run, QtCore.QSettings, "first_run")
+    def __init__(self, mesh: Any, parent: Any = None) -> None:
         session = session_of(mesh)
         super().__init__(_checked(parent))
         self._is_closed = False
@@ -85,7 +77,6 @@ class DeformWidget(QtWidgets.QWidget):
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
-        self.first_steps = FirstSteps(self.plotter, self.editor, first_run)
         halves = QtWidgets.QSplitter(self)
         halves.addWidget(self.plotter)
         halves.addWidget(self.panel)
@@ -135,7 +126,6 @@ class DeformWidget(QtWidgets.QWidget):
         if self._camera_position == tuple(self.plotter.camera.position):
             self.editor.controller.camera.viewpoint.frame(animate=False)
         self._camera_position = None
-        self.first_steps.begin()
 
     def changeEvent(self, event: Any) -> None:  # noqa: N802
         """Use the background for a new palette, light or dark."""

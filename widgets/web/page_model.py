@@ -17,7 +17,7 @@ from .. import panel
 from ..editor import DeformEditor
 from ..panel import Field
 from ..scene import Pointer
-from .touch import card_for_fingers, for_fingers
+from .touch import for_fingers
 
 _PERIOD = 0.1  # seconds between two refreshes, at least
 _UNSHARED = frozenset({"act", "acts", "action", "while_busy"})
@@ -49,9 +49,6 @@ class PageModel:
         self._is_due = False
         self._place: tuple[float, float] | None = None  # of the open menu, as shares of the view
         editor.controller.show_menu = self._open_menu
-        cards = panel.first_steps()
-        state.cards = _plain(cards)
-        state.touch_cards = _plain(tuple(map(card_for_fingers, cards)))
         self.refresh()
         self.stop: Callable[[], None] = editor.controller.messages.on_change(self.changed)
 

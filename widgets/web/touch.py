@@ -1,4 +1,4 @@
-"""Hints and first steps for fingers: what to tap instead of a key or a click with Shift.
+"""Hints for fingers: what to tap instead of a key or a click with Shift.
 
 Drag a cage vertex · Next: 4, deform             Drag a cage vertex · Next: [deform]
 No cages yet. Press F to fit them to ...         No cages yet. [Fit them to ...]
@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from ..panel import Card, Word
+from ..panel import Word
 
 # What a key does is named after it; another key may come between.
 _USE = re.compile(r"(?:, \w)?(?:: |, | to )([^.·,():]+?)(?=$| ·|[.,()])")
@@ -48,11 +48,6 @@ def for_fingers(words: Iterable[Word]) -> tuple[Word, ...]:
         found.append(Word(text, word.action))
     plain = (replace(word, text=_plain(word.text)) for word in found)
     return tuple(word for word in plain if word.text)
-
-
-def card_for_fingers(card: Card) -> Card:
-    """Return one of the first steps as it is done with a finger."""
-    return replace(card, sentence=_plain(card.sentence))
 
 
 def _plain(text: str) -> str:

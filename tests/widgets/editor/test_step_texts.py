@@ -7,7 +7,7 @@ import pytest
 from scenes import sausage
 from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.widgets.editor.step_texts import step_texts
+from vtk_segdeform.widgets.editor.session_history import step_texts
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 

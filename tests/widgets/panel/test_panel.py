@@ -22,7 +22,7 @@ from vtk_segdeform.widgets.editor import Controller, controller, preparing
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
-from vtk_segdeform.widgets.panel.status import first_steps, history, status, words_of
+from vtk_segdeform.widgets.panel.status import history, status, words_of
 from vtk_segdeform.widgets.panel.toolbar import toolbar, view_entries
 
 # What some of the controls can have, among `BAD`.
@@ -440,7 +440,6 @@ def test_names_and_tooltips_are_complete(editor):
         idle = field.kind in ("label", "menu", "file") or not field.enabled
         assert idle or field.act or editor.keys[field.action].action
     assert tooltip(of(editor, "paint.grow"), editor.keys) == "Grow by one ring (+)"
-    assert [card.name for card in first_steps()] == ["pin", "pull", "done"]
 
 
 def test_actions_hold_no_editor(editor):

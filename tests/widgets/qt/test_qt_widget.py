@@ -483,38 +483,6 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     assert not rows.isVisible()
 
 
-def test_the_first_steps_are_shown_once_until_a_click_escape_or_a_pull(make, state, tmp_path):
-    settings = QtCore.QSettings(str(tmp_path / "a.ini"), QtCore.QSettings.Format.IniFormat)
-    session = Session(state[0], state=state[1])
-    seen = Seen(DeformWidget(session, first_run=settings))
-    cards, plotter = seen.widget.first_steps, seen.widget.plotter
-    assert cards.isVisible()
-    assert not settings.contains("first steps seen")
-    before = seen.session.state
-    plotter.setFocus()
-    QtTest.QTest.keyClick(plotter, Qt.Key_Escape)
-    assert not cards.isVisible()
-
-    def press() -> None:
-        camera, start = seen.editor.view.camera, cards.geometry().topLeft() + QtCore.QPoint(9, 9)
-        place = camera.GetPosition()
-        QtTest.QTest.mousePress(plotter, Qt.LeftButton, Qt.NoModifier, start)
-        QtTest.QTest.mouseMove(plotter, start + QtCore.QPoint(60, 90))
-        until(lambda: camera.GetPosition() != place, "the view to be pressed")
-        QtTest.QTest.mouseRelease(plotter, Qt.LeftButton, Qt.NoModifier, start)
-
-    for dismiss in (press, lambda: bend(seen)):
-        cards.show()
-        assert plotter.rect().contains(cards.geometry())
-        assert seen.session.state is before
-        dismiss()
-        assert not cards.isVisible()
-    seen.widget.close()
-    again = Seen(DeformWidget(Session(state[0]), first_run=settings))
-    assert not again.widget.first_steps.isVisible()
-    again.widget.close()
-
-
 def dialog_of(widget):
     """Wait for the dialog with the keys, and return it."""
     until(lambda: widget.findChildren(KeysDialog), "the dialog")

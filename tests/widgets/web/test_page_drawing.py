@@ -39,7 +39,6 @@ class Drawn:
         self.stream, self.drawing = self.web.stream, self.web.stream._drawing
         self.web.editor.controller.finishing.is_wanted = False  # which moves the pose at rest
         self.page: Page = served.page(browser, size=SIZE)
-        self.page.evaluate("document.querySelector('.sd-cards').click()")
         self.await_surface()
         window = self.web.plotter.render_window
         served.call(lambda: window.AddObserver("StartEvent", self._count))

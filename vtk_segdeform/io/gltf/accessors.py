@@ -1,23 +1,22 @@
 """Accessors of a glTF document that get new numbers.
 
-Numbers in single precision that nothing else uses are replaced where they are, so that the layout
-of the file remains.  Others (shared, sparse, quantised) become new ones at the end of the buffer.
+Numbers in single precision in a bufferView of their own are replaced where they are, so that a file
+does not grow each time it is saved.  Others (interleaved, shared, sparse, quantised) become new
+ones at the end of the buffer.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
+import math
+from collections import Counter, defaultdict
 from typing import Any
 
 import numpy as np
 
 from ...arrays import FloatArray
-from .buffers import object_, objects, whole
+from .buffers import object_, objects
 
 _FLOAT, _TYPES = 5126, {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
-_SIZES = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
-_WITH_RANGES = ("buffers", "bufferViews", "accessors")
 _Owner = tuple[int | None, str, str]
 
 
@@ -35,7 +34,7 @@ class Accessors:
     def __init__(self, head: dict[str, Any], binary: bytes) -> None:
         self._head, self._binary = head, bytearray(binary)
         self._owners = _owners(head)
-        self._ranges, self._others = _ranges(head), _other_ranges(head)
+        self._uses, self._ranges = _used(head)
 
     def replace(self, number: int, values: FloatArray, owner: _Owner) -> int:
         """Give accessor *number* new values (n, k); return its number, which may be a new one.
@@ -56,7 +55,9 @@ class Accessors:
             self._head["accessors"].append(accessor)
             number = len(self._head["accessors"]) - 1
         elif self._is_alone(number):
-            start, stride, _ = self._ranges[number]
+            view = self._head["bufferViews"][accessor["bufferView"]]
+            start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+            stride = view.get("byteStride", 4 * numbers.shape[1])
             rows = np.ndarray(
                 numbers.shape, "<f4", buffer=self._binary, offset=start, strides=(stride, 4)
             )
@@ -94,17 +95,15 @@ class Accessors:
             accessor["max"] = numbers.max(axis=0).astype(float).tolist()
 
     def _is_alone(self, number: int) -> bool:
-        """Return whether the bytes of an accessor are single precision that nothing else uses."""
+        """Return whether an accessor is all of its bufferView, in single precision."""
         accessor = self._head["accessors"][number]
-        if "sparse" in accessor or accessor.get("componentType") != _FLOAT:
+        index = accessor.get("bufferView")
+        if "sparse" in accessor or accessor.get("componentType") != _FLOAT or index is None:
             return False
-        if self._ranges[number] is None:
-            return False
-        view = self._head["bufferViews"][accessor["bufferView"]]
-        if view.get("extensions"):  # compressed as well
-            return False
-        others = [each for k, each in enumerate(self._ranges) if k != number and each is not None]
-        return all(_are_apart(self._ranges[number], each) for each in [*others, *self._others])
+        view = self._head["bufferViews"][index]
+        start, end = _range_of(view)
+        overlapping = [each for each in self._ranges if each[0] < end and start < each[1]]
+        return not view.get("extensions") and self._uses[index] == 1 and len(overlapping) == 1
 
 
 def _owners(head: dict[str, Any]) -> dict[int, set[Any]]:
@@ -140,52 +139,28 @@ def _use(owners: dict[int, set[Any]], index: object, owner: Any) -> None:
         owners[int(index)].add(owner)
 
 
-def _ranges(head: dict[str, Any]) -> list[Any]:
-    """Return (first byte, stride, (bytes of a row, bytes in all)) of each accessor, or None."""
-    ranges: list[Any] = []
-    views = objects(head, "bufferViews", "the file")
-    for k, accessor in enumerate(objects(head, "accessors", "the file")):
-        if "bufferView" not in accessor:
-            ranges.append(None)
-            continue
-        name = f"accessor {k}"
-        kind = whole(accessor, "componentType", name)
-        row = _SIZES.get(kind, 4) * _WIDTHS.get(str(accessor.get("type")), 16)
-        number = whole(accessor, "bufferView", name, most=len(views) - 1)
-        view, count = views[number], whole(accessor, "count", name, least=1)
-        start = whole(view, "byteOffset", name, default=0)
-        start += whole(accessor, "byteOffset", name, default=0)
-        stride = whole(view, "byteStride", name, default=row, least=1)
-        ranges.append((start, stride, (row, (count - 1) * stride + row)))
-    return ranges
+def _range_of(place: dict[str, Any]) -> tuple[float, float]:
+    """Return the first byte of a range of the buffer, and the byte after it."""
+    start, length = place.get("byteOffset", 0), place.get("byteLength", 0)
+    known = isinstance(start, int | float) and isinstance(length, int | float)
+    return (start, start + length) if known else (0.0, math.inf)
 
 
-def _other_ranges(head: dict[str, Any]) -> list[Any]:
-    """Return the ranges of images, sparse accessors, compressed data ..., as `_ranges` does."""
-    views = objects(head, "bufferViews", "the file")
-    ranges: list[Any] = []
-    pending: list[Any] = [value for key, value in head.items() if key not in _WITH_RANGES]
-    for each in (*views, *objects(head, "accessors", "the file")):
-        pending += each.values()  # but not their own ranges
+def _used(head: dict[str, Any]) -> tuple[Counter[int], list[tuple[float, float]]]:
+    """Return how often each bufferView is used, and all ranges of bytes in a document.
+
+    Ranges are those of bufferViews, and of compressed data in their extensions.
+    """
+    uses, ranges = Counter[int](), list[tuple[float, float]]()
+    pending: list[Any] = [value for key, value in head.items() if key != "buffers"]
     while pending:
         value = pending.pop()
         if isinstance(value, list):
             pending += value
         elif isinstance(value, dict):
             pending += value.values()
-            number = value.get("bufferView", -1)
-            known = isinstance(number, int) and 0 <= number < len(views)
-            place = views[number] if known else value
-            start, length = place.get("byteOffset", 0), place.get("byteLength")
-            if isinstance(start, int | float) and isinstance(length, int | float):
-                ranges.append((start, 1, (1, length)))
-    return ranges
-
-
-def _are_apart(first: Any, second: Any) -> bool:
-    """Return whether two ranges share no byte, one after the other or interleaved."""
-    (a, step, (row, length)), (b, other, (width, extent)) = first, second
-    if a + length <= b or b + extent <= a:
-        return True
-    gap = (b - a) % step
-    return bool(step == other and gap >= row and gap + width <= step)
+            if isinstance(number := value.get("bufferView"), int):
+                uses[number] += 1
+            if "byteLength" in value:
+                ranges.append(_range_of(value))
+    return uses, ranges

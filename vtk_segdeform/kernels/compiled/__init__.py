@@ -15,7 +15,6 @@
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
     shells          `shells.shell_volumes`, `shells.shell_depths`
-    text            `number_lines.numbers_of`, `number_lines.Lines`, `ply_tables.tables_of`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
 are positional, as numba requires, and outputs are arrays passed as arguments.
@@ -41,12 +40,6 @@ from .pairs import facing_pairs, opposite_pairs
 from .products import add_adjoint, add_product
 from .rotations import rotations
 from .shells import shell_extremes, shell_sums, shells_around
-from .text import (
-    corners_of_lines,
-    numbers_of_lines,
-    plain_numbers,
-    rows_of_lists,
-)
 from .volumes import (
     area_gradient,
     area_slopes,
@@ -75,7 +68,6 @@ __all__ = [
     "cell_sums",
     "collapse_costs",
     "corner_terms",
-    "corners_of_lines",
     "determinants",
     "facing_pairs",
     "first_equal_points",
@@ -88,15 +80,12 @@ __all__ = [
     "moment_sums",
     "move_along",
     "number_trees",
-    "numbers_of_lines",
     "one_fan_each",
     "opposite_pairs",
     "pair_half_edges",
-    "plain_numbers",
     "ring_normals",
     "rings",
     "rotations",
-    "rows_of_lists",
     "shell_extremes",
     "shell_sums",
     "shells_around",

@@ -1,10 +1,9 @@
-// The page around the view: opening by upload, downloads, colours, drawer, first steps.
+// The page around the view: opening by upload, downloads, colours, drawer.
 import controls from './panel.js';
 import View from './view.js';
 
-const STEPS_SEEN = 'segdeform steps seen', COLOURS = 'segdeform colours';
+const COLOURS = 'segdeform colours';
 const DRAWING = 'segdeform drawing', DRAWS = 'view.draw_in_browser';
-const CARDS = { pin: 'mdi-pin-outline', pull: 'mdi-gesture-swipe-up', done: 'mdi-check' };
 const remembered = {
   get(name) { try { return localStorage.getItem(name); } catch { return null; } },
   set(name, value) { try { localStorage.setItem(name, value); } catch { /* private window */ } },
@@ -21,7 +20,7 @@ const Page = {
   inject: ['trame'],
   data: () => ({
     pins: false, panel: false, fault: '', sent: null, isOver: false, asked: null,
-    hasSteps: !remembered.get(STEPS_SEEN), isTouch: isTouch.matches, ended: '', hasHelp: false,
+    isTouch: isTouch.matches, ended: '', hasHelp: false,
     previewed: null, draws: remembered.get(DRAWING) !== 'no', isDrawable: false,
   }),
   mounted() {
@@ -110,11 +109,6 @@ const Page = {
       if (button) button.blur(); // the next key is for the editor
     },
     forget() { this.fault = ''; },
-    closeSteps() {
-      this.hasSteps = false;
-      remembered.set(STEPS_SEEN, 'yes');
-    },
-    cardIcon: (name) => CARDS[name] || 'mdi-circle-small',
 
     // Files.
     choose() { this.$refs.file.click(); },
@@ -183,7 +177,7 @@ const Page = {
   template: `
     <div class="sd" :class="{ dark }" @click="settle" @dragover="over" @dragleave.self="isOver = false" @drop="drop">
       <slot v-bind="{ ...$data, press, choose, download, togglePins, togglePanel, toggleDark,
-        extended, setDrawable, forget, closeSteps, cardIcon, preview, jump }"></slot>
+        extended, setDrawable, forget, preview, jump }"></slot>
       <input ref="file" type="file" class="sd-file" aria-label="File to open" @change="chosen">
       <div v-if="isOver" class="sd-over" @dragover="over" @dragleave="isOver = false" @drop="drop">
         <span>Drop to open</span></div>

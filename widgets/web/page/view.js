@@ -128,7 +128,7 @@ const isOnButton = (event) => event.target.closest && event.target.closest('butt
 
 const View = {
   props: { pins: Boolean, draws: Boolean, topic: { default: 'segdeform.picture' } },
-  emits: ['begun', 'download', 'open', 'drawable'],
+  emits: ['download', 'open', 'drawable'],
   template: `<div class="sd-canvas" ref="area"
       @pointerdown="down" @pointermove="move" @pointerup="up" @pointercancel="up"
       @pointerleave="leave" @wheel.prevent="turn" @contextmenu.prevent
@@ -225,7 +225,6 @@ const View = {
     },
 
     down(event) {
-      this.$emit('begun');
       this.$refs.area.setPointerCapture(event.pointerId);
       if (document.activeElement) document.activeElement.blur();
       if (event.pointerType === 'touch') return this.fingers.down(event);
