@@ -120,7 +120,7 @@ def by_elasticity(
     n_inner = int(np.count_nonzero(inner))
 
     def forces(moves: FloatArray) -> FloatArray:
-        change = (gradient @ moves).reshape(-1, 3, 3)
+        change = np.asarray(gradient @ moves).reshape(-1, 3, 3)
         trace = np.einsum("cii->c", change)[:, None, None]
         stress = change + np.swapaxes(change, 1, 2) + lame * trace * np.eye(3)
         return np.asarray((back @ (volumes * stress).reshape(-1, 3))[inner].ravel())

@@ -156,7 +156,7 @@ class _Energy:
         """Return E at *x* (p, 3); its value is infinite if *eps* is 0 and a corner is inverted."""
         terms, found = np.empty((len(self._ids), 22)), np.empty((len(self._ids), 2))
         kernels = compiled_kernels(_FACES_PER_CORNER * len(self._ids))
-        compute = kernels.corner_terms if kernels else _corner_terms
+        compute: Callable[..., None] = kernels.corner_terms if kernels else _corner_terms
         given = self._ids, self._hats, self._volumes, *inputs(x)
         in_parallel(
             lambda start, stop: compute(*given, eps, terms, found, start, stop),
@@ -200,7 +200,7 @@ class _Energy:
     def _forces(self, terms: FloatArray) -> FloatArray:
         """Return the slope and the diagonal of the Hessian at all points, (p, 6)."""
         kernels = compiled_kernels(_FACES_PER_CORNER * len(self._ids))
-        add = kernels.add_corner_forces if kernels else _add_corner_forces
+        add: Callable[..., None] = kernels.add_corner_forces if kernels else _add_corner_forces
         given = self._ids, self._hats, *inputs(terms)
         return self._sum(lambda *part: add(*given, *part), 6)
 
