@@ -9,7 +9,7 @@ from scenes import sausage
 from solids import rotation
 
 from vtk_segdeform.energy.energy import shape_energy
-from vtk_segdeform.energy.hessian import full_factor, quadratic_factor, rotation_term
+from vtk_segdeform.energy.hessian import _roots, full_factor, quadratic_factor, rotation_term
 from vtk_segdeform.geometry.kmeans import cluster_positions
 from vtk_segdeform.subspace.subspace import cage_subspace
 
@@ -126,3 +126,21 @@ def test_a_mirrored_pose_still_has_a_factor():
     held = energy.quadratic + 1e-3 * np.eye(len(REST)) * np.trace(energy.quadratic)
     factor = full_factor(held, rotation_term(energy, mirrored))
     assert factor is None or np.isfinite(factor.solve(mirrored)).all()
+
+
+def test_the_stiffness_of_weak_clusters_is_raised(rng):
+    """Also if they are flat, needles, mirrored or nothing; firm ones have the inverse itself."""
+    spread = rng.normal(size=(60, 3, 3))
+    stiffness = spread @ np.swapaxes(spread, 1, 2)
+    stiffness[:20] -= 2.0 * np.linalg.eigvalsh(stiffness[:20])[:, 1, None, None] * np.eye(3)
+    stiffness[20:24] = np.diag([1.0, 1.0, 1e-9])
+    stiffness[24:28] = np.diag([1.0, 1e-7, 0.0])
+    values, axes = np.linalg.eigh(stiffness)
+    raised = np.maximum(values, 1e-3 * np.abs(values).max(axis=1, keepdims=True))
+    expected = (axes / raised[:, None]) @ np.swapaxes(axes, 1, 2)
+    roots = _roots(stiffness)
+    size = np.abs(expected).max(axis=(1, 2), keepdims=True)
+    found = np.swapaxes(roots, 1, 2) @ roots
+    assert_allclose(found / size, expected / size, atol=1e-11)
+    assert (values[28:, 0] > 2e-3 * values[28:, 2]).sum() > 20
+    assert np.isfinite(_roots(np.zeros((1, 3, 3)))).all()
