@@ -69,9 +69,6 @@ def in_parallel(
         Whether *work* multiplies matrices.  If not, BLAS is not looked for: the first time in a
         process takes as long as opening a mesh of 10,000 vertices.
     """
-    if 0 < n <= size and progress is None:
-        work(0, n)
-        return
     tasks = [(start, min(start + size, n)) for start in range(0, n, size)]
     if len(tasks) <= 1 or n_threads() == 1:
         for start, stop in tasks:

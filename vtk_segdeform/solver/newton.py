@@ -204,11 +204,7 @@ def constrained_step(
         return h, np.zeros(0), []
     gh = np.array([np.vdot(row, h) for row in rows])  # -G H^-1 d
     gz = np.array([[np.vdot(row, direction) for direction in z] for row in rows])
-    # (G Z)^-1 (g - G H^-1 d)
-    if len(rows) == 1:
-        multipliers = (g + gh) / gz[0] if gz[0, 0] else np.zeros(1)
-    else:
-        multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]
+    multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
     for multiplier, direction in zip(multipliers, z, strict=True):
         h -= multiplier * direction
     return h, multipliers, z
