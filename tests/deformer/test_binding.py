@@ -222,7 +222,7 @@ def test_a_file_that_is_replaced_while_it_is_read_is_ignored(tmp_path, counted, 
         whole(*arguments)
 
     monkeypatch.setattr(binding_cache, "in_parallel", parallel)
-    assert binding_cache.read_binding(path, SCENE.mesh.n_vertices) is None
+    assert binding_cache.read_binding(path, SCENE.mesh.vertices) is None
 
 
 @posix

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from campaign import every
 from limbed import crab, torso
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 from solids import icosphere, rotation
 
 import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.deformer import Stiffness
-from vtk_segdeform.energy import shape_energy
+from vtk_segdeform.energy import grown_gradients, shape_energy
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import CellEnergy
 from vtk_segdeform.geometry import rigid_fit
@@ -188,6 +188,63 @@ def test_rigid_parts_are_congruent_after_the_finish(name, mesh, fixed, handle, r
     assert pose.fixed_error < 1e-12
     soft = deformer.stiffened(None).hold(fixed=fixed, handle=handle)
     assert max(residuals(mesh, stiffness, soft.finish(soft.solve(targets)).vertices)) > 1e-3
+
+
+def drag(**options) -> tuple[sd.Deformer, np.ndarray, list[sd.Solution]]:
+    """Return a deformer whose arm has a bone, the bone, and frames of a drag of the hand."""
+    body = torso(3)
+    x = body.vertices
+    bone = (x[:, 0] > 0.8) & (x[:, 0] < 1.4)
+    feet, hand = x[:, 2] < -1.3, np.flatnonzero(x[:, 0] > 1.6)
+    regions = sd.segment(body)
+    deformer = sd.Deformer(
+        body, regions, sd.fit_cages(body, regions), fixed=feet, handle=hand,
+        stiffness=np.where(bone, np.inf, 1.0), **options,
+    )  # fmt: skip
+    way = np.array([-0.3, 0.0, 0.6])
+    frames = [deformer.solve(x[hand] + share * way) for share in np.linspace(0.2, 1.0, 5)]
+    return deformer, np.where(bone, np.inf, 1.0), frames
+
+
+def test_rigid_parts_are_nearly_congruent_in_every_frame_of_a_drag():
+    deformer, stiffness, frames = drag()
+    for frame in frames:
+        assert max(residuals(deformer.mesh, stiffness, frame.vertices)) < 1e-3
+        assert frame.handle_error < 1e-4
+        assert abs(frame.volume_change) < 1e-12
+
+
+def test_the_inside_of_a_rigid_part_has_the_gradient_of_its_surface():
+    middle = np.where(np.abs(HEIGHT - LENGTH / 2) < 0.3 * LENGTH, np.inf, 1.0)
+    problem = bar_deformer().stiffened(middle)._problem
+    binding = problem.binding
+    gradients = grown_gradients(binding.energy, binding.interior, problem.rest_cages)
+    of_bone = binding.rigid.axes[0] @ binding.rigid.maps[0, 1:]
+    off = np.abs(gradients - of_bone).max(axis=(1, 2))
+    assert (off < 1e-9 * np.abs(of_bone).max()).any()
+
+
+def test_points_in_a_rigid_part_move_with_it():
+    deformer, stiffness, frames = drag()
+    bone, rest = np.isinf(stiffness), deformer.mesh.vertices
+    marrow = 0.4 * rest[bone] + 0.6 * rest[bone].mean(axis=0)
+    turn, shift = rigid_fit(rest[bone], frames[-1].vertices[bone])
+    off = deformer.carry(marrow) - (marrow @ turn.T + shift)
+    assert np.abs(off).max() < 2e-3 * deformer.mesh.diagonal
+    assert_allclose(deformer.carry(rest), frames[-1].vertices, atol=1e-12)
+
+
+def test_a_binding_with_rigid_parts_is_read_again(tmp_path):
+    computed, _, frames = drag(cache=tmp_path)
+    read, _, again = drag(cache=tmp_path)
+    assert_array_equal(frames[-1].vertices, again[-1].vertices)
+    soft = read.stiffened(None)
+    plain = sd.Deformer(read.mesh, read.regions, read.cages)
+    hand = {"fixed": computed.fixed, "handle": computed.handle}
+    targets = read.mesh.vertices[computed.handle] + [0.0, 0.0, 0.3]
+    assert_array_equal(
+        soft.hold(**hand).solve(targets).vertices, plain.hold(**hand).solve(targets).vertices
+    )
 
 
 def test_a_rigid_part_with_one_handle_vertex_turns_about_it():

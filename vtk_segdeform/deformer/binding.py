@@ -1,6 +1,7 @@
 """Binding: all that is computed once for a mesh, its regions and its cages, in seconds.
 
-    W~                 `subspace.cage_subspace`, figure 6 of the paper
+    W~                 `subspace.cage_subspace`, figure 6 of the paper; rigid parts move affinely
+                       (`subspace.affine_parts`)
     E(p)               `energy.shape_energy`, eqs. (5), (10), (20), with the stiffness of the cages
                        and the interior
     coarse volume      `coarse_volume.CoarseVolume`, of a large mesh
@@ -28,16 +29,17 @@ from ..energy import (
     shape_energy,
     with_cage_stiffness,
     with_interior,
+    with_rotating_rows,
 )
 from ..geometry import cluster_within_parts, decimated, lids_of
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions
 from ..solver import CoarseVolume
-from ..subspace import Subspace, cage_subspace
-from .stiffness import Stiffness
+from ..subspace import AffineParts, Subspace, blend_at, cage_subspace
+from .stiffness import MOST, Stiffness
 
-_FORMAT = 15  # increment whenever the content of a binding changes
+_FORMAT = 16  # increment whenever the content of a binding changes
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,9 @@ class BindingInputs:
 class Binding:
     """The subspace, energy and volumes with which a `Deformer` solves."""
 
-    energy: Energy
+    cages: Subspace  # W~ by the cages alone
+    rigid: AffineParts | None  # the parts that are to be rigid
+    energy: Energy  # in `cages`, blended with these parts
     interior: FloatArray  # (k,): the weights of the points inside the body
     coarse_volume: CoarseVolume
 
@@ -131,13 +135,29 @@ class Binding:
         subspace = cage_subspace(regions, cages, progress=share)
         tell(progress, 0.38, "clustering rotations")
         _ = inputs.clusters
-        energy, weights = _energy(inputs, subspace, part(progress, 0.4, 0.9))
-        coarse = CoarseVolume.of(regions.mesh, subspace, progress=part(progress, 0.93, 1.0))
-        return cls(energy, weights, coarse)
+        return cls._of(inputs, subspace, None, part(progress, 0.4, 1.0))
 
     def stiffened(self, inputs: BindingInputs) -> Binding:
         """Return the binding of *inputs* that differ in their stiffness only."""
-        return Binding(*_energy(inputs, self.energy.subspace), self.coarse_volume)
+        return self._of(inputs, self.cages, None if self.rigid else self.coarse_volume)
+
+    @classmethod
+    def _of(
+        cls,
+        inputs: BindingInputs,
+        cages: Subspace,
+        coarse: CoarseVolume | None,
+        progress: Progress | None = None,
+    ) -> Binding:
+        """Return the binding of *inputs* with W~ *cages*, and its *coarse* volume, if known."""
+        rigid, subspace = _rigid_parts(inputs, cages), cages
+        if rigid is not None:
+            subspace, coarse = rigid.blended(cages, inputs.rest.vertices, rigid.shares), None
+        energy, weights = _energy(inputs, subspace, rigid, part(progress, 0.0, 0.85))
+        if coarse is None:
+            last = part(progress, 0.88, 1.0)
+            coarse = CoarseVolume.of(inputs.regions.mesh, subspace, progress=last)
+        return cls(cages, rigid, energy, weights, coarse)
 
     def grown(self, inputs: BindingInputs, p: FloatArray) -> Binding:
         """Return this binding of *inputs* with another shape to keep: that with cages *p* (m, 3).
@@ -146,17 +166,38 @@ class Binding:
         """
         rest, subspace = inputs.rest, self.energy.subspace
         shape = rest.with_vertices(subspace.map(p - inputs.rest_cages, rest.vertices))
-        energy = _surface_energy(inputs, shape, p, subspace)
+        energy = _surface_energy(inputs, shape, p, subspace, self.rigid)
         gradients = grown_gradients(self.energy, self.interior, p)
         return replace(self, energy=with_interior(energy, gradients, self.interior))
 
 
+def _rigid_parts(inputs: BindingInputs, cages: Subspace) -> AffineParts | None:
+    """Return the parts of *inputs* that are to be rigid; their collars are as wide as the cages.
+
+    That is, as the mean distance between cage vertices.
+    """
+    if inputs.stiffness is None or not inputs.stiffness.rigid:
+        return None
+    spacing = np.sqrt(inputs.rest.vertex_areas.sum() / len(inputs.rest_cages))
+    return AffineParts.of(
+        inputs.rest,
+        cages,
+        inputs.stiffness.rigid,
+        collar=float(spacing),
+        smoothness=inputs.regions.smoothness,
+    )
+
+
 def _energy(
-    inputs: BindingInputs, subspace: Subspace, progress: Progress | None = None
+    inputs: BindingInputs,
+    subspace: Subspace,
+    rigid: AffineParts | None,
+    progress: Progress | None = None,
 ) -> tuple[Energy, FloatArray]:
     """Return the energy at rest, and the weights of the points inside the body."""
-    energy = _surface_energy(inputs, inputs.rest, inputs.rest_cages, subspace, progress=progress)
-    gradients, volumes = _interior(inputs, energy)
+    p = inputs.rest_cages
+    energy = _surface_energy(inputs, inputs.rest, p, subspace, rigid, progress=progress)
+    gradients, volumes = _interior(inputs, energy, rigid)
     weights = interior_weights(energy, gradients, volumes)
     return with_interior(energy, gradients, weights), weights
 
@@ -166,6 +207,7 @@ def _surface_energy(
     shape: Mesh,
     p: FloatArray,
     subspace: Subspace,
+    rigid: AffineParts | None,
     *,
     progress: Progress | None = None,
 ) -> Energy:
@@ -176,10 +218,16 @@ def _surface_energy(
         shape, subspace, inputs.stretch, clusters, stiffness=factors, progress=progress
     )
     faces = [cage.faces for cage in inputs.cages]
-    return with_cage_stiffness(energy, p, faces, clusters)
+    weight = np.full(3, MOST * energy.scale)
+    energy = with_cage_stiffness(energy, p, faces, clusters)
+    for rows in () if rigid is None else rigid.gradients:
+        energy = with_rotating_rows(energy, rows, rows @ p, weight)
+    return energy
 
 
-def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatArray]:
+def _interior(
+    inputs: BindingInputs, energy: Energy, rigid: AffineParts | None
+) -> tuple[FloatArray, FloatArray]:
     """Return the gradients (k, 3, m) at points inside the bodies, and the volumes (k,) there."""
     mesh, regions = inputs.rest, inputs.regions
     ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
@@ -187,4 +235,8 @@ def _interior(inputs: BindingInputs, energy: Energy) -> tuple[FloatArray, FloatA
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
     factors = None if inputs.stiffness is None else inputs.stiffness.factors
     interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses, factors)
-    return interior.gradients(cages, energy.subspace), interior.volumes
+    gradients = interior.gradients(cages, energy.subspace)
+    if rigid is not None:
+        shares = blend_at(mesh.vertices, rigid.shares, interior.points)
+        gradients = rigid.blended_gradients(gradients, shares)
+    return gradients, interior.volumes

@@ -28,7 +28,7 @@ from ..files import fault_of, open_regular, replacing
 from ..kernels import in_parallel
 from ..progress import Progress
 from ..solver import CoarseVolume
-from ..subspace import InterpolatedBlock, Subspace
+from ..subspace import AffineParts, InterpolatedBlock, Subspace
 from .binding import Binding, BindingInputs
 
 ENDING = ".binding.npz"
@@ -45,18 +45,22 @@ def cached_binding(
     if folder is None:
         return Binding.compute(inputs, progress)
     path = folder / (inputs.digest() + ENDING)
-    binding = read_binding(path, inputs.rest.n_vertices)
+    binding = read_binding(path, inputs.rest.vertices)
     if binding is None:
         binding = Binding.compute(inputs, progress)
         write_binding(path, binding)
     return binding
 
 
-def read_binding(path: Path, n_vertices: int) -> Binding | None:
-    """Return the binding in a file; None if there is no file, or no valid one."""
+def read_binding(path: Path, rest: FloatArray) -> Binding | None:
+    """Return the binding of vertices *rest* (n, 3) in a file; None if there is no valid file."""
     try:
         arrays = _read(path)
-        subspace = _subspace(arrays, "w", n_vertices)
+        cages = subspace = _subspace(arrays, "w", len(rest))
+        rigid = None
+        if "rigid_maps" in arrays:
+            rigid = AffineParts(*(arrays[f"rigid_{each.name}"] for each in fields(AffineParts)))
+            subspace = rigid.blended(cages, rest, rigid.shares)
         energy = Energy(
             quadratic=arrays["quadratic"],
             constant=float(arrays["constant"]),
@@ -69,7 +73,7 @@ def read_binding(path: Path, n_vertices: int) -> Binding | None:
         if "cells" in arrays:
             surface = _subspace(arrays, "c", int(arrays["n_cells"]))
             coarse = CoarseVolume(surface, arrays["cells"], arrays["shares"])
-        binding = Binding(energy, arrays["interior"], coarse)
+        binding = Binding(cages, rigid, energy, arrays["interior"], coarse)
         os.utime(path)  # recently used files are deleted last
     except FileNotFoundError:
         return None
@@ -90,8 +94,10 @@ def write_binding(path: Path, binding: Binding) -> None:
         "mass": energy.mass,
         "operator": energy.rotation_operator,
         "interior": binding.interior,
-        **_arrays(energy.subspace, "w"),
+        **_arrays(binding.cages, "w"),
     }
+    if (rigid := binding.rigid) is not None:
+        arrays |= {f"rigid_{each.name}": getattr(rigid, each.name) for each in fields(rigid)}
     if coarse.cells is not None:
         arrays |= {"cells": coarse.cells, "shares": coarse.shares}
         arrays |= {"n_cells": np.array(coarse.surface.n_vertices)}

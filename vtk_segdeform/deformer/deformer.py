@@ -47,7 +47,7 @@ from ..mesh import Mesh, SurfacePoint, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
 from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
-from ..subspace import Passengers, Subspace, bind_passengers
+from ..subspace import Passengers, Subspace
 from .arguments import (
     LOCALITY,
     SPREAD,
@@ -528,8 +528,7 @@ class Deformer:
     @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
         """Bind other points (k, 3) to the cages, to be moved with them; see `passengers`."""
-        weights = self.regions.weights
-        return bind_passengers(self.mesh, weights, self.cages, points, progress=progress)
+        return self._problem.passengers(points, progress=progress)
 
     @one_blas_thread()
     def carry(self, points: ArrayLike) -> FloatArray:

@@ -12,6 +12,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
@@ -21,7 +22,7 @@ from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
 from ..regions import Regions
-from ..subspace import Subspace, bind_passengers
+from ..subspace import Passengers, Subspace, bind_passengers, blend_at
 from .binding import Binding, BindingInputs
 from .binding_cache import cached_binding
 from .frame import Frame
@@ -91,15 +92,11 @@ class Problem:
         return self._with(shape=shape, binding=self.binding.grown(self.inputs, p))
 
     def _with(self, **changes: Any) -> Problem:
-        """Return the problem with *changes* on which `samples` and `linked_parts` do not depend."""
+        """Return the problem with *changes*, and what is known and does not depend on them."""
         other = replace(self, **changes)
-        vars(other).update(
-            {
-                name: vars(self)[name]
-                for name in ("samples", "linked_parts", "_gaps")
-                if name in vars(self)
-            }
-        )
+        is_same = other.binding.cages is other.subspace is self.subspace
+        names = ("linked_parts", *(("samples", "_gaps") if is_same else ()))
+        vars(other).update({name: vars(self)[name] for name in names if name in vars(self)})
         return other
 
     @property
@@ -131,6 +128,27 @@ class Problem:
         """Return the vertices of each cage, in the coordinates of the caller."""
         p = self.frame.outward(p)
         return tuple(p[own] for own in self.subspace.columns)
+
+    def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:
+        """Bind other points (k, 3), in the coordinates of the caller; see `subspace.passengers`."""
+        weights = self.regions.weights
+        found = bind_passengers(self.mesh, weights, self.cages, points, progress=progress)
+        inside, every = self.frame.inward(found.points), slice(None)
+        subspace = self._with_rigid_parts(found.subspace, inside, self.rest, every)
+        return Passengers(found.points, subspace)
+
+    def _with_rigid_parts(
+        self, subspace: Subspace, points: FloatArray, mesh: Mesh, kept: IntArray | slice
+    ) -> Subspace:
+        """Return W~ *subspace* of *points* (k, 3), blended with the rigid parts as *mesh* is.
+
+        Its vertices are those *kept* of all.
+        """
+        rigid = self.binding.rigid
+        if rigid is None:
+            return subspace
+        shares = blend_at(mesh.vertices, rigid.shares[:, kept], points)
+        return rigid.blended(subspace, points, shares)
 
     def row_of(self, point: SurfacePoint) -> FloatArray:
         """Return the row of W~ of *point*, (m,)."""
@@ -166,14 +184,10 @@ class Problem:
             ids = np.flatnonzero(component == k)
             ids = ids[:: 1 + len(ids) // _GAPS]
             other, kept = rest.of_components(own == leader[k])
-            weights = self.regions.weights[:, kept]
-            used = np.flatnonzero(weights.any(axis=1))
             points = rest.vertices[ids]
-            led = bind_passengers(other, weights[used], [cages[r] for r in used], points).subspace
-            rows = self.subspace.at(ids)
-            for r, some, block in zip(used, led.rows, led.blocks, strict=True):
-                rows[some, self.subspace.columns[r]] -= block
-            found[int(k)] = rows
+            led = bind_passengers(other, self.regions.weights[:, kept], cages, points).subspace
+            led = self._with_rigid_parts(led, points, other, kept)
+            found[int(k)] = self.subspace.at(ids) - led.at(np.arange(len(ids)))
         return found
 
     def carrying_from(self, ids: IntArray) -> Carrying:

@@ -21,7 +21,7 @@ from ..mesh import Mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Anchors, GaussNewton, PositionTerm, SolverOptions, Volumes
-from ..subspace import Passengers, bind_passengers
+from ..subspace import Passengers
 from .enclosed_volume import EnclosedVolume
 from .problem import Problem
 
@@ -80,8 +80,7 @@ class SpringBody:
     @one_blas_thread()
     def attach(self, points: FloatArray) -> Passengers:
         """Bind *points* (k, 3) to the cages."""
-        problem = self.problem
-        return bind_passengers(problem.mesh, problem.regions.weights, problem.cages, points)
+        return self.problem.passengers(points)
 
     @one_blas_thread()
     def poses(

@@ -5,8 +5,8 @@
     s = infinity  rigid: bones, teeth, buttons
 
 Only ratios matter: if all vertices have the same, nothing changes.  Each connected part of rigid
-vertices moves as one body, whose place the solve finds.  Its cages keep its shape nearly; a finish
-places it exactly, where it is nearest to their pose.
+vertices moves as one body, whose place the solve finds.  In the cages it is affine, and rigid
+nearly (`subspace.affine_parts`); a finish places it exactly, where it is nearest to their pose.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from ..mesh import Mesh
 from ..solver import connected_sets
 from .symmetry import Mirror
 
-_LEAST, _MOST = 1e-2, 1e2  # of s, in medians; rigid parts have the largest, cages bend no less
+_LEAST = 1e-2  # of s, in medians
+MOST = 1e2  # rigid parts have the largest; with more, the solver takes up to 3 times as many steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +63,7 @@ class Stiffness:
         is_rigid = np.isinf(values)
         rigid = np.flatnonzero(is_rigid)
         soft = values[~is_rigid & (values > 0.0)]
-        values = np.clip(values / (np.median(soft) if len(soft) else 1.0), _LEAST, _MOST)
+        values = np.clip(values / (np.median(soft) if len(soft) else 1.0), _LEAST, MOST)
         if not len(rigid) and (values == values[0]).all():
             return None
         return cls(values, tuple(rigid[own] for own in connected_sets(mesh, rigid)))

@@ -11,6 +11,7 @@ The files, in reading order:
     borders         smoothing of the borders between parts on the mesh
 """
 
+from .blending import blend_weights
 from .borders import within_rings
 from .regions import (
     CageSurface,
@@ -25,6 +26,7 @@ from .segmentation import segment, with_regions_apart
 __all__ = [
     "CageSurface",
     "Regions",
+    "blend_weights",
     "cage_distance_weights",
     "require_region",
     "require_regions",
