@@ -18,7 +18,7 @@ from vtk_segdeform.energy import grown_gradients, shape_energy
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import CellEnergy
 from vtk_segdeform.geometry import rigid_fit
-from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.mesh import Mesh, mesh_of
 
 BAR = models.bar((0.3, 0.16, 2.4), divisions=(5, 4, 48))
 X = BAR.vertices
@@ -232,6 +232,31 @@ def test_points_in_a_rigid_part_move_with_it():
     off = deformer.carry(marrow) - (marrow @ turn.T + shift)
     assert np.abs(off).max() < 2e-3 * deformer.mesh.diagonal
     assert_allclose(deformer.carry(rest), frames[-1].vertices, atol=1e-12)
+
+
+def test_a_rigid_ring_around_a_bar_follows_it():
+    bar, ring = models.bar((0.2, 0.12, 1.0), (8, 5, 40)), models.torus(900, major=0.2, minor=0.03)
+    middle = bar.vertices[:, 2].mean()
+    mesh = mesh_of(
+        np.concatenate([bar.vertices, ring.vertices + [0.0, 0.0, middle]]),
+        np.concatenate([bar.faces, ring.faces + bar.n_vertices]),
+    ).mesh
+    x, own = mesh.vertices, np.arange(bar.n_vertices, mesh.n_vertices)
+    on_bar = np.arange(mesh.n_vertices) < bar.n_vertices
+    fixed = np.flatnonzero(on_bar & (x[:, 2] < middle - 0.45))
+    handle = np.flatnonzero(on_bar & (x[:, 2] > middle + 0.45))
+    regions = sd.segment(mesh)
+    deformer = sd.Deformer(
+        mesh, regions, sd.fit_cages(mesh, regions), fixed=fixed, handle=handle,
+        stiffness=np.where(on_bar, 1.0, np.inf),
+    )  # fmt: skip
+    pose = deformer.solve(x[handle] + [0.5, 0.0, -0.25]).vertices
+    inside = np.flatnonzero(on_bar & (np.abs(x[:, 2] - middle) < 0.06))
+    (turn, _), (of_bar, _) = (rigid_fit(x[ids], pose[ids]) for ids in (own, inside))
+    angle = np.degrees(np.arccos((np.trace(turn.T @ of_bar) - 1.0) / 2.0))
+    assert angle < 8.0
+    between = (pose - x)[own].mean(axis=0) - (pose - x)[inside].mean(axis=0)
+    assert np.linalg.norm(between) < 0.02
 
 
 def test_a_binding_with_rigid_parts_is_read_again(tmp_path):

@@ -48,6 +48,16 @@ def test_a_part_moves_by_the_affine_map_that_fits_the_motion_of_its_cages_best()
         assert np.abs(after[ids] - before[ids]).max() > 1e-3
 
 
+def test_the_misfit_is_the_mean_square_distance_from_the_affine_maps():
+    cages, parts, _ = bound()
+    p, expected = a_pose(), 0.0
+    for share in parts.shares:
+        c = BAR.vertex_areas * share / (BAR.vertex_areas @ share)
+        basis, before = np.sqrt(c)[:, None] * np.c_[np.ones(len(X)), X], cages.map(p)
+        expected += np.linalg.lstsq(basis, np.sqrt(c)[:, None] * before, rcond=None)[1].sum()
+    assert_allclose(np.vdot(p, parts.misfit @ p), expected, rtol=1e-9)
+
+
 def test_affine_maps_of_the_cages_are_affine_maps_of_the_surface():
     _, _, both = bound()
     turn, shift = np.array([[1.0, 0.3, 0.0], [0.2, 0.8, 0.1], [0.0, -0.4, 1.1]]), [3.0, -1.0, 2.0]

@@ -222,6 +222,8 @@ def _surface_energy(
     energy = with_cage_stiffness(energy, p, faces, clusters)
     for rows in () if rigid is None else rigid.gradients:
         energy = with_rotating_rows(energy, rows, rows @ p, weight)
+    if rigid is not None:  # without it, the cages around a part would hardly be held by it
+        energy = replace(energy, quadratic=energy.quadratic + energy.scale * rigid.misfit)
     return energy
 
 

@@ -14,7 +14,11 @@ tetrahedron.  It overlaps its surroundings in a collar, where it is blended as r
 This is another W~, with the same cage vertices.  In the part alpha is 1.  The weights c are areas
 times alpha, so that a flat part takes its normal from the collar.
 
-An energy of G_1 p .. G_3 p, the gradient of A, makes the part rigid.
+An energy of G_1 p .. G_3 p, the gradient of A, makes the part rigid; one of the misfit of A,
+
+    sum_i c_i |W~_i p - A(v_i)|^2  =  tr p^T (sum_i c_i W~_i^T W~_i  -  sum_a G_a^T G_a) p
+
+keeps the cages around it near it.
 """
 
 from __future__ import annotations
@@ -44,6 +48,7 @@ class AffineParts(Frozen):
     centres: FloatArray  # (q, 3)
     axes: FloatArray  # (q, 3, 3): b_1 .. b_3 of v are (v - centre) @ axes
     maps: FloatArray  # (q, 4, m): G
+    misfit: FloatArray  # (m, m), above, summed over the parts
 
     @classmethod
     def of(
@@ -73,6 +78,7 @@ class AffineParts(Frozen):
         shares = _shares(mesh, parts, collar, smoothness)
         count, x = len(parts), mesh.vertices
         centres, axes, rows = np.zeros((count, 3)), np.zeros((count, 3, 3)), []
+        squares = np.zeros((subspace.n_columns, subspace.n_columns))
         for r, share in enumerate(shares):
             own = np.flatnonzero(share)
             c = mesh.vertex_areas[own] * share[own]
@@ -86,8 +92,12 @@ class AffineParts(Frozen):
             columns = np.broadcast_to(own, basis.shape).ravel()
             entries = np.repeat(np.arange(4), len(own)), columns
             rows.append(sparse.coo_array((basis.ravel(), entries), (4, len(x))))
+            for piece in row_pieces(len(own), subspace.n_columns):
+                w = subspace.at(own[piece])
+                squares += (w.T * c[piece]) @ w
         products = subspace.premultiplied(sparse.vstack(rows).tocsr())
-        return cls(shares, centres, axes, products.reshape(count, 4, -1))
+        misfit = squares - products.T @ products
+        return cls(shares, centres, axes, products.reshape(count, 4, -1), misfit)
 
     @property
     def gradients(self) -> FloatArray:
