@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import zipfile
+
 import numpy as np
 import pytest
 from limbed import torso
@@ -111,6 +114,62 @@ def test_a_change_applies_to_the_pose_when_it_is_refined():
     assert np.abs(posed.vertices - before).max() > 1e-3
     posed.undo()
     assert_array_equal(posed.vertices, before)
+
+
+def test_a_pose_keeps_the_rigid_parts_of_its_solve(tmp_path):
+    posed = session()
+    posed.set_stiffness(None)
+    posed.move_handle("hand", moved(), max_steps=8)
+    posed.commit()
+    before, points = posed.vertices.copy(), 0.9 * X
+    carried = posed.poses.carry(posed.state, points)
+    posed.set_stiffness(STIFFNESS)
+    path = tmp_path / "posed.segdeform"
+    sd.save_session(path, posed)
+    loaded = sd.load_session(path)
+    for each in (posed, loaded):
+        assert_array_equal(each.vertices, before)
+        assert_array_equal(each.poses.carry(each.state, points), carried)
+    posed.refine()
+    solved = posed.vertices.copy()
+    assert np.abs(solved - before).max() > 1e-3 * SIZE
+    posed.set_stiffness(None)
+    sd.save_session(path, posed)
+    loaded = sd.load_session(path)
+    assert_array_equal(loaded.vertices, solved)
+    with zipfile.ZipFile(path) as archive:
+        name = next(each for each in archive.namelist() if each.startswith("header"))
+        assert json.loads(archive.read(name))["version"] == 4  # earlier programs refuse it
+    rest = loaded.volumes()
+    assert_allclose(list(rest.values()), list(session().volumes().values()), rtol=1e-12)
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["then finished", "finished before"])
+def test_a_finish_and_a_drag_are_of_the_rigid_parts_of_now(first):
+    posed = session()
+    posed.set_stiffness(None)
+    posed.handles.add(np.flatnonzero(np.isinf(STIFFNESS))[:5], "bone")
+    posed.move_handle("hand", moved())
+    posed.commit()
+    if first:
+        posed.finish()
+    posed.set_stiffness(STIFFNESS)
+    if not first:
+        assert posed.finish().is_finished
+        require_kept(posed)
+    motion = np.eye(4)
+    motion[:3, 3] = 0.0, 0.02, 0.02
+    targets = posed.vertices[posed.state.handles["bone"]] + motion[:3, 3]
+    posed.move_handle("bone", motion)
+    off = posed.vertices[posed.state.handles["bone"]] - targets
+    assert np.abs(off).max() < 1e-4 * SIZE
+
+
+def moved() -> np.ndarray:
+    """Return a motion of the hand that bends the forearm."""
+    motion = np.eye(4)
+    motion[:3, 3] = -0.3, 0.2, 0.5
+    return motion
 
 
 def test_bad_input_changes_nothing():

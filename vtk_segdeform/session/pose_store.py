@@ -26,6 +26,9 @@ def pose_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
         arrays["finished_shifts"] = pose.finished.shifts
         arrays["finished_cages"] = np.concatenate(pose.finished.cage_vertices)
         arrays["finished_offset"] = pose.finished.offset
+    if pose is not None and pose.stiffness is not None and np.isinf(pose.stiffness).any():
+        header["rigid_in_pose"] = True  # earlier versions show a pose of other cages
+        arrays["pose_stiffness"] = pose.stiffness
     if state.fixed_at is not None:
         header["fixed_in_pose"] = True
         arrays["fixed_at"] = state.fixed_at
@@ -62,7 +65,10 @@ def read_pose(
             tuple(split_rows(then, cages)),
             archive.array(f"{prefix}finished_offset", "f", (n_vertices, 3)),
         )
-    return Pose(tuple(places), dict(zip(handles, targets, strict=True)), finished)
+    stiffness = None
+    if "rigid_in_pose" in header and field(header, "rigid_in_pose", flag):
+        stiffness = archive.array(f"{prefix}pose_stiffness", "f", (n_vertices,))
+    return Pose(tuple(places), dict(zip(handles, targets, strict=True)), finished, stiffness)
 
 
 def read_places(

@@ -17,7 +17,7 @@ differ from W~ p by rounding, so that each frame maps the mesh once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -264,7 +264,14 @@ class Poses:
         return self.memo.get("surface", (state.regions, state.cages, cages), mapped, _KEPT)
 
     def _mapped(self, state: State, cages: Cages) -> FloatArray:
-        return frozen(self.bind(state).surface(cages))
+        return frozen(self._bound_to(state, cages).surface(cages))
+
+    def _bound_to(self, state: State, cages: Cages) -> Deformer:
+        """Return a deformer with the W~ of *cages*: those of the pose keep that of their solve."""
+        pose = state.pose
+        if pose is None or cages is not pose.cage_vertices or pose.on(state.stiffness) is pose:
+            return self.bind(state)
+        return self.bind(replace(state, stiffness=pose.stiffness))
 
     def rotations(self, state: State, cages: Cages) -> FloatArray:
         """Return `Deformer.rotations`, (n, 3, 3) float."""
@@ -284,7 +291,8 @@ class Poses:
 
     def carry(self, state: State, points: ArrayLike) -> FloatArray:
         """Return *points* (k, 3), given at rest, moved along with the mesh to the pose."""
-        return self.bind(state).passengers(points).moved(state.cage_vertices)
+        cages = state.cage_vertices
+        return self._bound_to(state, cages).passengers(points).moved(cages)
 
     def mirror(self, state: State) -> Mirror | None:
         """Return the plane of symmetry with the option of *state*, if there is one."""

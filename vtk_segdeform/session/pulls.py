@@ -173,12 +173,13 @@ def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Gr
         patch = _free_patch(mesh, replace(state, handles=handles), name, SPREAD * radius, along)
         handles = with_handle(mesh, state, name, patch)
     places = tuple(cage.vertices for cage in state.cages)
-    places = places if state.pose is None else state.pose.cage_vertices
-    finished = None if state.pose is None else state.pose.finished
+    before = None if state.pose is None else state.pose.on(state.stiffness)
+    places = places if before is None else before.cage_vertices
+    finished = None if before is None else before.finished
     if finished is not None:  # handles stay where they are, also for the cages
         kept = np.isin(finished.held, state.fixed)
         finished = replace(finished, held=finished.held[kept], shifts=finished.shifts[kept])
-    pose = Pose(places, targets_at(handles, vertices), finished)
+    pose = Pose(places, targets_at(handles, vertices), finished, state.stiffness)
     reach, follows, depth = bound.reach_of_pull(point, radius, locality, limb)
     if len(handles[name]) > 1:  # which moves as a whole
         point = SurfacePoint.at_vertex(point.vertex)

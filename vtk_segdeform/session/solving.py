@@ -50,6 +50,8 @@ def solve(
     Cancelled
         If *progress* raised it.
     """
+    if state.pose is not None:
+        state = replace(state, pose=state.pose.on(state.stiffness))
     held, deformer, aim = poses.path(state)
     deformer = deformer.copy()
     before, shift, wanted = state.pose, poses.shift(state), stacked(targets)
@@ -75,7 +77,7 @@ def solve(
         last, shift = shift, finished.shifted(poses.surface(state, cages))
         if np.array_equal(shift[deformer.handle], last[deformer.handle]):
             break
-    pose = Pose(cages, MappingProxyType({**targets}), finished)
+    pose = Pose(cages, MappingProxyType({**targets}), finished, state.stiffness)
     after = replace(state, pose=pose)
     is_large = poses.mesh.n_vertices > sizes.SCALED_VOLUME
     if live and is_large and finished is None and cages is solution.cage_vertices:
@@ -129,7 +131,8 @@ def free_form(poses: Poses, state: State, cage_vertices: Sequence[FloatArray]) -
     for vertices in p:
         frozen(vertices)
     has_finished = before is not None and before.finished is not None
-    pose = Pose(p, MappingProxyType({}), moved_on(poses, state, p) if has_finished else None)
+    finished = moved_on(poses, state, p) if has_finished else None
+    pose = Pose(p, MappingProxyType({}), finished, state.stiffness)
     x = poses.vertices(replace(state, pose=pose))
     return replace(pose, targets=targets_at(state.handles, x))
 

@@ -177,11 +177,21 @@ class Pose(Frozen):
     """For each handle by name, (k, 3) float: the targets of its vertices."""
     finished: Finished | None = None
     """The mesh, unless it is that of the cages, W~ p."""
+    stiffness: FloatArray | None = None
+    """(n,) float: that of its solve; W~ depends on where it is infinite."""
 
     @property
     def is_finished(self) -> bool:
         """Whether the mesh was finished with these cages, which were not moved since then."""
         return self.finished is not None and self.finished.cage_vertices is self.cage_vertices
+
+    def on(self, stiffness: FloatArray | None) -> Pose:
+        """Return the pose whose cages move the mesh as with another *stiffness*."""
+        one, other = (_rigid(each) for each in (self.stiffness, stiffness))
+        if np.array_equal(one, other):
+            return self
+        cages = (*self.cage_vertices,)  # caches tell them apart
+        return replace(self, cage_vertices=cages, stiffness=stiffness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +337,11 @@ def checked_state(mesh: Mesh, state: State) -> State:
     pose = None
     if state.pose is not None:
         pose = _checked_pose(cages, lengths, list(handles), require(state.pose, Pose, "state.pose"))
-        pose = replace(pose, finished=_checked_finished(mesh, cages, state.pose.finished))
+        pose = replace(
+            pose,
+            finished=_checked_finished(mesh, cages, state.pose.finished),
+            stiffness=checked_stiffness(mesh, state.pose.stiffness),
+        )
         _require_plausible(mesh, pose)
     pulls, locality = all_of(state.pulls, str, "state.pulls"), state.locality
     if locality is not None:
@@ -341,6 +355,11 @@ def checked_state(mesh: Mesh, state: State) -> State:
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
         owned_parts(mesh, state.parts), _checked_saved(mesh, state.saved),
     )  # fmt: skip
+
+
+def _rigid(stiffness: FloatArray | None) -> IntArray:
+    """Return the vertices (k,) that are rigid."""
+    return np.flatnonzero(np.isinf(() if stiffness is None else stiffness))
 
 
 def checked_stiffness(mesh: Mesh, stiffness: ArrayLike | None) -> FloatArray | None:

@@ -12,6 +12,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     pose.npy              (c, 3) float     targets.npy      (h, 3) float           if not at rest
     locality.npy          (c, 3) float     the cages where a pull began            if any
     finished.npy          (n, 3) float     the mesh in a finished pose             if any
+    pose_stiffness.npy    (n,) float       of its solve, if something was rigid
     finished_held.npy, finished_shifts.npy, finished_cages.npy, finished_offset.npy
                                            as in `state.Finished`
     saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any
@@ -74,7 +75,7 @@ if TYPE_CHECKING:
     from ..io import Surface
 
 FORMAT = "vtk_segdeform session"
-VERSION = 3
+VERSION = 4
 
 # The options of version 1; a file has others only if they are not at their defaults.
 _FIRST = {
@@ -232,6 +233,8 @@ def _write(
         arrays |= {f"saved_{k}_{key}": array for key, array in posed.items()}
     if saved:
         header["saved_poses"] = saved
+    if any("rigid_in_pose" in each for each in (header, *saved)):
+        header["version"] = 4
     if state.pivots:
         header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
     if state.stiffness is not None:

@@ -129,8 +129,10 @@ class SurfaceStream:
 
     @property
     def _is_finished(self) -> bool:
-        pose = self.session.state.pose
-        return pose is not None and pose.finished is not None
+        state = self.session.state
+        if state.pose is None:
+            return False
+        return state.pose.finished is not None or state.pose.on(state.stiffness) is not state.pose
 
     def _pose_messages(self, surface: EncodedSurface) -> list[bytes]:
         self._number += 1
