@@ -1,7 +1,9 @@
-"""The pictures of rigid parts, slides and symmetry."""
+"""The pictures of rigid parts, slides, symmetry and a held centroid."""
 
 from __future__ import annotations
 
+import runpy
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +41,33 @@ def rigid() -> None:
         coloured(mesh, poses[1], held=low, rigid=middle),
     ]
     write("rigid", drawings, np.concatenate(poses))
+
+
+def balance(example: Path) -> None:
+    """Draw the figure of the *example* from above, its centroid free and held.
+
+    A ring is around the centroid at rest, a disc at that of the pose.
+    """
+    names = runpy.run_path(str(example))
+    mesh, feet = names["mesh"], names["feet"]
+    poses = [names[each].vertices for each in ("plain", "balanced")]
+    top, size = np.concatenate(poses)[:, 2].max(), mesh.diagonal
+    rest = names["centroid"](mesh.vertices)
+
+    def over(pose: Any) -> Drawing:
+        def draw(plotter: pv.Plotter) -> None:
+            coloured(mesh, pose, held=np.isin(np.arange(len(pose)), feet))(plotter)
+            for centre, inner, outer in (
+                (rest, 0.025, 0.032),
+                (names["centroid"](pose), 0.0, 0.018),
+            ):
+                at = (centre[0], centre[1], top)
+                disc = pv.Disc(center=at, inner=inner * size, outer=outer * size, c_res=40)
+                add_surface(plotter, disc.triangulate(), color=rgb(HANDLE) / 255)
+
+        return draw
+
+    write("balance", [over(pose) for pose in poses], np.concatenate(poses))
 
 
 def slide() -> None:

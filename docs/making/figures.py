@@ -20,7 +20,7 @@ import pyvista as pv
 from matplotlib.colors import LinearSegmentedColormap
 
 import vtk_segdeform as sd
-from making.constrained import rigid, slide, symmetry
+from making.constrained import balance, rigid, slide, symmetry
 from making.made import EXAMPLES
 from making.made import FIGURES as FOLDER
 from making.plots import convergence, volume_along_a_step
@@ -294,6 +294,7 @@ FIGURES: dict[str, tuple[Callable[[], None], int]] = {
     "landmarks": (landmarks, 0),
     "solids": (solids, 0),
     "batch": (batch, 4),
+    "balance": (lambda: balance(EXAMPLES / "keep_its_balance.py"), 2),
     "rigid": (rigid, 2),
     "slide": (slide, 2),
     "symmetry": (symmetry, 3),

@@ -6,6 +6,7 @@ import functools
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import vtk_segdeform
@@ -33,6 +34,14 @@ RIGHT = {
         max(names["errors"]) < 1e-12
         and names["after"] > 1.2 * names["before"]
         and not len(names["solution"].crossings())
+    ),
+    "keep_its_balance": lambda names: (
+        np.abs(names["centroid"](names["balanced"].vertices) - names["centroid"](names["x"]))[
+            :2
+        ].max()
+        < 1e-12 * names["size"]
+        and abs(names["area"](names["balanced"].vertices) / names["area"](names["x"]) - 1.02) < 1e-9
+        and names["balanced"].volume_error < 1e-12
     ),
     "find_the_handles": lambda names: names["off"] < 1e-3 and max(names["changes"]) < 1e-12,
     "write_a_motion": lambda names: (
@@ -84,8 +93,8 @@ LEAVES = {
 LONG = {
     "an_arm_in_a_sleeve", "beat_a_ventricle", "bend_a_solid", "bend_the_cactus", "carry_a_grid",
     "dinosaur", "dinosaur_with_constraints", "film_a_drag", "find_the_handles",
-    "fit_an_atlas", "many_poses", "one_cage_or_several", "with_and_without_volume",
-    "write_a_motion",
+    "fit_an_atlas", "keep_its_balance", "many_poses", "one_cage_or_several",
+    "with_and_without_volume", "write_a_motion",
 }  # fmt: skip
 FEW = {"cactus": 600, "dinosaur": 1000, "random_limbs": 600}  # vertices
 DRAW = {"bend_a_solid", "carry_a_grid", "editor_in_a_plotter", "film_a_drag"}
