@@ -6,6 +6,7 @@ import copy
 import pickle
 from dataclasses import fields
 
+import numpy as np
 import public_calls
 import pytest
 from numpy.testing import assert_array_equal
@@ -14,6 +15,7 @@ from shared_arrays import CLASSES, writable_shared_arrays
 
 import vtk_segdeform as sd
 from vtk_segdeform import Session
+from vtk_segdeform.freezing import stored_whole, without_zeros
 from vtk_segdeform.session.state import Pose, State
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -48,6 +50,19 @@ def working_session() -> Session:
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
 def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
     assert writable_shared_arrays(way(public_calls.instance(cls))) == []
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_pickled_matrix_has_the_same_bits_in_the_same_order_without_its_zeros(order):
+    matrix = np.zeros((90, 50), order=order)
+    matrix[3, 4:], matrix[5:9, 2] = np.random.default_rng(0).normal(size=46), [-0.0, np.nan, 1, 2]
+    stored = without_zeros(matrix)
+    again = stored_whole(stored)
+    assert len(pickle.dumps(stored)) < 0.1 * matrix.nbytes
+    assert again.strides == matrix.strides
+    assert_array_equal(again.view(np.uint64), matrix.view(np.uint64))
+    points = np.zeros((9, 3))
+    assert stored_whole(without_zeros(points)) is points
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)

