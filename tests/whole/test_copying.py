@@ -86,7 +86,7 @@ def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
     session = working_session()
     other = way(session)
     assert other.is_dragging
-    assert other.region_names == ("trunk", "region 2")
+    assert other.painting.names == ("trunk", "region 2")
     assert_array_equal(other.vertices, session.vertices)
     for one in (session, other):
         one.poses.memo.drop("path")

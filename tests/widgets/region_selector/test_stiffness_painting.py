@@ -196,7 +196,7 @@ def test_with_a_symmetry_both_sides_are_fixed_or_stiffened_but_a_handle_is_on_on
     if target is Paint.HANDLE:
         assert_array_equal(painted()[~on_right], 0.0)
         return
-    mates = desk.session.mirror.mates
+    mates = desk.session.poses.mirror(desk.session.state).mates
     assert_array_equal(x[mates[on_right], 0] < 0.0, True)
     assert (painted() != idle)[~on_right].sum() > 5
     changed = (during != desk.colours[x[:, 2].argmin()]).any(axis=1)
