@@ -109,7 +109,7 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(again, monkeypatch):
     _, editor, hand, _ = again
     end = time.monotonic() + 60.0
 
-    def endless(mesh, n_regions, *, progress, **_):  # the real one may end before the key is pressed
+    def endless(mesh, n_regions, *, progress, **_):  # the real one may end before the key
         while time.monotonic() < end:
             progress(0.5, "looking everywhere")
             time.sleep(0.001)
