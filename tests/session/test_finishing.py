@@ -42,12 +42,7 @@ def volume_of(mesh: Mesh, vertices: np.ndarray | None = None) -> float:
 
 def ready(scene: Scene = SCENE) -> Session:
     """Return a session with fixed vertices and a handle called "tip"."""
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle, "tip")
-    return session
+    return scene.session("tip")
 
 
 def dragged(session: Session, angle: float = -0.9) -> Session:

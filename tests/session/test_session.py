@@ -24,7 +24,7 @@ from vtk_segdeform.regions.regions import Regions
 from vtk_segdeform.session import preparing, solving
 from vtk_segdeform.session.listeners import Change
 from vtk_segdeform.session.session import Session
-from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.session.timeline import Timeline
 from vtk_segdeform.solver.solution import Status
@@ -38,12 +38,7 @@ X = VERTICES[:, 0]
 
 def ready(**options) -> Session:
     """Return a session with regions, cages, fixed vertices and a handle called "tip"."""
-    session = Session(SCENE.mesh, state=State(options=Options(**options)))
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.handles.add(SCENE.handle, "tip")
-    return session
+    return SCENE.session("tip", **options)
 
 
 def snapshot(session: Session) -> list[bytes]:
@@ -769,9 +764,7 @@ def test_regions_are_called_by_their_place_until_they_have_a_name():
 
 def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
     scene = sausage(4)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
+    session = scene.caged()
     session.painting.rename(1, "arm")
     session.painting.rename(3, "leg")
     assert len(session.cages) == 4  # a name changes nothing else

@@ -32,9 +32,7 @@ WAYS = [copy.copy, copy.deepcopy, pickled]
 
 def working_session() -> Session:
     """Return a session with an ongoing drag, a step to undo and one to redo."""
-    session = Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
+    session = SCENE.caged()
     session.painting.rename(0, "trunk")
     session.set_fixed(SCENE.fixed)
     session.handles.add(SCENE.handle)
