@@ -38,16 +38,18 @@ class _WithoutZeros(NamedTuple):
     shape: tuple[int, ...]
     order: Literal["C", "F"]  # of its memory: products depend on it, bit for bit
     places: NDArray[np.uint8]  # one bit for each number
-    numbers: NDArray[np.float64]  # those that are not 0
+    numbers: NDArray[np.float64] | None  # those that are not 0; None of a matrix of bools
 
 
 def without_zeros(value: Any) -> Any:
-    """Return a matrix (n, m) of floats as it is stored in pickles; anything else unchanged."""
+    """Return a matrix (n, m) of floats or bools as it is pickled; anything else unchanged."""
     is_matrix = isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] > _POINTS
-    if not is_matrix or value.dtype != np.float64:
+    if not is_matrix or value.dtype not in (np.float64, np.bool_):
         return value
     order: Literal["C", "F"] = "F" if value.flags.fnc else "C"
     flat = value.ravel(order=order)
+    if value.dtype == np.bool_:
+        return _WithoutZeros(value.shape, order, np.packbits(flat), None)
     kept = flat.view(np.uint64) != 0  # by bits: -0.0 is kept
     return _WithoutZeros(value.shape, order, np.packbits(kept), flat[kept])
 
@@ -56,8 +58,11 @@ def stored_whole(value: Any) -> Any:
     """Return the matrix that `without_zeros` has stored; anything else unchanged."""
     if not isinstance(value, _WithoutZeros):
         return value
-    flat = np.zeros(value.shape[0] * value.shape[1])
-    flat[np.unpackbits(value.places, count=len(flat)).view(np.bool_)] = value.numbers
+    size = value.shape[0] * value.shape[1]
+    flat: NDArray[Any] = np.unpackbits(value.places, count=size).view(np.bool_)
+    if value.numbers is not None:
+        kept, flat = flat, np.zeros(size)
+        flat[kept] = value.numbers
     return flat.reshape(value.shape, order=value.order)
 
 

@@ -59,6 +59,10 @@ def test_a_pickled_matrix_has_the_same_bits_in_the_same_order_without_its_zeros(
     assert len(pickle.dumps(stored)) < 0.1 * matrix.nbytes
     assert again.strides == matrix.strides
     assert_array_equal(again.view(np.uint64), matrix.view(np.uint64))
+    bools = np.asarray(matrix > 0.5, order=order)
+    again = stored_whole(without_zeros(bools))
+    assert (again.dtype, again.strides) == (bools.dtype, bools.strides)
+    assert_array_equal(again, bools)
     points = np.zeros((9, 3))
     assert stored_whole(without_zeros(points)) is points
 
