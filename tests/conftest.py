@@ -163,10 +163,11 @@ def _bodies_once() -> Iterator[None]:
 
 @pytest.fixture(params=["numba", "numpy"])
 def either(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Run checks of meshes with and without compiled kernels, whatever the size."""
+    """Run with and without compiled kernels, whatever the size."""
     from vtk_segdeform import sizes
     from vtk_segdeform.kernels import dispatch
 
+    monkeypatch.setattr(sizes, "COMPILED", 0)
     monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
     if request.param == "numba":
         pytest.importorskip("numba")

@@ -16,7 +16,6 @@ from vtkmodules.vtkFiltersCore import vtkTriangleMeshPointNormals
 from vtk_segdeform import Mesh, models
 from vtk_segdeform.geometry.normals import VertexNormals
 from vtk_segdeform.io.polygons import polydata_of
-from vtk_segdeform.kernels import dispatch
 
 MESHES = {
     "sphere": lambda: Mesh(*icosphere(4)),
@@ -24,15 +23,6 @@ MESHES = {
     "cactus": lambda: models.cactus(1200),
 }
 MESHES = {name: functools.cache(made) for name, made in MESHES.items()}
-
-
-@pytest.fixture(params=["compiled", "plain"])
-def either(request, monkeypatch):
-    """Run with and without compiled kernels."""
-    if request.param == "compiled":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
 def posed(mesh: Mesh) -> np.ndarray:

@@ -5,9 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from solids import rotation, somewhere
 
-from vtk_segdeform import sizes
 from vtk_segdeform.geometry.rotations import closest_rotations, rigid_fit
-from vtk_segdeform.kernels import dispatch
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.5, 3.0, np.pi])
@@ -62,13 +60,8 @@ def test_weights_count_points_that_often():
     assert_allclose(weights @ (rest @ found.T + shift - moved), 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_many_closest_rotations_are_those_of_each(compiled, monkeypatch):
-    if compiled:
-        pytest.importorskip("numba")
-        monkeypatch.setattr(sizes, "COMPILED", 0)
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+@pytest.mark.usefixtures("either")
+def test_many_closest_rotations_are_those_of_each():
     turns = np.array([rotation(axis, 0.3 * k) for k, axis in enumerate(somewhere(11, seed=3))])
     stretch = np.array([1.0, 3.0, 0.2])
     assert_allclose(

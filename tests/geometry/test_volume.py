@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from solids import CUBE, SOLIDS, icosphere, somewhere, torus
 
-from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import (
     outer_components,
     signed_volume,
@@ -13,7 +12,6 @@ from vtk_segdeform.geometry.volume import (
     volume_along,
     volume_gradient,
 )
-from vtk_segdeform.kernels import dispatch
 
 MESHES = {**SOLIDS, "sphere": icosphere(3), "torus": torus()}
 
@@ -23,13 +21,8 @@ def mesh(request):
     return MESHES[request.param]
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_compiled_kernels_and_numpy_give_the_volumes_of_known_solids(compiled, monkeypatch):
-    if compiled:
-        pytest.importorskip("numba")
-        monkeypatch.setattr(sizes, "COMPILED", 0)
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+@pytest.mark.usefixtures("either")
+def test_compiled_kernels_and_numpy_give_the_volumes_of_known_solids():
     vertices, faces = CUBE[0] + 7.0, CUBE[1]
     assert signed_volume(vertices, faces) == pytest.approx(1.0, rel=1e-14)
     # Moved by t along the outward diagonal of every corner, the cube has sides 1 + 2 t.

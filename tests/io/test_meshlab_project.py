@@ -44,9 +44,7 @@ def test_meshlab_opens_the_mesh_and_its_cages_unchanged(tmp_path):
     import pymeshlab
 
     scene = sausage(2)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
+    session = scene.caged()
     session.handles.add(scene.handle)
     write_project(tmp_path / "work.mlp", {**meshlab.as_layers(session), "painted": painted()})
     meshset = pymeshlab.MeshSet(verbose=False)

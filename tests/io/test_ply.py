@@ -11,13 +11,12 @@ from numpy.testing import assert_array_equal
 from solids import CUBE, TETRAHEDRON, icosphere
 from test_round_trips import Warnings, prism
 
-from vtk_segdeform import Mesh, sizes
+from vtk_segdeform import Mesh
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.convert import from_polydata, read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.ply_tables import tables_of
 from vtk_segdeform.io.surface import read_mesh
-from vtk_segdeform.kernels import dispatch
 
 HEADER = (
     "ply\nformat {kind} 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n"
@@ -205,13 +204,10 @@ def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path):
         assert_array_equal(found, np.column_stack([pairs[:, 0], v]))
 
 
-@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("length", ["char", "ushort", "double"])
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])
-def test_lists_of_any_lengths_between_numbers(monkeypatch, kind, length, compiled):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if not compiled:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+def test_lists_of_any_lengths_between_numbers(kind, length):
     order, of_length = "<" if "little" in kind else ">", {"char": "b", "ushort": "H", "double": "d"}
     n = of_length[length]
 

@@ -5,20 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from solids import icosphere
+from solids import icosphere, joined
 from vtkmodules.vtkCommonDataModel import vtkTriangle
 
 from vtk_segdeform.mesh import Crossings, new_crossings, self_intersections
 from vtk_segdeform.mesh.intersections import intersections_of
 from vtk_segdeform.mesh.near_faces import _near_centres, near_faces
 from vtk_segdeform.mesh.triangles import flat_faces
-
-
-def joined(*solids):
-    """Return several solids as one surface."""
-    starts = np.cumsum([0] + [len(points) for points, _ in solids])
-    faces = [faces + start for (_, faces), start in zip(solids, starts, strict=False)]
-    return np.concatenate([points for points, _ in solids]), np.concatenate(faces)
 
 
 def triangles(n=150, spread=0.5, seed=6):

@@ -10,10 +10,8 @@ from numpy.testing import assert_array_equal
 from open_surfaces import moebius
 from solids import CUBE, icosphere, rotation, together, torus
 
-from vtk_segdeform import sizes
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.io.polygons import triangles_of
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh import find_faults, mesh_of, winding_number
 from vtk_segdeform.mesh.faults import Search
 from vtk_segdeform.mesh.orientation import faces_to_flip
@@ -22,15 +20,6 @@ from vtk_segdeform.mesh.topology import HalfEdges
 
 SPHERE = icosphere(2)
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
-
-
-@pytest.fixture(params=["numba", "numpy"])
-def with_and_without_numba(request, monkeypatch):
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
-    if request.param == "numba":
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
 def flipped(faces, which):
@@ -128,7 +117,7 @@ def test_sheets_that_meet_along_a_line_agree_where_they_continue_each_other():
         assert (up > 0.0).all() or (up < 0.0).all()
 
 
-@pytest.mark.usefixtures("with_and_without_numba")
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("around", ["closed", "holes", "turned", "branching", "box"])
 def test_shells_are_found_inside_a_surface_by_its_winding_number(around):
     outer, faces = icosphere(3)
@@ -162,7 +151,7 @@ def test_shells_are_found_inside_a_surface_by_its_winding_number(around):
     assert 10 < depth.sum() < 70
 
 
-@pytest.mark.usefixtures("with_and_without_numba")
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["upright", "turned"])
 def test_a_body_that_stands_on_the_ground_of_a_room_is_not_inside(turn):
     room, faces = box(n=3)
@@ -174,7 +163,7 @@ def test_a_body_that_stands_on_the_ground_of_a_room_is_not_inside(turn):
             assert_array_equal(depth, [0, height > 0.0])
 
 
-@pytest.mark.usefixtures("with_and_without_numba")
+@pytest.mark.usefixtures("either")
 def test_volumes_known_after_flipping_are_those_of_the_flipped_shells():
     band = np.asarray(moebius().points, float), triangles_of(moebius())
     x, faces = together(SPHERE, torus(9, 6), (0.3 * SPHERE[0], SPHERE[1]), band, box([(0, 1)]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
-from solids import CUBE, SOLIDS, icosphere, together, torus, two_components
+from solids import CUBE, SOLIDS, icosphere, soup, together, torus, two_components
 
 from vtk_segdeform.errors import ConstraintError, MeshError
 from vtk_segdeform.mesh import Kind, find_faults, mesh_of
@@ -14,11 +14,6 @@ from vtk_segdeform.mesh import Kind, find_faults, mesh_of
 SPHERE = icosphere(2)
 BODIES = [*SOLIDS.values(), SPHERE, torus(12, 8), two_components()]
 BODIES = [body for body in BODIES if len(body[1]) < 400]
-
-
-def soup(vertices, faces):
-    """Return the triangles with three points each, as STL has them."""
-    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
 
 
 def checked(vertices, faces):

@@ -10,20 +10,10 @@ import pytest
 from campaign import every
 from numpy.testing import assert_array_equal
 
-from vtk_segdeform import sizes
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.mesh.grouping import two_sides
 from vtk_segdeform.mesh.topology import HalfEdges
 
-
-@pytest.fixture(params=["compiled", "numpy"], autouse=True)
-def kernels(request, monkeypatch):
-    """Run each test with compiled kernels, and without."""
-    if request.param == "numpy":
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
-        return
-    pytest.importorskip("numba")
-    monkeypatch.setattr(sizes, "COMPILED_CHECKS", 0)
+pytestmark = pytest.mark.usefixtures("either")
 
 
 def random_faces(seed: int) -> np.ndarray:

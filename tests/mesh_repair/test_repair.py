@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from campaign import every
 from numpy.testing import assert_array_equal
-from solids import CUBE, SOLIDS, icosphere, torus
+from solids import CUBE, SOLIDS, icosphere, soup, torus
 
 from vtk_segdeform.errors import MeshError
 from vtk_segdeform.geometry.volume import signed_volume
@@ -20,11 +20,6 @@ from vtk_segdeform.mesh_repair.repair import repair
 
 SPHERE = icosphere(2)
 N, M = len(SPHERE[0]), len(SPHERE[1])
-
-
-def soup(vertices, faces):
-    """Return the mesh with three separate vertices for every triangle."""
-    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
 
 
 def together(*solids):

@@ -18,6 +18,7 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, SessionE
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session import finishing
 from vtk_segdeform.session.poses import Aim
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import checked_state
@@ -41,12 +42,7 @@ def volume_of(mesh: Mesh, vertices: np.ndarray | None = None) -> float:
 
 def ready(scene: Scene = SCENE) -> Session:
     """Return a session with fixed vertices and a handle called "tip"."""
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle, "tip")
-    return session
+    return scene.session("tip")
 
 
 def dragged(session: Session, angle: float = -0.9) -> Session:
@@ -173,7 +169,7 @@ def test_a_finish_that_is_cancelled_or_late_changes_nothing():
     with pytest.raises(Cancelled):
         session.finish(progress=cancel)
     assert session.state is before
-    late = session.finishing()()
+    late = finishing.finish(session.poses, session.state)()
     dragged(session, -0.1)
     now = session.state
     assert not session.accept_finish(late)

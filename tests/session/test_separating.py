@@ -134,7 +134,7 @@ def test_what_is_attached_follows_at_once_and_other_regions_remain():
     masks = session.regions.membership[:, scene.mesh.components == 0]
     session.attach({1: 0})
     assert_array_equal(session.regions.membership[:, scene.mesh.components == 0], masks)
-    assert session.region_name(0) == "low"
+    assert session.painting.name(0) == "low"
     session.set_fixed(scene.fixed)
     session.handles.add(scene.handle, "hand")
     session.drag({"hand": scene.targets(40.0)})

@@ -21,9 +21,10 @@ from vtk_segdeform.errors import CageError, Cancelled, ConstraintError, RegionEr
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
+from vtk_segdeform.session import preparing, solving
 from vtk_segdeform.session.listeners import Change
 from vtk_segdeform.session.session import Session
-from vtk_segdeform.session.state import Options, State
+from vtk_segdeform.session.state import State
 from vtk_segdeform.session.store import load_session, save_session
 from vtk_segdeform.session.timeline import Timeline
 from vtk_segdeform.solver.solution import Status
@@ -37,12 +38,7 @@ X = VERTICES[:, 0]
 
 def ready(**options) -> Session:
     """Return a session with regions, cages, fixed vertices and a handle called "tip"."""
-    session = Session(SCENE.mesh, state=State(options=Options(**options)))
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
-    session.set_fixed(SCENE.fixed)
-    session.handles.add(SCENE.handle, "tip")
-    return session
+    return SCENE.session("tip", **options)
 
 
 def snapshot(session: Session) -> list[bytes]:
@@ -383,17 +379,17 @@ def test_other_cages_are_carried_to_the_pose(by_pull):
         session.drag(SCENE.turned(40))
         session.commit()
     before, diagonal = session.vertices, session.mesh.diagonal
-    assert session.carried(session.cages) is not None
-    cages = session.fitted_cages(n_cage_vertices=90)
-    session.set_cages(cages, posed=session.carried(cages), n_cage_vertices=90)
+    sized = preparing.sized(session.state, 90)
+    cages = preparing.fitted(session.mesh, sized)
+    refitted = replace(sized, cages=cages).at_rest()
+    posed = solving.carried(session.poses, refitted, session.vertices)
+    session.set_cages(cages, posed=posed, n_cage_vertices=90)
     for _ in range(2):
         assert np.linalg.norm(session.vertices - before, axis=1).max() < 0.02 * diagonal
         assert abs(session.volume_change) < 1e-12
         session.refine()
     session.undo()
     assert_array_equal(session.vertices, before)
-    session.reset_pose()
-    assert session.carried(cages) is None
 
 
 def test_options_of_fitting_need_no_new_binding_and_others_do():
@@ -743,61 +739,59 @@ ODD = [
 
 def test_regions_are_called_by_their_place_until_they_have_a_name():
     session = Session(SCENE.mesh)
-    assert session.region_names == ()
+    assert session.painting.names == ()
     session.set_regions(SCENE.regions)
-    assert session.region_names == ("region 1", "region 2")
-    assert session.region_name(2) == "region 3"  # that of one still to come
+    assert session.painting.names == ("region 1", "region 2")
+    assert session.painting.name(2) == "region 3"  # that of one still to come
     news = []
     session.on_change(news.append)
     for name in ODD:
         session.painting.rename(1, f"  {name} ")
-        assert session.region_names == ("region 1", name)
+        assert session.painting.names == ("region 1", name)
         assert news[-1] == Change.NAMES | Change.HISTORY
     with pytest.raises(RegionError, match="already"):
         session.painting.rename(0, ODD[-1])
     session.painting.rename(1, ODD[-1])  # no other name: no step
     assert session.undo() == f"rename {ODD[-2]}"
-    assert session.region_names == ("region 1", ODD[-2])
+    assert session.painting.names == ("region 1", ODD[-2])
     session.painting.rename(1, "")
-    assert session.region_names == ("region 1", "region 2")
+    assert session.painting.names == ("region 1", "region 2")
     session.painting.rename(1, "arm")
     session.painting.rename(1, "region 2")  # what it would be called anyway is no name
     session.painting.merge([0, 1])
-    assert session.region_names == ("region 1",)
+    assert session.painting.names == ("region 1",)
 
 
 def test_a_name_goes_with_its_region_and_with_what_becomes_of_it():
     scene = sausage(4)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
+    session = scene.caged()
     session.painting.rename(1, "arm")
     session.painting.rename(3, "leg")
     assert len(session.cages) == 4  # a name changes nothing else
     masks = session.regions.membership
-    whole = dict(zip(session.region_names, masks, strict=True))
+    whole = dict(zip(session.painting.names, masks, strict=True))
 
     def mask(name):
-        return session.regions.membership[session.region_names.index(name)]
+        return session.regions.membership[session.painting.names.index(name)]
 
     session.painting.split(1)
-    assert session.region_names == ("region 1", "arm", "region 3", "leg", "arm 2")
+    assert session.painting.names == ("region 1", "arm", "region 3", "leg", "arm 2")
     assert_array_equal(mask("arm") | mask("arm 2"), whole["arm"])
     assert_array_equal(mask("leg"), whole["leg"])
     session.painting.split(4)
-    assert session.region_names[5] == "arm 3"
+    assert session.painting.names[5] == "arm 3"
     session.painting.merge([0, 5, 4, 1])  # the first that has a name gives it
-    assert session.region_names == ("arm", "region 2", "leg")
+    assert session.painting.names == ("arm", "region 2", "leg")
     assert_array_equal(mask("arm"), whole["arm"] | whole["region 1"])
     session.painting.split(1)
-    assert session.region_names == ("arm", "region 2", "leg", "region 4")
+    assert session.painting.names == ("arm", "region 2", "leg", "region 4")
     session.painting.paint(4, scene.mesh.vertices[:, 0] > 2.0)
-    assert session.region_names[2:] == ("leg", "region 4", "region 5")
+    assert session.painting.names[2:] == ("leg", "region 4", "region 5")
     for _ in range(5):
         session.undo()
-    assert session.region_names == ("region 1", "arm", "region 3", "leg")
+    assert session.painting.names == ("region 1", "arm", "region 3", "leg")
     session.segment(2)  # other regions
-    assert session.region_names == ("region 1", "region 2")
+    assert session.painting.names == ("region 1", "region 2")
 
 
 def test_halves_of_a_region_are_connected_overlap_and_cover_it():

@@ -86,7 +86,7 @@ def same(a: Session, b: Session) -> bool:
         and list(one.handles) == list(other.handles)
         and (one.pose is None) == (other.pose is None)
         and one.options == other.options
-        and a.region_names == b.region_names
+        and a.painting.names == b.painting.names
         and one.regions.smoothness == other.regions.smoothness
         and one.pulls == other.pulls
         and locality(a) == locality(b)
@@ -127,7 +127,7 @@ def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_p
     content = saved(shared(posed), tmp_path)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         header = json.loads(archive.read("header.json"))
-    assert header.pop("region_names") == ["", shared(posed).region_names[1]]
+    assert header.pop("region_names") == ["", shared(posed).painting.names[1]]
     assert header["version"] == 1  # older programs read files with names, too
     nameless = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(nameless, "w") as new:
@@ -135,8 +135,8 @@ def test_a_file_without_names_as_older_programs_wrote_it_is_read_as_before(tmp_p
             new.writestr(name, json.dumps(header) if name == "header.json" else old.read(name))
     (tmp_path / "old.npz").write_bytes(nameless.getvalue())
     loaded = load_session(tmp_path / "old.npz")
-    assert loaded.region_names == ("region 1", "region 2")
-    loaded.painting.rename(1, shared(posed).region_names[1])
+    assert loaded.painting.names == ("region 1", "region 2")
+    loaded.painting.rename(1, shared(posed).painting.names[1])
     assert same(loaded, shared(posed))
 
 

@@ -11,7 +11,6 @@ from scipy import sparse
 
 from vtk_segdeform import sizes
 from vtk_segdeform.errors import Cancelled
-from vtk_segdeform.kernels import dispatch
 from vtk_segdeform.subspace import InterpolatedBlock, interpolated
 
 SCENE = sausage(3, is_coarse=True)
@@ -61,12 +60,8 @@ def test_rows_are_those_of_the_coordinates_but_for_an_error_of_third_order(
     assert_allclose(x, SCENE.mesh.vertices, atol=1e-6)  # offsets are in single precision
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_products_are_those_of_the_rows_compiled_or_not(monkeypatch, subspace, compiled):
-    if compiled:
-        pytest.importorskip("numba")
-    else:
-        monkeypatch.setattr(dispatch, "_kernels", lambda: None)
+@pytest.mark.usefixtures("either")
+def test_products_are_those_of_the_rows_compiled_or_not(subspace):
     n = subspace.n_vertices
     rows = subspace.at(np.arange(n))
     base = SCENE.mesh.vertices

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,12 +94,16 @@ def test_in_single_precision_the_product_is_that_of_rounded_weights(monkeypatch)
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_a_pickle_has_the_blocks_only_and_maps_the_same_bits(compiled):
-    subspace = Subspace(SUBSPACE.n_vertices, SUBSPACE.rows, SUBSPACE.blocks)
-    before = len(pickle.dumps(subspace))
+@pytest.mark.parametrize("again", [True, False])
+def test_a_pickle_maps_the_same_bits_and_has_no_blocks_that_can_be_computed_again(compiled, again):
+    subspace = replace(SUBSPACE) if again else replace(SUBSPACE, again=None)
+    without_caches = len(pickle.dumps(subspace))
+    assert (without_caches < 0.3 * sum(block.nbytes for block in subspace.blocks)) == again
     vars(subspace)["_is_compiled"] = compiled
     moved = subspace.map(wobble())
     text = pickle.dumps(subspace)
-    assert len(text) < 1.01 * before
-    assert pickle.loads(text)._is_compiled == compiled
-    assert np.array_equal(pickle.loads(text).map(wobble()), moved)
+    assert len(text) < without_caches + 1000
+    for other in (pickle.loads(text), copy.deepcopy(subspace)):
+        assert other._is_compiled == compiled
+        assert np.array_equal(other.map(wobble()), moved)
+    assert copy.deepcopy(subspace).blocks is subspace.blocks  # not computed again

@@ -63,9 +63,12 @@ def plain_view(size: tuple[int, int] = (400, 400), *, is_own: bool = False) -> V
     return View(renderer, interactor)
 
 
-def look_along_y(view: View) -> None:
-    """Show all that is in *view*, z up; a unit sphere is seen as `Painter` expects."""
-    view.camera.SetPosition(0.0, -4.0, 0.0)
+def look_from(view: View, *place: float) -> None:
+    """Show all that is in *view* from the direction of *place*, z up.
+
+    From (0, -4, 0) a unit sphere is seen as `Painter` expects.
+    """
+    view.camera.SetPosition(*place)
     view.camera.SetViewUp(0.0, 0.0, 1.0)
     view.renderer.ResetCamera()
     view.render()

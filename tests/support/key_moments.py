@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 from hands import Hand, OneTimerHost, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
-from soaking import session_of, slender
+from soaking import NAME, slender
 
 from vtk_segdeform import Session, save_session
 from vtk_segdeform.session import Change
@@ -455,7 +455,7 @@ class HandStand(Stand):
 
 def ready() -> Session:
     """Return a small session, complete except for a pose, and bound."""
-    session = session_of(slender())
+    session = slender().session(NAME)
     session.change_options(n_cage_vertices=40)
     session = Session(session.mesh, state=session.state)  # without a history
     session.bind()

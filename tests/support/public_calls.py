@@ -32,7 +32,7 @@ import vtk_segdeform.widgets.plugin
 from vtk_segdeform import models
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.faults import Search, as_soup
-from vtk_segdeform.session import Handles, Painting
+from vtk_segdeform.session import Handles, Painting, finishing
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.subspace.passengers import Passengers
 from vtk_segdeform.widgets.films.film import Film
@@ -242,7 +242,8 @@ def _preparation() -> Any:
 
 
 def _finished() -> Any:
-    return _worked_on().finishing()()
+    done = _worked_on()
+    return finishing.finish(done.poses, done.state)()
 
 
 def surface() -> pv.PolyData:

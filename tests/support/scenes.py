@@ -13,7 +13,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Options, Session, State
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +37,18 @@ class Scene:
         bound = _bound(self.mesh, self.regions, self.cages)
         return bound.hold(fixed=self.fixed, handle=self.handle, **volumes)
 
-    def session(self) -> Session:
-        """Return a session of the scene, complete except for a pose."""
-        session = Session(self.mesh)
+    def caged(self, **options) -> Session:
+        """Return a session of the scene with regions and cages."""
+        session = Session(self.mesh, state=State(options=Options(**options)))
         session.set_regions(self.regions)
         session.set_cages(self.cages)
+        return session
+
+    def session(self, name: str | None = None, **options) -> Session:
+        """Return a session of the scene, complete except for a pose."""
+        session = self.caged(**options)
         session.set_fixed(self.fixed)
-        session.handles.add(self.handle)
+        session.handles.add(self.handle, name)
         return session
 
     def turned(self, degrees: float, axis=(0.0, 1.0, 0.0), about=(0.0, 0.0, 0.0)) -> np.ndarray:

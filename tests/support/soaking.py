@@ -42,16 +42,6 @@ def slender() -> Scene:
     return Scene(mesh, regions, tuple(cages), np.flatnonzero(x < -2.2), np.flatnonzero(x > 2.2))
 
 
-def session_of(scene: Scene) -> Session:
-    """Return a session of *scene* at rest, with one handle, `NAME`."""
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
-    session.set_fixed(scene.fixed)
-    session.handles.add(scene.handle, NAME)
-    return session
-
-
 def sways(scene: Scene, count: int, degrees: float) -> Iterator[np.ndarray]:
     """Yield *count* targets, back and forth, every sweep about another axis."""
     for event in range(count):
@@ -81,7 +71,7 @@ class LongDrag:
     events: int = 0
 
     def __post_init__(self) -> None:
-        self.session = session_of(self.scene)
+        self.session = self.scene.session(NAME)
         self._volume = signed_volume(self.scene.mesh.vertices, self.scene.mesh.faces)
 
     def follow(self, targets: np.ndarray, max_steps: int) -> Solution:

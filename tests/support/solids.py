@@ -105,6 +105,11 @@ def exact_volume_change(before: np.ndarray, after: np.ndarray, faces: np.ndarray
     return float(Fraction(six_volumes(after) - rest, rest))
 
 
+def soup(vertices, faces):
+    """Return the triangles with three points each, as STL has them."""
+    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
+
+
 def joined(*solids):
     """Return several surfaces as one."""
     starts = np.cumsum([0] + [len(vertices) for vertices, _ in solids])

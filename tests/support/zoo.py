@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere, joined, torus
+from solids import CUBE, OCTAHEDRON, TETRAHEDRON, icosphere, joined, soup, torus
 
 Soup = tuple[Any, Any]
 
@@ -55,12 +55,6 @@ def cells(filled: Any, finer: int = 1) -> Soup:
 def moved(soup: Soup, scale: Any = 1.0, shift: Any = (0.0, 0.0, 0.0)) -> Soup:
     """Return a surface scaled, then shifted."""
     return np.asarray(soup[0]) * scale + shift, soup[1]
-
-
-def soup_of(soup: Soup) -> Soup:
-    """Return triangles that share no vertex."""
-    vertices, faces = soup
-    return vertices[faces].reshape(-1, 3), np.arange(3 * len(faces)).reshape(-1, 3)
 
 
 def with_face(soup: Soup, *faces: Any) -> Soup:
@@ -209,7 +203,7 @@ OPEN = [
     Creature("two cubes sharing an edge", lambda: _corner((0, 0, 0), (1, 1, 0))),
     Creature("two cubes sharing a corner", lambda: _corner((0, 0, 0), (1, 1, 1))),
     Creature("a fin", lambda: with_face(body(), [0, *body()[1][5][:2]])),
-    Creature("triangle soup", lambda: soup_of(body())),
+    Creature("triangle soup", lambda: soup(*body())),
     Creature("flat", lambda: moved(body(), [1.0, 1.0, 0.0])),
     Creature("Moebius strip", moebius),
     Creature("Klein bottle", klein),

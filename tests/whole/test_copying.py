@@ -6,6 +6,7 @@ import copy
 import pickle
 from dataclasses import fields
 
+import numpy as np
 import public_calls
 import pytest
 from numpy.testing import assert_array_equal
@@ -14,6 +15,7 @@ from shared_arrays import CLASSES, writable_shared_arrays
 
 import vtk_segdeform as sd
 from vtk_segdeform import Session
+from vtk_segdeform.freezing import stored_whole, without_zeros
 from vtk_segdeform.session.state import Pose, State
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -30,9 +32,7 @@ WAYS = [copy.copy, copy.deepcopy, pickled]
 
 def working_session() -> Session:
     """Return a session with an ongoing drag, a step to undo and one to redo."""
-    session = Session(SCENE.mesh)
-    session.set_regions(SCENE.regions)
-    session.set_cages(SCENE.cages)
+    session = SCENE.caged()
     session.painting.rename(0, "trunk")
     session.set_fixed(SCENE.fixed)
     session.handles.add(SCENE.handle)
@@ -48,6 +48,23 @@ def working_session() -> Session:
 @pytest.mark.parametrize("cls", CLASSES, ids=lambda cls: cls.__name__)
 def test_the_arrays_of_a_copy_are_read_only_as_well(cls, way):
     assert writable_shared_arrays(way(public_calls.instance(cls))) == []
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_pickled_matrix_has_the_same_bits_in_the_same_order_without_its_zeros(order):
+    matrix = np.zeros((90, 50), order=order)
+    matrix[3, 4:], matrix[5:9, 2] = np.random.default_rng(0).normal(size=46), [-0.0, np.nan, 1, 2]
+    stored = without_zeros(matrix)
+    again = stored_whole(stored)
+    assert len(pickle.dumps(stored)) < 0.1 * matrix.nbytes
+    assert again.strides == matrix.strides
+    assert_array_equal(again.view(np.uint64), matrix.view(np.uint64))
+    bools = np.asarray(matrix > 0.5, order=order)
+    again = stored_whole(without_zeros(bools))
+    assert (again.dtype, again.strides) == (bools.dtype, bools.strides)
+    assert_array_equal(again, bools)
+    points = np.zeros((9, 3))
+    assert stored_whole(without_zeros(points)) is points
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.__name__)
@@ -71,7 +88,7 @@ def test_a_copied_session_has_the_drag_the_names_and_the_history(way):
     session = working_session()
     other = way(session)
     assert other.is_dragging
-    assert other.region_names == ("trunk", "region 2")
+    assert other.painting.names == ("trunk", "region 2")
     assert_array_equal(other.vertices, session.vertices)
     for one in (session, other):
         one.poses.memo.drop("path")

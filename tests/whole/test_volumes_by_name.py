@@ -211,7 +211,7 @@ def test_volumes_with_goals_are_exact_at_every_size(name, size, request):
     mesh = BODIES[name]()
     regions = sd.segment(mesh, 2)
     deformer = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 90))  # bound anew
-    assert deformer.step_volumes.surface.n_vertices < mesh.n_vertices
+    assert deformer._constraints.preserved.volumes.surface.n_vertices < mesh.n_vertices
     fixed, handle = _ends(mesh, np.random.default_rng(0))
     bodies = [each for each in deformer.volume_names if each.startswith("body")]
     goals = dict(zip(bodies, ["-20%", "keep", "at least keep"], strict=False))

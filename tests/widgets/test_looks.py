@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from hands import Hand, picture, plain_view
+from hands import Hand, look_from, picture, plain_view
 from open_surfaces import bottle
 from scenes import sausage
 
@@ -251,10 +251,7 @@ def test_the_editor_with_a_bent_body(ready):
     dragger = editor.widgets.dragger
     editor.On()
     editor.mode, dragger.local = Mode.DEFORM, True
-    view.camera.SetPosition(0.0, -20.0, 4.0)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
+    look_from(view, 0.0, -20.0, 4.0)
     hand = Hand(view)
     looks("editor-pivot", view, hand)
     hand.event("KeyPressEvent", key="backslash")

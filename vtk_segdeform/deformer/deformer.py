@@ -46,7 +46,7 @@ from ..kernels import compiled_kernels, load_for, one_blas_thread
 from ..mesh import Mesh, SurfacePoint, new_crossings, require_mesh
 from ..progress import Progress, part, tell
 from ..regions import Regions, require_regions
-from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint, Volumes
+from ..solver import CONVERGED, Bodies, Solution, SolverOptions, Status, VolumeConstraint
 from ..subspace import Passengers, Subspace
 from .arguments import (
     LOCALITY,
@@ -90,6 +90,9 @@ _BOUND = 0.95  # of the progress bar, before the trial step
 
 class Deformer:
     """Deform one mesh by its handles, again and again, each time from the last solution.
+
+    Pickled, it takes some 3 megabytes for 5,000 vertices; W~ is computed again when it is read, in
+    0.1 s, with the same bits on the same machine.
 
     Parameters
     ----------
@@ -519,11 +522,6 @@ class Deformer:
     def preserved_volumes(self) -> tuple[VolumeConstraint, ...]:
         """The volumes that every pose preserves: of each body, or of each region."""
         return self._constraints.preserved.constraints
-
-    @property
-    def step_volumes(self) -> Volumes:
-        """The volumes that the solver's steps preserve, and the surface they are computed on."""
-        return self._constraints.preserved.volumes
 
     @one_blas_thread()
     def passengers(self, points: ArrayLike, *, progress: Progress | None = None) -> Passengers:

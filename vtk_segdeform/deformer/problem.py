@@ -18,6 +18,7 @@ from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy
 from ..finish import CellEnergy
+from ..freezing import Frozen
 from ..geometry import Carrying, carriers, towards
 from ..mesh import Mesh, SurfacePoint, connected
 from ..progress import Progress
@@ -41,7 +42,7 @@ _LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the en
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Problem(Frozen):
     """A mesh and its energy in the subspace of its cages; made by `Problem.of`."""
 
     mesh: Mesh  # n vertices, in the coordinates of the caller

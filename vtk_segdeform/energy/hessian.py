@@ -27,12 +27,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy import linalg
 from scipy.linalg import blas, lapack
 
 from ..arrays import FloatArray
+from ..freezing import stored_whole, without_zeros
 from ..geometry import closest_rotations
 from ..kernels import compiled_kernels
 from ..subspace import NUMBERS_PER_FACE
@@ -60,6 +62,12 @@ class Factor:
     triangle: FloatArray  # in LAPACK's order; zero above its diagonal
     coupled: bool
     share: float = 0.0  # of the term of the rotations, which the Hessian contains
+
+    def __getstate__(self) -> dict[str, Any]:
+        return vars(self) | {"triangle": without_zeros(self.triangle)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, triangle=stored_whole(state["triangle"]))
 
     def solve(self, y: FloatArray) -> FloatArray:
         """Return H^-1 y, (m, 3), for *y* (m, 3)."""

@@ -27,7 +27,7 @@ The files, in reading order:
 """
 
 from ..mesh import SurfacePoint
-from . import pulls
+from . import finishing, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .handles import require_handle
@@ -58,11 +58,15 @@ __all__ = [
     "SurfacePoint",
     "Timeline",
     "blend_label",
+    "finishing",
     "load_session",
+    "preparing",
     "pulls",
     "region_name",
     "require_handle",
     "save_session",
     "saved_view",
+    "separating",
+    "solving",
     "volume_label",
 ]

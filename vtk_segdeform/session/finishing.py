@@ -49,7 +49,7 @@ _TURNED = 3e-5  # mesh sizes by which shifts must turn before the targets of the
 
 
 class FinishedPose(NamedTuple):
-    """The result of `Session.finishing`."""
+    """The result of `finish`, for `Session.accept_finish`."""
 
     before: Pose
     """The pose that was finished."""

@@ -19,7 +19,7 @@ class Change(enum.Flag):
     REGIONS = enum.auto()
     """`Session.regions`."""
     NAMES = enum.auto()
-    """`Session.region_names`."""
+    """`Painting.names`."""
     CAGES = enum.auto()
     """`Session.cages`, at rest."""
     CONSTRAINTS = enum.auto()

@@ -71,6 +71,16 @@ class Painting:
     def __init__(self, history: Timeline, poses: Poses) -> None:
         self._history, self._poses = history, poses
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the regions; unnamed ones are "region 1", "region 2", ... by number."""
+        regions = self._history.state.regions
+        return tuple(map(self.name, range(0 if regions is None else regions.n_regions)))
+
+    def name(self, region: int) -> str:
+        """Return the name of a region, also of one that does not exist yet."""
+        return naming.region_name(self._names, region)
+
     def paint(self, region: int, vertices: ArrayLike, *, subtract: bool = False) -> None:
         """Add *vertices*, ids or a mask, to a region, or with *subtract* remove them.
 
@@ -82,7 +92,7 @@ class Painting:
         RegionError
             If there is no such region, it would become empty, or a vertex would be in no region.
         """
-        regions, name = self._regions, self._name(region)
+        regions, name = self._regions, self.name(region)
         membership, count = regions.membership, regions.n_regions
         mask = _mask(regions.mesh, vertices)
         if not as_flag(subtract, "subtract") and is_whole(region, count, count) and mask.any():
@@ -146,7 +156,7 @@ class Painting:
         RegionError
             If there is no such region, or a part would be empty.
         """
-        regions, name = self._regions, self._name(region)
+        regions, name = self._regions, self.name(region)
         region = _checked(regions, region)
         mesh, whole = regions.mesh, regions.membership[region]
         second = _far_half(mesh, whole) if vertices is None else _mask(mesh, vertices) & whole
@@ -178,14 +188,13 @@ class Painting:
             If there is no such region, *name* is the name of another region, or it is not printable
             text of at most 80 characters.
         """
-        state = self._history.state
-        count = 0 if state.regions is None else state.regions.n_regions
+        state, count = self._history.state, len(self.names)
         if not is_whole(region, 0, count - 1):
             raise RegionError(
                 f"there is no region {shown(region)}; there are {count}, numbered from 0"
             )
         names = naming.renamed(self._names, int(region), name)
-        self._history.step(f"rename {self._name(region)}", replace(state, region_names=names))
+        self._history.step(f"rename {self.name(region)}", replace(state, region_names=names))
 
     @property
     def _regions(self) -> Regions:
@@ -194,9 +203,6 @@ class Painting:
     @property
     def _names(self) -> naming.Names:
         return self._history.state.region_names
-
-    def _name(self, region: int) -> str:
-        return naming.region_name(self._names, region)
 
     def _step(self, label: str, membership: BoolArray, names: naming.Names) -> None:
         after = self._regions.with_membership(membership)

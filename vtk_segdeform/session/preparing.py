@@ -72,6 +72,13 @@ def prepared(preparation: Preparation, state: State) -> State:
     return replace(state, regions=preparation.regions, cages=preparation.cages)
 
 
+def sized(state: State, n_cage_vertices: int | None) -> State:
+    """Return *state* with the option *n_cage_vertices*, if it is given."""
+    if n_cage_vertices is None:
+        return state
+    return replace(state, options=replace(state.options, n_cage_vertices=n_cage_vertices))
+
+
 def fitted(mesh: Mesh, state: State, progress: Progress | None = None) -> tuple[Cage, ...]:
     """Return cages around the regions of *state*, by its options.
 

@@ -14,12 +14,13 @@ Each of these calls is one undo step, except that all moves of a drag are one st
     handles    the handles and their edits              painting    edits of the regions
     saved_poses                                         poses by name, applied and blended
 
-- New regions or cages reset the pose, unless `carried` tells where the cages are.  New regions keep
-  the cages if each cage still encloses its region; otherwise all cages are removed.
+- New regions or cages reset the pose, unless `set_cages` gets the cages in the pose.  New regions
+  keep the cages if each cage still encloses its region; otherwise all cages are removed.
 - New fixed vertices, handles or options keep the pose; the next move starts from it.
 
-A session belongs to one thread.  Only `fitted_cages`, `carried` and `bind` may run in another
-thread, while the session is not used in any other way; they do not change its visible state.
+A session belongs to one thread.  Only `bind` and the functions of `preparing`, `separating` and
+`solving` may run in another thread, while the session is not used in any other way; they do not
+change its visible state.
 
 Long because it is the interface of one class; the implementation is in the other files.
 """
@@ -41,7 +42,6 @@ from ..cages import Cage
 from ..checks import Described, as_flag, as_text, require, require_sequence, shown
 from ..deformer import (
     Deformer,
-    Mirror,
     Slide,
     checked_constraints,
     checked_limb,
@@ -64,7 +64,7 @@ from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .saved_poses import SavedPoses
-from .separating import apart, separated, separated_by
+from .separating import apart, separated
 from .state import (
     Cages,
     Options,
@@ -222,12 +222,6 @@ class Session(Described):
         return self.state.regions
 
     @property
-    def region_names(self) -> tuple[str, ...]:
-        """The names of the regions; unnamed ones are "region 1", "region 2", ... by number."""
-        count = 0 if self.regions is None else self.regions.n_regions
-        return tuple(self.region_name(region) for region in range(count))
-
-    @property
     def cages(self) -> tuple[Cage, ...]:
         """One cage for each region, at rest; empty if there are no cages yet."""
         return self.state.cages
@@ -283,11 +277,6 @@ class Session(Described):
         return self.poses.lids(self.state)
 
     @property
-    def mirror(self) -> Mirror | None:
-        """The plane of symmetry with ``options.symmetry``, and the mates of the vertices."""
-        return self.poses.mirror(self.state)
-
-    @property
     def solution(self) -> Solution | None:
         """The solver's result for the current pose; None at rest, after loading or undo."""
         return self.poses.solution(self.state)
@@ -327,37 +316,16 @@ class Session(Described):
         progress: Progress | None = None,
     ) -> None:
         """Segment the mesh automatically; see `vtk_segdeform.segment`."""
-        regions = self.segmented(n_regions, overlap=overlap, seed=seed, progress=progress)
-        self.history.step("segment", painting.with_regions(self.state, regions))
-
-    def segmented(
-        self,
-        n_regions: int | None = None,
-        *,
-        overlap: int | None = None,
-        seed: int = 0,
-        progress: Progress | None = None,
-    ) -> Regions:
-        """Return the regions of `segment`, without changing the session.
-
-        This may run in another thread; pass the result to `set_regions` in the session's thread.
-        """
         follows = preparing.following(self.mesh, self.state)
-        return segment(
+        regions = segment(
             self.mesh, n_regions, overlap=overlap, seed=seed, progress=progress, **follows
         )
+        self.history.step("segment", painting.with_regions(self.state, regions))
 
     def set_regions(self, regions: Regions, *, label: str = "set regions") -> None:
         """Set the regions; *label* names the undo step."""
         after = painting.with_regions(self.state, of_mesh(self.mesh, regions))
         self.history.step(require(label, str, "label"), after)
-
-    def attached(self, attach: Mapping[int, int | str], progress: Progress | None = None) -> State:
-        """Return the state after `attach`, without changing the session.
-
-        This may run in another thread; pass the result to ``history.step`` in the session's thread.
-        """
-        return separating.attached(self.poses, self.state, attach, progress)
 
     def attach(self, attach: Mapping[int, int | str]) -> None:
         """Let components follow others at once, by the option *attach* of `Options`.
@@ -365,11 +333,8 @@ class Session(Described):
         Components that follow another one now, or no longer, get other regions and cages; the other
         regions remain, and so does the pose, nearly.
         """
-        self.history.step("change attached components", self.attached(attach))
-
-    def region_name(self, region: int) -> str:
-        """Return the name of a region, also of one that does not exist yet."""
-        return naming.region_name(self.state.region_names, region)
+        after = separating.attached(self.poses, self.state, attach)
+        self.history.step("change attached components", after)
 
     # Cages.
 
@@ -384,10 +349,10 @@ class Session(Described):
         """Set the cages, one around each region; CageError if they do not fit.
 
         *n_cage_vertices*, if given, becomes the option of the same step.  The pose is reset, unless
-        the vertices *posed* (m_r, 3) of the cages are given; see `carried`.
+        the vertices *posed* (m_r, 3) of the cages are given; see `solving.carried`.
         """
         require(label, str, "label")
-        options = self._options_with(n_cage_vertices)
+        state = preparing.sized(self.state, n_cage_vertices)
         cages = fitting_cages(self.regions, cages, self.state.region_names)
         if posed is not None:
             require_sequence(posed, "posed")
@@ -397,7 +362,7 @@ class Session(Described):
                 handles.cage_places(self.mesh, own, cage.n_vertices, "posed vertices")
                 for own, cage in zip(posed, cages, strict=True)
             ]
-        after = replace(self.state, cages=cages, options=options).at_rest()
+        after = replace(state, cages=cages).at_rest()
         if posed is not None:
             local = self.state.locality
             after = replace(after, fixed_at=self.state.fixed_at)
@@ -407,40 +372,9 @@ class Session(Described):
             after = replace(after, pose=pose, locality=local)
         self.history.step(label, after)
 
-    def carried(
-        self,
-        cages: Sequence[Cage],
-        progress: Progress | None = None,
-        *,
-        n_cage_vertices: int | None = None,
-    ) -> Cages | None:
-        """Return the vertices (m_r, 3) that other *cages* have in the current pose; None at rest.
-
-        The mesh is nearly where it is now.  This may run in another thread, as `fitted_cages`; pass
-        the result to `set_cages`.
-        """
-        cages = fitting_cages(self.regions, cages, self.state.region_names)
-        if self.state.pose is None:
-            return None
-        options = self._options_with(n_cage_vertices)
-        state = replace(self.state, cages=cages, options=options).at_rest()
-        return solving.carried(self.poses, state, self.vertices, progress)
-
-    def fitted_cages(
-        self, progress: Progress | None = None, *, n_cage_vertices: int | None = None
-    ) -> tuple[Cage, ...]:
-        """Fit cages to the regions and return them, without changing the session.
-
-        This may run in another thread; pass the result to `set_cages` in the session's thread.
-        *n_cage_vertices* is the total of their vertices, by default that of the options; unless
-        these have another number than the default one, it follows the number of regions.
-        """
-        state = replace(self.state, options=self._options_with(n_cage_vertices))
-        return preparing.fitted(self.mesh, state, progress)
-
     def fit_cages(self, progress: Progress | None = None) -> None:
         """Fit cages to the regions; if cancelled, nothing changes."""
-        self.set_cages(self.fitted_cages(progress), label="fit cages")
+        self.set_cages(preparing.fitted(self.mesh, self.state, progress), label="fit cages")
 
     def bind(self, progress: Progress | None = None) -> None:
         """Bind the cages and constraints in advance, so that the first move does not wait."""
@@ -698,7 +632,7 @@ class Session(Described):
         count = len(places[region])
         places[region] = handles.cage_places(self.mesh, vertices, count, "vertices")
         pose = solving.free_form(self.poses, self.state, places)
-        name = f"the cage of {self.region_name(region)}"
+        name = f"the cage of {self.painting.name(region)}"
         grip = _Placed(pose, tuple(places))
         self.history.move(replace(self.state, pose=pose), name, grip=grip)
 
@@ -709,10 +643,6 @@ class Session(Described):
     def volume(self, name: str) -> tuple[float, float]:
         """Return one of `volumes`, and (V - V0) / V0."""
         return self.deformer.volume(name, self.vertices)
-
-    def volume_label(self, name: str) -> str:
-        """Return the volume called *name* as people see it, who count from 1: "body 1", "arm"."""
-        return naming.volume_label(self.state.region_names, as_text(name, "name"))
 
     def set_part(self, name: str, vertices: ArrayLike | None) -> None:
         """Let the part *vertices* of the surface have a volume called *name*, under a lid.
@@ -746,7 +676,7 @@ class Session(Described):
         as_text(name, "name")
         goals = {own: goal for own, goal in self.options.volumes if own != name}
         options = replace(self.options, volumes=tuple(goals.items()))
-        label = f"forget the volume of {self.volume_label(name)}"
+        label = f"forget the volume of {naming.volume_label(self.state.region_names, name)}"
         self.history.step(label, replace(self.state, options=options))
 
     def set_volume(self, name: str, goal: str | float, *, max_steps: int | None = None) -> Solution:
@@ -768,28 +698,15 @@ class Session(Described):
         SessionError, ConstraintError
             If it is no goal, there is no such volume, or it contradicts others that are set.
         """
-        goals = self._goals_with(name, goal)
+        goals = {**dict(self.options.volumes), as_text(name, "name"): goal}
+        goals = dict(replace(self.options, volumes=tuple(goals.items())).volumes)  # checked
         state = apart(self.poses, self.state, goals)
         state = pulls.kept(state, self.poses.vertices(state))
         options = replace(state.options, volumes=tuple(goals.items()))
         state = replace(state, options=options)
         places = handles.targets_of(self.mesh, state)
-        return self._drag(state, places, [f"the volume of {self.volume_label(name)}"], max_steps)
-
-    def needs_cages(self, name: str, goal: str | float) -> bool:
-        """Whether `set_volume` has to fit new cages first, which may take a second or more."""
-        goals = self._goals_with(name, goal)
-        return separated_by(self.poses, self.state, goals) is not None
-
-    def with_cages_for(
-        self, name: str, goal: str | float, progress: Progress | None = None
-    ) -> State:
-        """Return the state with these cages; this may run in another thread."""
-        return apart(self.poses, self.state, self._goals_with(name, goal), progress)
-
-    def _goals_with(self, name: str, goal: str | float) -> dict[str, str | float]:
-        goals = {**dict(self.options.volumes), as_text(name, "name"): goal}
-        return dict(replace(self.options, volumes=tuple(goals.items())).volumes)  # checked
+        moved = f"the volume of {naming.volume_label(self.state.region_names, name)}"
+        return self._drag(state, places, [moved], max_steps)
 
     def refine(
         self,
@@ -842,7 +759,7 @@ class Session(Described):
         if self.is_unsettled:
             begun = 0.5
             self.refine(progress=part(progress, 0.0, begun))
-        result = self.finishing()(part(progress, begun, 1.0))
+        result = finishing.finish(self.poses, self.state)(part(progress, begun, 1.0))
         self.accept_finish(result)
         return result.solution
 
@@ -869,16 +786,8 @@ class Session(Described):
             return False
         return solution.status is Status.STEP_LIMIT
 
-    def finishing(self) -> finishing.Finish:
-        """Return a function that finishes the current pose, ``finishing(progress)``.
-
-        It does not use the session, so another thread may call it while the session is edited; pass
-        its result to `accept_finish` in the session's thread.  Raises like `finish`.
-        """
-        return finishing.finish(self.poses, self.state)
-
     def accept_finish(self, result: FinishedPose) -> bool:
-        """Use the result of `finishing`; False if the pose has changed since."""
+        """Use the result of `finishing.finish`; False if the pose has changed since."""
         before, pose, solution = require(result, FinishedPose, "result")
         if self.state.pose is not before:
             return False
@@ -902,12 +811,12 @@ class Session(Described):
         RegionError
             If there is no such region.
         """
-        count = len(self.region_names)
+        count = len(self.painting.names)
         if not is_whole(region, 0, count - 1):
             raise RegionError(f"region must be the number of one of {count}; got {shown(region)}")
         self.commit()
         after = solving.with_region_at_rest(self.poses, self.state, int(region))
-        self.history.step(f"reset {self.region_name(int(region))}", after)
+        self.history.step(f"reset {self.painting.name(int(region))}", after)
 
     def change_options(
         self, **changes: float | bool | Attach | Mapping[str, str | float] | None
@@ -983,11 +892,6 @@ class Session(Described):
         """Tell whether the cages of two poses differ by rounding only."""
         p, q = np.concatenate(a.cage_vertices), np.concatenate(b.cage_vertices)
         return bool(np.abs(p - q).max() <= _ROUNDING * self.mesh.diagonal)
-
-    def _options_with(self, n_cage_vertices: int | None) -> Options:
-        if n_cage_vertices is None:
-            return self.options
-        return replace(self.options, n_cage_vertices=n_cage_vertices)
 
 
 def _with_settings(settings: Mapping[str, Any], state: State) -> State:

@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..freezing import Frozen
 from ..geometry import Lids, corner_and_edges, outer_components, signed_volume
 from ..kernels import in_parallel
 from ..mesh import Mesh, inside_points
@@ -25,7 +26,7 @@ _PIECE = 1 << 15  # faces processed together
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
+class Bodies(Frozen):
     """The b bodies of a mesh, and the constraints that preserve the volume of each.
 
     Parameters

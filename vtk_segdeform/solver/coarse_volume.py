@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from scipy import sparse
 
 from .. import sizes
 from ..arrays import FloatArray, IntArray
+from ..freezing import Frozen
 from ..geometry import cluster_positions, decimated, faces_between, voronoi_cells
 from ..mesh import Mesh
 from ..progress import Progress
@@ -82,7 +83,7 @@ class CoarseVolume:
         is_flat = np.bincount(cells, areas) == 0.0
         areas = np.where(is_flat[cells], 1.0, areas)
         shares = areas / np.bincount(cells, areas)[cells]
-        return cls(subspace.averaged(_matrix(cells, shares)), cells, shares)
+        return cls(_surface_of(subspace, cells, shares), cells, shares)
 
     def volumes(
         self, constraints: Sequence[VolumeConstraint], rest: FloatArray, unit: float = 1.0
@@ -102,7 +103,7 @@ class CoarseVolume:
 
 
 @dataclass(frozen=True, eq=False)
-class _VolumeHessian:
+class _VolumeHessian(Frozen):
     """Second derivatives of volumes by the cages, from few points; called as `Volumes.hessian`."""
 
     surface: Subspace
@@ -161,6 +162,12 @@ class _VolumeHessian:
         number = np.repeat(np.arange(len(few)), [len(each.faces) for each in few])
         faces = np.concatenate([each.faces for each in few])
         return weights, VolumeConstraint(faces, 0.0, few[0].extension), number
+
+
+def _surface_of(subspace: Subspace, cells: IntArray, shares: FloatArray) -> Subspace:
+    """Return W~ of the means of *cells*."""
+    again = partial(_surface_of, subspace, cells, shares)
+    return replace(subspace.averaged(_matrix(cells, shares)), again=again)
 
 
 def _over_cells(

@@ -41,6 +41,7 @@ from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..freezing import Frozen
 from ..kernels import compiled_kernels, inputs
 from .terms import NO_SURFACE
 
@@ -64,7 +65,7 @@ _TINY = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
-class ContactSurface:
+class ContactSurface(Frozen):
     """Samples of a surface at rest, size about 1, and which of them are in contact with which.
 
     Parameters

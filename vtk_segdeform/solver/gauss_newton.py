@@ -58,6 +58,7 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy import linalg
@@ -206,6 +207,9 @@ class GaussNewton:
                 "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
         self._factor, self._state = factor, _State(factor)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_term"}
 
     def copy(self) -> GaussNewton:
         """Return a solver that continues from here independently."""

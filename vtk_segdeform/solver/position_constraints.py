@@ -25,6 +25,7 @@ from scipy.sparse import csgraph
 
 from .. import sizes
 from ..arrays import FloatArray, IntArray
+from ..freezing import Frozen
 from ..geometry import cluster_positions
 from ..mesh import Mesh
 from ..subspace import Subspace
@@ -78,7 +79,7 @@ class TargetTerm:
 
 
 @dataclass(frozen=True, eq=False)
-class PositionTerm:
+class PositionTerm(Frozen):
     """The term for k vertices in sets.
 
     A set of many vertices is moved by few cage vertices: its rows Q R are replaced by R, with

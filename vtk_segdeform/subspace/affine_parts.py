@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy import sparse
@@ -139,7 +140,8 @@ class AffineParts(Frozen):
                 found[np.searchsorted(mine, own[r])] += basis[r] @ maps[r]
             all_rows.append(mine)
             blocks.append(found)
-        return Subspace(subspace.n_vertices, tuple(all_rows), tuple(blocks))
+        again = None if subspace.again is None else partial(self.blended, subspace, points, shares)
+        return Subspace(subspace.n_vertices, tuple(all_rows), tuple(blocks), again)
 
     def blended_gradients(self, gradients: FloatArray, shares: FloatArray) -> FloatArray:
         """Return *gradients* (k, 3, m) of W~ at points that belong to the parts by *shares*."""

@@ -10,6 +10,7 @@ Long because nearly every key has its function here.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,17 @@ from vtk_segdeform.errors import CageError, ConstraintError, RegionError, Sessio
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import FinishedPose, State, blend_label
+from vtk_segdeform.regions import segment as find_regions
+from vtk_segdeform.session import (
+    FinishedPose,
+    State,
+    blend_label,
+    finishing,
+    preparing,
+    separating,
+    solving,
+    volume_label,
+)
 
 from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
@@ -101,7 +112,9 @@ def finish(controller: Controller) -> None:
         is_same = controller.finishing.accept(result)
         return "Pose finished on the mesh" if is_same else "The pose changed; it was not finished"
 
-    controller.start("Finishing on the mesh", measured(session.finishing()), accept)
+    controller.start(
+        "Finishing on the mesh", measured(finishing.finish(session.poses, session.state)), accept
+    )
 
 
 def save(controller: Controller) -> None:
@@ -176,7 +189,8 @@ def segment(controller: Controller, n_regions: int | None = None) -> None:
         return f"{_count(regions.n_regions, 'region')} found{_reset(controller, before)}"
 
     def work(progress: Progress) -> Regions:
-        return session.segmented(n_regions, progress=progress)
+        follows = preparing.following(session.mesh, session.state)
+        return find_regions(session.mesh, n_regions, progress=progress, **follows)
 
     controller.start("Detecting regions", work, show)
 
@@ -199,7 +213,8 @@ def attaching(component: int, carrier: str, label: str) -> Action:
             session.history.step(label, after)
             return label[:1].upper() + label[1:]
 
-        controller.start("Fitting cages", partial(session.attached, wanted), show)
+        work = partial(separating.attached, session.poses, before, wanted)
+        controller.start("Fitting cages", work, show)
 
     return attach
 
@@ -211,11 +226,12 @@ def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> Non
         raise RegionError(f"No regions to fit cages to. {_detecting(controller)}, or paint one")
 
     def work(progress: Progress) -> tuple[Sequence[Cage], Any]:
-        cages = session.fitted_cages(part(progress, 0.0, 0.4), n_cage_vertices=n_cage_vertices)
-        if session.regions is not regions:  # changed in another view of the same session
+        state, x = preparing.sized(session.state, n_cage_vertices), session.vertices
+        cages = preparing.fitted(session.mesh, state, part(progress, 0.0, 0.4))
+        if state.pose is None or session.regions is not regions:  # changed in another view
             return cages, None
-        rest = part(progress, 0.4, 1.0)
-        return cages, session.carried(cages, rest, n_cage_vertices=n_cage_vertices)
+        after, rest = replace(state, cages=cages).at_rest(), part(progress, 0.4, 1.0)
+        return cages, solving.carried(session.poses, after, x, rest)
 
     def show(found: tuple[Sequence[Cage], Any]) -> str:
         cages, posed = found
@@ -377,7 +393,8 @@ def keeping(part: str | None) -> Action:
             is_kept = session.options.preserve_region_volumes
             setting_volume(name, "free" if is_kept else "keep")(controller)
         is_kept = controller.widgets.keeps(name)
-        controller.say(f"Volume of {session.volume_label(name)} {'kept' if is_kept else 'free'}")
+        label = volume_label(session.state.region_names, name)
+        controller.say(f"Volume of {label} {'kept' if is_kept else 'free'}")
 
     return keep
 
@@ -403,9 +420,11 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
 
     def change(controller: Controller) -> None:
         session, before = controller.session, controller.session.state
-        if dict(before.options.volumes).get(name) == goal:
+        goals: dict[str, str | float] = dict(before.options.volumes)
+        if goals.get(name) == goal:
             return
-        label = f"set the volume of {session.volume_label(name)}"
+        goals[name] = goal
+        label = f"set the volume of {volume_label(session.state.region_names, name)}"
 
         def finish(*, joins: bool = join) -> None:
             session.set_volume(name, goal, max_steps=STEPS)
@@ -418,8 +437,9 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
             session.history.step(label, after)
             finish(joins=True)
 
-        if session.needs_cages(name, goal):
-            controller.start("Fitting cages", partial(session.with_cages_for, name, goal), show)
+        if separating.separated_by(session.poses, before, goals) is not None:
+            work = partial(separating.apart, session.poses, before, goals)
+            controller.start("Fitting cages", work, show)
         else:
             finish()
 
@@ -452,7 +472,9 @@ def _checked_part(controller: Controller, part: str | None) -> str:
     if part is None:
         raise ConstraintError("Pull the surface first, or select a handle")
     if part not in session.deformer.volume_names:
-        raise ConstraintError(f"{session.volume_label(part)} encloses no volume")
+        raise ConstraintError(
+            f"{volume_label(session.state.region_names, part)} encloses no volume"
+        )
     return part
 
 
@@ -464,7 +486,7 @@ def resetting(region: int) -> Action:
 
     def reset_part(controller: Controller) -> None:
         controller.session.reset_region(region)
-        controller.say(f"Reset {controller.session.region_name(region)}")
+        controller.say(f"Reset {controller.session.painting.name(region)}")
 
     return reset_part
 
@@ -581,7 +603,7 @@ def merge_region(controller: Controller) -> None:
     other = selector.region_under_pointer()
     if other is None or other == selector.region:
         raise RegionError(
-            f"Point at the region to merge with {controller.session.region_name(selector.region)}"
+            f"Point at the region to merge with {controller.session.painting.name(selector.region)}"
         )
     merging([selector.region, other])(controller)
 
@@ -590,7 +612,7 @@ def merging(regions: Sequence[int]) -> Action:
     """Return the action that merges two or more *regions*."""
 
     def merge(controller: Controller) -> None:
-        *names, last = map(controller.session.region_name, sorted(regions))
+        *names, last = map(controller.session.painting.name, sorted(regions))
         controller.session.painting.merge(sorted(regions))
         controller.widgets.choose_region(min(regions))
         controller.say(f"Merged {', '.join(names)} and {last}")
@@ -603,7 +625,7 @@ def split_region(controller: Controller) -> None:
     _require_regions(controller, "split")
     region = controller.widgets.selector.region
     controller.session.painting.split(region)
-    controller.say(f"Split {controller.session.region_name(region)}")
+    controller.say(f"Split {controller.session.painting.name(region)}")
 
 
 # Handles.
@@ -698,7 +720,7 @@ def _require_regions(controller: Controller, verb: str) -> None:
     if not count:
         raise RegionError(f"No regions to {verb} yet. {_detecting(controller)}, or paint one")
     if region >= count:
-        name = controller.session.region_name(region)
+        name = controller.session.painting.name(region)
         another = f"Press {controller.keys.cap('next_region')} to select another"
         raise RegionError(f"Cannot {verb} {name}: not painted yet. {another}")
 

@@ -1,7 +1,7 @@
 """Finishing poses on the mesh in the background, once the hand has rested after a drag.
 
     end of a drag  ->  rest for a moment, until the pose has converged
-    another thread ->  `Session.finishing`, from its own deformer
+    another thread ->  `finishing.finish` of the session, from its own deformer
     the result     ->  `Session.accept_finish`, part of the same undo step
     on the screen  ->  `Glide`, since the pose may move by some per cent of the diagonal
 
@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 from vtk_segdeform.checks import as_flag
 from vtk_segdeform.progress import Progress
-from vtk_segdeform.session import Change, FinishedPose, Session
+from vtk_segdeform.session import Change, FinishedPose, Session, finishing
 
 from ..scene import Glide, SurfaceDisplay, View
 from .queue import Kind, Queue, Task, Work
@@ -109,7 +109,7 @@ class Finishing:
         session = self._session()
         if session.solution is None or not session.can_finish:  # None after undo
             return None
-        return measured(session.finishing())
+        return measured(finishing.finish(session.poses, session.state))
 
     def accept(self, result: FinishedPose) -> bool:
         """Use a finished pose, and glide to it; False if the pose has changed since."""

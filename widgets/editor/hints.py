@@ -67,7 +67,7 @@ def _painting_hint(widgets: WidgetSet, keys: Keys) -> str:
     selector = widgets.selector
     if selector.paints is Paint.REGION:
         new = selector.region >= widgets.n_regions
-        name = widgets.session.region_name(selector.region)
+        name = widgets.session.painting.name(selector.region)
         target = brief(name, region_name((), selector.region)) + (" (new)" if new else "")
     elif selector.paints is Paint.FIXED:
         target = "fixed vertices"
@@ -120,7 +120,8 @@ def _part(widgets: WidgetSet, keys: Keys | None = None) -> str:
     change = signed(100.0 * widgets.overlay.region_volumes.change(part), 0)
     if change == "0":
         return ""
-    text = f"{brief(session.volume_label(part), volume_label((), part))} {change} %"
+    label = volume_label(session.state.region_names, part)
+    text = f"{brief(label, volume_label((), part))} {change} %"
     text = text[:1].upper() + text[1:]
     if keys is None or widgets.keeps(widgets.part):
         return text

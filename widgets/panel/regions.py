@@ -130,9 +130,9 @@ def _renaming(key: str, name: str) -> Action:
 
     def rename(controller: Controller) -> None:
         session, region = controller.session, int(key)
-        before = session.region_name(region)
+        before = session.painting.name(region)
         session.painting.rename(region, name)
-        controller.say(f"Renamed {before} to {session.region_name(region)}")
+        controller.say(f"Renamed {before} to {session.painting.name(region)}")
 
     return rename
 
@@ -151,7 +151,7 @@ def _rows(editor: DeformEditor) -> tuple[Row, ...]:
 
 def _row(editor: DeformEditor, region: int, volume: float | None) -> Row:
     widgets, cages = editor.widgets, editor.session.cages
-    name, exists = editor.session.region_name(region), region < widgets.n_regions
+    name, exists = editor.session.painting.name(region), region < widgets.n_regions
     cage = Cell("None" if exists else "")
     if exists and cages:
         cage = Cell(str(cages[region].n_vertices), widgets.cages.is_visible(region))

@@ -9,7 +9,7 @@ import numpy as np
 
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.pictures import BODY, of_region, rgb
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Session, volume_label
 from vtk_segdeform.solver import Bodies
 
 from ..editor import Action, Controller, DeformEditor, actions
@@ -173,7 +173,12 @@ def bodies_section(editor: DeformEditor) -> Section:
                 value=attached,
                 enabled=component is not None,
                 choices=tuple(choices),
-                act=partial(_attaching, session.volume_label(name), component or 0, tuple(choices)),
+                act=partial(
+                    _attaching,
+                    volume_label(session.state.region_names, name),
+                    component or 0,
+                    tuple(choices),
+                ),
             ),
         ),
         visible=count > 1,
@@ -218,12 +223,12 @@ def _carrier(bodies: Bodies, component: int) -> str:
 
 
 def _label(session: Session, name: str) -> str:
-    label = session.volume_label(name)
+    label = volume_label(session.state.region_names, name)
     return label[:1].upper() + label[1:]
 
 
 def _short(session: Session, name: str) -> str:
-    label = session.volume_label(name)
+    label = volume_label(session.state.region_names, name)
     return brief(label, label)
 
 

@@ -227,7 +227,7 @@ class PaintTarget:
     def _name(self) -> str:
         """The target in messages."""
         if self.paint is Paint.REGION:
-            return self.session.region_name(self.region)
+            return self.session.painting.name(self.region)
         if self.paint is Paint.FIXED:
             return "the set of fixed vertices"
         if self.paint is Paint.STIFFNESS:

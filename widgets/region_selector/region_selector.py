@@ -283,7 +283,7 @@ class RegionSelector(Widget):
         """
         shares = shares_of(stroke)
         is_mirrored = target.paint in (Paint.FIXED, Paint.STIFFNESS)
-        mirror = self.session.mirror if is_mirrored else None
+        mirror = self.session.poses.mirror(self.session.state) if is_mirrored else None
         return shares if mirror is None else np.maximum(shares, shares[mirror.mates])
 
     def _apply(self, shares: FloatArray, target: PaintTarget, erase: bool) -> None:

@@ -205,4 +205,4 @@ class VolumeOverlay:
         return lines
 
     def _name(self, region: int) -> str:
-        return brief(self.session.region_name(region), region_name((), region))
+        return brief(self.session.painting.name(region), region_name((), region))

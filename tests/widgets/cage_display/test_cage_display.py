@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
-from hands import Hand, draw_seldom, picture, plain_view
+from hands import Hand, draw_seldom, look_from, picture, plain_view
 from scenes import Scene, sausage
 
 from vtk_segdeform import Session
@@ -38,10 +38,7 @@ def surface():
     scene, state = fitted()
     view = plain_view((500, 400))
     surface = SurfaceDisplay(view, Session(scene.mesh, state=state))
-    view.camera.SetPosition(0.0, -10.0, 2.0)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
+    look_from(view, 0.0, -10.0, 2.0)
     draw_seldom(view)
     yield surface
     surface.remove()

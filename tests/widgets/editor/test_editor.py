@@ -19,6 +19,7 @@ from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, MeshError, RegionError
 from vtk_segdeform.geometry.volume import signed_volume
+from vtk_segdeform.session import solving
 from vtk_segdeform.widgets.editor import actions, controller
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.queue import _Shared
@@ -364,7 +365,7 @@ def test_a_pose_that_new_cages_cannot_have_is_reset_and_that_is_said(bench, monk
     session.commit()
     far = 1e6 * session.mesh.diagonal
     monkeypatch.setattr(
-        session, "carried", lambda cages, *_, **__: [cage.vertices + far for cage in cages]
+        solving, "carried", lambda _, state, *__: [cage.vertices + far for cage in state.cages]
     )
     bench.type("f")
     assert session.state.pose is None

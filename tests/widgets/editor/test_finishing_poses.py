@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from hands import plain_view
-from soaking import session_of, slender
+from soaking import NAME, slender
 from test_editor import Bench, bench  # noqa: F401 - one of them is a fixture
 from test_editor import pull_handle as pull_handle_in
 
@@ -38,7 +38,7 @@ pull_handle = functools.partial(pull_handle_in, moves=2)
 @pytest.fixture(scope="module")
 def ready():
     """Return the state of a session of few vertices, complete except for a pose."""
-    session = session_of(slender())
+    session = slender().session(NAME)
     return session.mesh, session.state
 
 

@@ -31,9 +31,7 @@ UP[2, 3] = 0.3
 def editor():
     """Return an editor over a session with two steps, "tip" and a drag of it."""
     scene, view = sausage(is_coarse=True), plain_view((200, 200))
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
+    session = scene.caged()
     session = Session(scene.mesh, state=session.state)
     session.handles.add(scene.handle, "tip")
     draw_seldom(view)

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, look_from, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
 from open_meshes import combined
 from scenes import sausage
@@ -39,10 +39,7 @@ class Bench:
         self.session.bind()
         self.editor = DeformEditor(plain_view(), self.session)
         view = self.editor.view
-        view.camera.SetPosition(0.0, -12.0, 0.0)
-        view.camera.SetViewUp(0.0, 0.0, 1.0)
-        view.renderer.ResetCamera()
-        view.render()
+        look_from(view, 0.0, -12.0, 0.0)
         draw_seldom(view)
         self.editor.On()
         self.hand = Hand(view)

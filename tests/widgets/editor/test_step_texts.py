@@ -27,7 +27,7 @@ def test_steps_are_named_by_what_moved_where_and_how_far():
     session.move_handle(name, turn)
     session.commit(f"rotate {name}")
     vertex = int(np.abs(x - [-1.0, -0.8, 0.0]).max(axis=1).argmin())
-    region = session.region_name(session.regions.label_at(vertex))
+    region = session.painting.name(session.regions.label_at(vertex))
     session.handles.pin(vertex)
     other = int(np.abs(x - [0.5, -0.8, 0.0]).max(axis=1).argmin())
     session.pull(other, session.vertices[other] + [0.0, -0.3, 0.4])
@@ -36,7 +36,7 @@ def test_steps_are_named_by_what_moved_where_and_how_far():
     session.pull(other, session.vertices[other] + [0.0, 0.0, -0.1])
     session.commit("pull")
     session.set_volume("region 1", "+10%")
-    there = session.region_name(session.regions.label_at(other))
+    there = session.painting.name(session.regions.label_at(other))
     assert step_texts(session)[-7:] == (
         f"drag {name}, 0.25",
         f"rotate {name}, 30°",

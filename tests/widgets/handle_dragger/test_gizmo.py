@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import every
-from hands import picture, plain_view
+from hands import look_from, picture, plain_view
 from solids import rotation
 
 from vtk_segdeform import Session, models
@@ -31,15 +31,8 @@ VIEW_RING = Part(Kind.ROTATION)
 def view():
     view = plain_view()
     SurfaceDisplay(view, Session(models.sphere(300)))
-    look_from(view, LOOKS[0])
+    look_from(view, *LOOKS[0])
     return view
-
-
-def look_from(view, place):
-    view.camera.SetPosition(*place)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
 
 
 def pointer(place):
@@ -91,7 +84,7 @@ def test_its_size_on_the_screen_is_constant(view, parallel):
 )
 def test_parts_are_hit_where_they_are_drawn(view, place, axes):
     view.camera.SetParallelProjection(place == LOOKS[1])
-    look_from(view, place)
+    look_from(view, *place)
     gizmo = Gizmo(view)
     gizmo.place(CENTRE, axes)
     image = picture(view)
@@ -134,7 +127,7 @@ def test_the_far_half_of_a_ring_is_neither_drawn_nor_hit(view):
 
 
 def test_where_a_ring_crosses_an_arrow_the_arrow_is_hit(view):
-    look_from(view, (8.0, -6.0, 6.0))  # the ring about y crosses the arrow along y
+    look_from(view, 8.0, -6.0, 6.0)  # the ring about y crosses the arrow along y
     gizmo = Gizmo(view)
     gizmo.place(CENTRE)
     arrows = [gizmo.line(Part(Kind.AXIS, axis))[:, :2] for axis in range(3)]
@@ -208,7 +201,7 @@ def test_a_highlighted_part_is_yellow_and_show_only_hides_the_others(view):
 def test_the_first_picture_after_a_camera_move_is_final():
     view = plain_view()
     SurfaceDisplay(view, Session(models.sphere(300)))
-    look_from(view, LOOKS[0])
+    look_from(view, *LOOKS[0])
     assert view.foreground.GetLayer() == 1  # the foreground exists already
     gizmo = Gizmo(view)
     gizmo.place(np.array([0.0, -0.9, 0.4]))

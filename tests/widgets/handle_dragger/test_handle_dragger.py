@@ -38,9 +38,7 @@ class Bench:
     """A session with two handles, a dragger that is on, and a hand."""
 
     def __init__(self, look=LOOKS[0], *, parallel=False, up=(0.0, 0.0, 1.0)):
-        self.session = Session(SCENE.mesh)
-        self.session.set_regions(SCENE.regions)
-        self.session.set_cages(SCENE.cages)
+        self.session = SCENE.caged()
         self.session.set_fixed(SCENE.fixed)
         x, _, z = SCENE.mesh.vertices.T
         self.session.handles.add(SCENE.handle)

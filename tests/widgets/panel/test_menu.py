@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, look_from, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
@@ -27,10 +27,7 @@ class Bench:
         self.session.bind()
         view = plain_view()
         self.editor = DeformEditor(view, self.session)
-        view.camera.SetPosition(0.0, -12.0, 0.0)
-        view.camera.SetViewUp(0.0, 0.0, 1.0)
-        view.renderer.ResetCamera()
-        view.render()
+        look_from(view, 0.0, -12.0, 0.0)
         draw_seldom(view)
         self.editor.On()
         self.hand, self.opened = Hand(view), 0

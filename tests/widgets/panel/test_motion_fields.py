@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.panel import press, sections
 from vtk_segdeform.widgets.scene import Phase, Pointer
@@ -17,24 +16,6 @@ from vtk_segdeform.widgets.scene import Phase, Pointer
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 SCENE = sausage(is_coarse=True)
 REST = SCENE.mesh.vertices[SCENE.handle]
-
-
-@pytest.fixture
-def editor():
-    session = SCENE.session()
-    view = plain_view()
-    editor = DeformEditor(view, session)
-    view.camera.SetPosition(0.0, -12.0, 0.0)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
-    draw_seldom(view)
-    editor.On()
-    editor.mode = Mode.DEFORM
-    editor.wait()
-    editor.controller.finishing.is_wanted = False
-    yield editor
-    editor.remove()
 
 
 def shown(editor):

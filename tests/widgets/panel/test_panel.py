@@ -45,9 +45,7 @@ def _unprepared():
 def start() -> tuple[Mesh, State]:
     """Return the mesh and the state of a session that every control of the panel can change."""
     scene = sausage(is_coarse=True)
-    session = Session(scene.mesh)
-    session.set_regions(scene.regions)
-    session.set_cages(scene.cages)
+    session = scene.caged()
     session.set_fixed(scene.fixed)
     name = session.handles.add(scene.handle)
     session.handles.pin(int(np.argmin(np.abs(scene.mesh.vertices[:, 0]))))

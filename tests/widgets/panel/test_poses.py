@@ -4,27 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import draw_seldom, plain_view
 from numpy.testing import assert_array_equal
-from scenes import sausage
 
-from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel import press, sections
 
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
-
-
-@pytest.fixture
-def editor():
-    view = plain_view()
-    draw_seldom(view)
-    editor = DeformEditor(view, sausage(is_coarse=True).session())
-    editor.On()
-    editor.mode = Mode.DEFORM
-    editor.wait()
-    editor.controller.finishing.is_wanted = False
-    yield editor
-    editor.remove()
 
 
 def shown(editor):

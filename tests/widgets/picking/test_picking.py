@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 import pytest
-from hands import plain_view
+from hands import look_from, plain_view
 from scenes import sausage
 from scipy.sparse import csgraph
 from solids import icosphere, two_components
@@ -31,10 +31,7 @@ def over(mesh, size=(400, 400), *, parallel=False):
     session = Session(mesh)
     surface = SurfaceDisplay(view, session)
     view.camera.SetParallelProjection(parallel)
-    view.camera.SetPosition(1.0, -3.0, 0.7)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
+    look_from(view, 1.0, -3.0, 0.7)
     return view, session, surface, Picker(surface)
 
 

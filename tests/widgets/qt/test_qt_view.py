@@ -17,7 +17,8 @@ from qt_moments import delete_now
 
 import pyvistaqt  # isort: skip
 import vtk_segdeform.widgets.plugin  # noqa: F401 - pyvistaqt ignores pyvista's entry points
-from vtk_segdeform import Regions, Session, models
+from vtk_segdeform import Regions, models
+from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.editor import Mode
 
 pytestmark = pytest.mark.usefixtures("unprepared")
@@ -108,13 +109,13 @@ def test_a_job_is_stopped_by_escape_while_qt_runs(again, monkeypatch):
     _, editor, hand, _ = again
     end = time.monotonic() + 60.0
 
-    def endless(session, n_regions, *, progress):  # the real one may end before the key is pressed
+    def endless(mesh, n_regions, *, progress, **_):  # the real one may end before the key
         while time.monotonic() < end:
             progress(0.5, "looking everywhere")
             time.sleep(0.001)
-        return Regions.single(session.mesh)
+        return Regions.single(mesh)
 
-    monkeypatch.setattr(Session, "segmented", endless)
+    monkeypatch.setattr(actions, "find_regions", endless)
     hand.key("g")
     until(lambda: "looking everywhere" in editor.status, "the job")
     hand.key("Escape")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, Painter, draw_seldom, look_along_y, picture, plain_view
+from hands import Hand, Painter, draw_seldom, look_from, picture, plain_view
 from vtkmodules.vtkRenderingCore import vtkTextActor
 
 from vtk_segdeform import Regions, Session, models
@@ -24,7 +24,7 @@ class Desk(Painter):
             z = self.session.mesh.vertices[:, 2]
             self.session.set_regions(Regions.from_masks(self.session.mesh, [z > -0.2, z < 0.2]))
         self.selector = RegionSelector(self.view, self.session)
-        look_along_y(self.view)
+        look_from(self.view, 0.0, -4.0, 0.0)
         draw_seldom(self.view)
         self.hand = Hand(self.view)
         self.selector.On()

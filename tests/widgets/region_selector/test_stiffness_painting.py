@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hands import Hand, Painter, draw_seldom, look_along_y, plain_view
+from hands import Hand, Painter, draw_seldom, look_from, plain_view
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 
@@ -26,7 +26,7 @@ class Desk(Painter):
         self.session = session
         self.editor = DeformEditor(plain_view(), session)
         view = self.editor.view
-        look_along_y(view)
+        look_from(view, 0.0, -4.0, 0.0)
         draw_seldom(view)
         self.editor.On()
         self.editor.mode = Mode.REGIONS
@@ -196,7 +196,7 @@ def test_with_a_symmetry_both_sides_are_fixed_or_stiffened_but_a_handle_is_on_on
     if target is Paint.HANDLE:
         assert_array_equal(painted()[~on_right], 0.0)
         return
-    mates = desk.session.mirror.mates
+    mates = desk.session.poses.mirror(desk.session.state).mates
     assert_array_equal(x[mates[on_right], 0] < 0.0, True)
     assert (painted() != idle)[~on_right].sum() > 5
     changed = (during != desk.colours[x[:, 2].argmin()]).any(axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from campaign import every
-from hands import look_along_y, plain_view
+from hands import look_from, plain_view
 
 from vtk_segdeform import Session, models
 from vtk_segdeform.widgets.picking.picking import Picker
@@ -20,7 +20,7 @@ def test_one_fast_move_of_the_brush_reaches_all_that_a_slow_one_does(radius):
     view = plain_view()
     session = Session(models.sphere(10_000))
     surface = SurfaceDisplay(view, session)
-    look_along_y(view)
+    look_from(view, 0.0, -4.0, 0.0)
     picker = Picker(surface)
     (x0, y0, _), (x1, y1, _) = view.to_display(np.array([[-0.5, -0.86, 0.05], [0.5, -0.86, 0.05]]))
     brush = Brush(picker, Pointer(Phase.PRESS, x0, y0), radius=radius, through=False)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from campaign import every
 from hands import Hand, draw_seldom, plain_view
-from soaking import NAME, session_of, slender
+from soaking import NAME, slender
 
 from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
@@ -37,7 +37,7 @@ class Bench:
     """An editor in deform mode, and a hand."""
 
     def __init__(self) -> None:
-        self.session = session_of(slender())
+        self.session = slender().session(NAME)
         self.view = plain_view((200, 160))
         self.editor = DeformEditor(self.view, self.session)
         self.widgets = self.editor.widgets

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - a plain window needs it
 from campaign import every
-from hands import draw_seldom, picture, plain_view
+from hands import draw_seldom, look_from, picture, plain_view
 from open_meshes import open_box, sheet
 from scenes import sausage
 from solids import rotation
@@ -40,10 +40,7 @@ def overlay(request):
     session.change_options(preserve_volume=False)
     view = plain_view((400, 300))
     surface = SurfaceDisplay(view, session)
-    view.camera.SetPosition(0.0, -10.0, 0.0)
-    view.camera.SetViewUp(0.0, 0.0, 1.0)
-    view.renderer.ResetCamera()
-    view.render()
+    look_from(view, 0.0, -10.0, 0.0)
     draw_seldom(view)
     overlay = VolumeOverlay(view, session, surface)
     overlay.wanted_range = None
