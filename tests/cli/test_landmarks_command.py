@@ -67,6 +67,24 @@ def test_the_mesh_and_what_is_carried_grow_alike(words, tmp_path, capsys):
     assert all(float(row["left out"]) < 1e-6 for row in rows)
 
 
+def test_landmarks_slide_along_a_surface_and_a_curve_by_their_names(words, tmp_path, capsys):
+    write_mesh(tmp_path / "patient.ply", BAR.with_vertices(BAR.vertices * GROWTH))
+    through = np.linspace(-1.0, 1.0, 9)[:, None] * [0.0, 0.0, 0.3] + BAR.vertices[SOME[1]] * GROWTH
+    line = Landmarks(names(9), through, np.full(9, np.nan))
+    write_landmarks(tmp_path / "line.csv", line)
+    words += ["--slide", f"L0={tmp_path / 'patient.ply'}", "--slide", f"?1={tmp_path / 'line.csv'}"]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert "unpaired        in own.csv" not in text
+    assert "landmarks       12, off by" in text
+    assert_allclose(read_mesh(tmp_path / "out.ply").vertices, BAR.vertices * GROWTH, atol=1e-5)
+    assert main([*words, "--slide", f"M*={tmp_path / 'line.csv'}"]) == 2
+    assert "no landmark of --source has a name like M*" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([*words, "--slide", "L1"])
+    assert "must be NAMES=FILE; got 'L1'" in capsys.readouterr().err
+
+
 def test_a_volume_uncertainty_and_a_picture_are_options(words, tmp_path, capsys):
     words += ["--volume", "+5%", "--uncertainty", "0.01"]
     words += ["--picture", str(tmp_path / "fit.png")]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from argparse import Namespace
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from ..landmarks import (
     write_landmarks,
     write_rows,
 )
+from ..mesh import Mesh
 from ..pictures import picture_landmarks, require_picture
 from ..progress import Progress
 from .outputs import Say, report_surface, report_volume
@@ -40,6 +42,8 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
         if _is_of_landmarks(path) and path.suffix.lower() != ".csv":
             raise ConstraintError(f"--carry writes landmarks to .csv; got {path.name}")
     source, target = read_landmarks(options.source), read_landmarks(options.target)
+    sliding = [_sliding(names, path, source) for names, path in options.slide]
+    target = _with_unknown(target, [name for names, _ in sliding for name in names])
     pairs = paired(source, target)
     for path, found in ((options.source, source), (options.target, target)):
         if alone := [name for name in found.names if name not in set(pairs.names)]:
@@ -54,6 +58,7 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
             pairs.source,
             pairs.target,
             uncertainty=np.where(np.isnan(given), options.uncertainty, given),
+            slides=[([pairs.names.index(name) for name in own], on) for own, on in sliding],
             volume=options.volume,
             n_regions=options.regions,
             n_cage_vertices=options.cage_vertices,
@@ -80,11 +85,29 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
             surface.mesh,
             fit.vertices,
             source=pairs.source,
-            target=pairs.target,
+            target=fit.targets,
             residuals=fit.residuals,
         )
         say(f"written         {options.picture}")
     return True
+
+
+def _sliding(names: str, path: Path, source: Landmarks) -> tuple[list[str], Mesh | FloatArray]:
+    """Return the landmarks whose names fit, and the curve or the surface that they slide along."""
+    own = [name for name in source.names if fnmatchcase(name, names)]
+    if not own:
+        raise ConstraintError(f"--slide: no landmark of --source has a name like {names}")
+    return own, read_landmarks(path).points if _is_of_landmarks(path) else Surface.read(path).mesh
+
+
+def _with_unknown(target: Landmarks, names: Sequence[str]) -> Landmarks:
+    """Return *target* with those of *names* that it lacks, at NaN."""
+    more = tuple(name for name in names if name not in target.names)
+    return Landmarks(
+        (*target.names, *more),
+        np.concatenate([target.points, np.full((len(more), 3), np.nan)]),
+        np.concatenate([target.uncertainty, np.full(len(more), np.nan)]),
+    )
 
 
 def _report(fit: LandmarkFit, pairs: Pairs, say: Say) -> None:

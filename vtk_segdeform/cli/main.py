@@ -461,6 +461,9 @@ def _landmarks(parser: argparse.ArgumentParser) -> None:
     add("--target", type=Path, required=True, metavar="FILE", help=text)
     text = "standard deviation of targets whose file gives none (default: 0, met exactly)"
     add("--uncertainty", type=float, default=0.0, metavar="S", help=text)
+    text = "let landmarks slide along a surface, or along a curve through the landmarks of a file; "
+    text += "names may have *; they need no targets; may be repeated"
+    add("--slide", type=_slide, action="append", default=[], metavar="NAMES=FILE", help=text)
     text = "keep, a volume, or a change such as +5%% (default: free)"
     add("--volume", default="free", metavar="GOAL", help=text)
     text = "move another surface, points, curves, a grid or landmarks along; may be repeated"
@@ -472,6 +475,13 @@ def _landmarks(parser: argparse.ArgumentParser) -> None:
     text = "total cage vertices (default: depends on the number of regions)"
     add("--cage-vertices", type=_count, default=None, metavar="N", help=text)
     add("--picture", type=Path, metavar="PNG", help="write a picture of mesh and landmarks")
+
+
+def _slide(text: str) -> tuple[str, Path]:
+    names, _, file = text.rpartition("=")
+    if not names or not file:
+        raise argparse.ArgumentTypeError(f"must be NAMES=FILE; got {text!r}")
+    return names, Path(file)
 
 
 def _carried(text: str) -> tuple[Path, Path]:

@@ -54,7 +54,7 @@ from .finishing import on_volumes
 from .limbs import Limb
 from .problem import Problem
 from .pull import pull
-from .slides import Slide, checked_slides
+from .slides import Slide, SurfaceTrack, checked_slides
 from .springs import SpringBody, SpringPose, regions_and_cages
 from .stiffness import Stiffness
 from .symmetry import Mirror
@@ -77,6 +77,7 @@ __all__ = [
     "SpringBody",
     "SpringPose",
     "Stiffness",
+    "SurfaceTrack",
     "automatic_locality",
     "changing_components",
     "checked_constraints",

@@ -117,7 +117,7 @@ def guides(slides: Iterable[Slide], mesh: Mesh, *, few: bool = False) -> tuple[G
 
 def _track(slide: Slide, mesh: Mesh, some: IntArray) -> Track:
     if slide.along == "surface":
-        return _Surface(mesh)
+        return SurfaceTrack(mesh)
     direction = _direction(slide, mesh)
     along = np.outer(direction, direction)
     return _Flat(mesh.vertices[some], along if slide.along == "plane" else np.eye(3) - along)
@@ -145,7 +145,7 @@ class _Flat:
         return x - (x - self.points) @ self.normal, np.broadcast_to(self.normal, (len(x), 3, 3))
 
 
-class _Surface:
+class SurfaceTrack:
     """A triangle mesh; its normals are interpolated between vertices, so that they have no jumps.
 
     With those of faces, solves went back and forth between the planes of neighbouring faces.
@@ -161,6 +161,7 @@ class _Surface:
         self._starts = np.cumsum(self._counts) - self._counts
 
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the nearest points of *x* (k, 3), and the projectors on the normals there."""
         near = self._tree.query(x, k=_NEIGHBOURS)[1].ravel()  # a mesh has three vertices at least
         each, k = ragged_arange(self._counts[near])
         faces, point = self._faces_at[self._starts[near][each] + k], each // _NEIGHBOURS

@@ -36,6 +36,7 @@ from ..geometry import rigid_fit
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, part, tell
+from .sliding import checked_slides, slid
 from .spline import CENTRES, Compact, Spline, smoothing_of
 
 STIFFNESS = (1e-3, 1e-2, 0.1, 1.0, 10.0)
@@ -56,6 +57,8 @@ class LandmarkFit:
 
     vertices: FloatArray
     """(n, 3) float: the vertices of the mesh, fitted."""
+    targets: FloatArray
+    """(k, 3) float: of landmarks that slide, where they have slid to."""
     residuals: FloatArray
     """(k, 3) float: from where the landmarks are now to their targets."""
     left_out: FloatArray
@@ -87,6 +90,7 @@ def fit_landmarks(
     target: ArrayLike,
     *,
     uncertainty: ArrayLike = 0.0,
+    slides: Sequence[tuple[ArrayLike, Mesh | ArrayLike]] = (),
     volume: str | float = "free",
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
@@ -104,6 +108,10 @@ def fit_landmarks(
         Where they are to be, such as in a patient; the size of the body may be another one.
     uncertainty : float or (k,) float
         Standard deviation of each coordinate of a target, in their unit; 0: it is met exactly.
+    slides : sequence of (landmarks, curve or surface), optional
+        Landmarks, by their numbers, whose targets slide along a surface, a `Mesh`, or along a
+        curve, (m, 3) points in order, to where the spline through all of them bends least.  Their
+        targets are first moved to the nearest points; those of NaN begin where the others lead.
     volume : str or float
         "free", "keep", or a goal such as "+5%" or a number, as of "whole" of `Deformer`; of an open
         surface that under lids.  The landmarks are then met as nearly as the cages can.
@@ -119,7 +127,8 @@ def fit_landmarks(
     Raises
     ------
     ArgumentError
-        If there are fewer than three pairs, an uncertainty is negative, or arrays do not fit.
+        If there are fewer than three pairs, an uncertainty is negative, arrays do not fit, or
+        *slides* are no pairs of landmarks and what they slide along.
     CageError
         If a landmark is too far from the mesh.
     ConstraintError
@@ -137,12 +146,14 @@ def fit_landmarks(
     """
     require_mesh(mesh)
     a = as_points(source, "source")
-    u = as_points(target, "target", len(a))
+    tracks = checked_slides(slides, len(a))
+    u = _targets(target, len(a), [ids for ids, _ in tracks])
     if len(a) < _LEAST:
         raise ArgumentError(f"source must have {_LEAST} landmarks or more; got {len(a)}")
     sigma = as_numbers(uncertainty, "uncertainty")
     if sigma.shape not in ((), (len(a),)) or not (np.isfinite(sigma) & (sigma >= 0.0)).all():
         raise ArgumentError(f"uncertainty must be one or {len(a)} numbers, 0 or more")
+    u = slid(a, u, tracks)
     goal = checked_goals({"whole": volume})["whole"]
     body = SpringBody(
         mesh,
@@ -175,7 +186,23 @@ def fit_landmarks(
     tell(progress, 1.0, "fitted")
     change = body.enclosed.relative(body.problem.frame.about_origin(x))
     tested = errors[best], errors[0]
-    return LandmarkFit(x, u - to(a), *tested, stiffness, change, _map=to, _mesh=mesh)
+    return LandmarkFit(x, u, u - to(a), *tested, stiffness, change, _map=to, _mesh=mesh)
+
+
+def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> FloatArray:
+    """Return the checked targets (k, 3); NaN in rows of sliding landmarks that begin nowhere."""
+    given = as_numbers(target, "target")
+    sliding = np.concatenate([np.zeros(0, dtype=np.int64), *slides])
+    free = np.zeros(count, dtype=bool)
+    if given.shape == (count, 3):
+        free[sliding] = np.isnan(given[sliding]).any(axis=1)
+    if not free.any():
+        return as_points(given, "target", count)
+    if count - np.count_nonzero(free) < _LEAST:
+        raise ArgumentError(f"target must have {_LEAST} landmarks or more that are not NaN")
+    found = as_points(np.where(free[:, None], 0.0, given), "target", count)
+    found[free] = np.nan
+    return found
 
 
 class _Fitting:

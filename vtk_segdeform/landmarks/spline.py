@@ -52,6 +52,8 @@ class Spline:
 
     Attributes
     ----------
+    bending : (k, k) float
+        B: u^T B u is the bending energy of the spline with the values u (k,), up to a factor.
     deviations : (k,) float
         The standard deviation of the value at each centre given the others, up to a factor.
     """
@@ -66,6 +68,7 @@ class Spline:
         matrix[k:, :k] = matrix[:k, k:].T
         matrix[np.arange(k), np.arange(k)] += smoothing
         self._inverse = linalg.pinvh(matrix, rtol=_RANK)[:, :k]
+        self.bending = self._inverse[:k]
         least = np.finfo(float).tiny
         self.deviations = 1.0 / np.sqrt(np.maximum(np.diag(self._inverse), least))
 
