@@ -443,6 +443,7 @@ ARGUMENTS: dict[str, Callable[[], Any]] = {
     "goal": lambda: "keep",
     "handle": _right,
     "held": _left,
+    "hinge": lambda: 0.5,
     "history": lambda: 5,
     "interactor": lambda: view().interactor,
     "join": lambda: False,

@@ -343,6 +343,13 @@ def changing_limb(steps: int) -> Action:
     return lambda controller: controller.say(controller.widgets.puller.change_limb(steps))
 
 
+def next_hinge(controller: Controller) -> None:
+    """Let limbs bend along their length, half at their joint, or at their joint only."""
+    puller = controller.widgets.puller
+    puller.hinge = 0.0 if puller.hinge == 1.0 else 0.5 if puller.hinge < 0.5 else 1.0
+    controller.say(f"Hinge: {100.0 * puller.hinge:.0f} %")
+
+
 def auto_locality(controller: Controller) -> None:
     """Let pins decide how local a pull is, and the radius which limb it moves."""
     controller.widgets.puller.locality = controller.widgets.puller.limb = None

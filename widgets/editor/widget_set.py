@@ -80,11 +80,7 @@ class WidgetSet:
         self.puller.binds = False  # the editor does, in the background
         self.puller.is_locked = lambda name: name in self.dragger.locked
         self.puller.is_hidden = lambda name: name in self.dragger.hidden
-        self.dragger.pulls_with = lambda: {
-            "radius": self.puller.radius,
-            "locality": self.puller.locality,
-            "limb": self.puller.limb,
-        }
+        self.dragger.pulls_with = lambda: self.puller.options
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
@@ -203,6 +199,7 @@ class WidgetSet:
         mine.radius = size * its.radius
         self.puller.radius = size * before.puller.radius
         self.puller.locality, self.puller.limb = before.puller.locality, before.puller.limb
+        self.puller.hinge = before.puller.hinge
         self.dragger.local = before.dragger.local
         self.overlay.wanted_range = before.overlay.wanted_range
         self.surface.style = before.surface.style

@@ -28,7 +28,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import Limb, checked_limb, checked_locality
+from vtk_segdeform.deformer import Limb, checked_hinge, checked_limb, checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session, SurfacePoint, pulls
@@ -96,6 +96,7 @@ class Puller(Widget):
         self._tint = LimbTint(self._surface, self._limb_of_pull)
         self._gizmo = Gizmo(self.view)
         self._limb: int | None = None
+        self._hinge = 0.0
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
@@ -142,6 +143,26 @@ class Puller(Widget):
     def limb(self, limb: int | None) -> None:
         self._limb = checked_limb(limb)
         self._invoke("ModifiedEvent")
+
+    @property
+    def hinge(self) -> float:
+        """Where a pulled limb bends, 0 to 1: along its length, or at its joint only."""
+        return self._hinge
+
+    @hinge.setter
+    def hinge(self, hinge: float) -> None:
+        self._hinge = checked_hinge(hinge)
+        self._invoke("ModifiedEvent")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The radius, locality, limb and hinge, as of `Session.pull`."""
+        return {
+            "radius": self.radius,
+            "locality": self.locality,
+            "limb": self.limb,
+            "hinge": self.hinge,
+        }
 
     def change_limb(self, steps: int) -> str:
         """Let a pull move a larger limb of the point under the pointer, or a smaller one.
@@ -308,9 +329,7 @@ class Puller(Widget):
         start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
         self._pulled = point
-        pull = partial(
-            session.pull, point, radius=self.radius, locality=self.locality, limb=self.limb
-        )
+        pull = partial(session.pull, point, **self.options)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
         try:

@@ -10,6 +10,7 @@ from hands import Hand, draw_seldom, picture, plain_view
 
 from vtk_segdeform import Session
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.models.implicit import Limb, implicit_surface
 from vtk_segdeform.widgets.editor.editor import DeformEditor
 from vtk_segdeform.widgets.panel.panel import press
@@ -148,6 +149,25 @@ def test_a_pull_moves_the_limb_and_the_chosen_one_by_keys_or_by_the_panel(bench)
     assert "No limb here" in bench.editor.status
     bench.hand.types("bracketleft", (3, 3))
     assert "Point at the surface" in bench.editor.status
+
+
+def test_a_hinge_by_the_key_or_by_the_panel_keeps_the_arm_straight(bench):
+    arm = bench.rest[:, 0] > 0.8
+    way = [bench.at(HAND) + [0, k] for k in range(0, 100, 20)]
+    changes = []
+    for _ in range(2):
+        bench.hover(HAND)
+        bench.hand.drag(way)
+        turn, shift = rigid_fit(bench.rest[arm], bench.session.vertices[arm])
+        away = bench.rest[arm] @ turn.T + shift - bench.session.vertices[arm]
+        changes.append(np.linalg.norm(away, axis=1).max())
+        bench.session.undo()
+        bench.hand.types("b", bench.at(HAND))
+        assert "Hinge: 50 %" in bench.editor.status or changes[1:]
+    assert changes[1] < 0.5 * changes[0]
+    assert bench.puller.hinge == 1.0
+    press(bench.editor, "pull.hinge", 20.0)
+    assert bench.editor.widgets.dragger.pulls_with()["hinge"] == pytest.approx(0.2)
 
 
 def test_r_turns_the_limb_about_its_axis_then_in_the_view_then_moves(bench):
