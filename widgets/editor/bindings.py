@@ -84,7 +84,7 @@ BINDINGS = (
     Binding("auto_locality", ("a",), P, "Automatic locality", actions.auto_locality),
     Binding("hinge", ("b",), P, "Bend limbs at the joint: 0, 50, 100 %", actions.next_hinge),
     Binding("remove_pins", ("u",), P, "Remove all points", actions.unpin_all),
-    Binding("", ("r",), P, "While pulling: turn the limb, turn in the view, move", None),
+    Binding("", ("r",), DRAGGING, "While dragging: turn the limb, turn in the view, move", None),
     Binding("select_through", ("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
     Binding(
         "grow", ("plus", "equal"), PAINTING, "Grow by one ring", lambda c: c.widgets.selector.grow()

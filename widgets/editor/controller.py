@@ -309,7 +309,9 @@ class Controller:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("InteractionEvent", self._gesture_moved)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
-        self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
+        self.widgets.puller.says = self.say
+        for widget in (self.widgets.puller, self.widgets.dragger):
+            widget.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:

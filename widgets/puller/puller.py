@@ -5,7 +5,7 @@ shows the radius, and the limb that would move is tinted.  A press on a pin or a
 as dots, grabs that.
 
     shift + click       pin the point, or remove the pin or pulled point there
-    shift + wheel       smaller, larger radius
+    shift + wheel       smaller, larger radius; with control a smaller, larger limb
     while pulling:
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
     r           turn the limb about its axis, or without one the surface around the point about
@@ -75,6 +75,8 @@ class Puller(Widget):
         Whether the first pull binds the session if need be; otherwise it waits until that is done.
     is_locked, is_hidden : callable
         Of a name: whether a pin or pulled point must not be grabbed, or is not shown; none is.
+    says : callable
+        Called with a text about a limb that the wheel chose.
     waiting : Waiting
         The pull that waits until the session is ready.
     """
@@ -86,6 +88,7 @@ class Puller(Widget):
         self.binds = True
         self.is_locked: Callable[[str], bool] = lambda _: False
         self.is_hidden: Callable[[str], bool] = lambda _: False
+        self.says: Callable[[str], object] = lambda _: None
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         changed = partial(self._invoke, "ModifiedEvent")
@@ -284,12 +287,18 @@ class Puller(Widget):
         return self._pull(point, press) if can_grab else self._refuse(_TOO_COARSE)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
-        """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
+        """Change the radius, or with Control the limb, over the mesh with Shift held.
+
+        Otherwise pass the wheel to the camera.
+        """
         if self.is_grabbing:
             return True  # camera and radius stay the same during a pull
         if not pointer.shift or self._picker.hit(pointer) is None:
             return False
-        self._resize(clicks, pointer)
+        if pointer.control:
+            self.says(self.change_limb(clicks))
+        else:
+            self._resize(clicks, pointer)
         return True
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
