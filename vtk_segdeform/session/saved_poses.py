@@ -17,7 +17,7 @@ from types import MappingProxyType
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..arrays import FloatArray, frozen, is_number
+from ..arrays import FloatArray, IntArray, frozen, is_number
 from ..checks import shown
 from ..errors import ConstraintError
 from ..geometry import rigid_fit
@@ -100,6 +100,23 @@ class SavedPoses(Mapping[str, State]):
         self._require(name)
         saved = self._own[name]
         return saved.pose is None or _has_cages(self._history.state, saved)
+
+    def places(self, name: str, vertices: IntArray) -> FloatArray | None:
+        """Return the places (k, 3) of some *vertices* (k,) in a saved pose, within milliseconds.
+
+        None if they cannot be known so soon: it was saved with other cages, which are not bound.
+        """
+        self._require(name)
+        saved, pose = self._own[name], self._own[name].pose
+        if pose is None:
+            return np.asarray(self._poses.mesh.vertices[vertices])
+        if pose.finished is not None:
+            return np.asarray(pose.finished.vertices[vertices])
+        state = self._history.state
+        if not (_has_cages(state, saved) and self._poses.is_bound(state)):
+            return None
+        rows = self._poses.bind(state).subspace.at(vertices)
+        return np.asarray(rows @ np.concatenate(pose.cage_vertices))
 
     def blend(
         self, first: str | None, second: str | None, share: float, *, max_steps: int | None = None

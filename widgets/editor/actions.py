@@ -486,6 +486,31 @@ def pinning(vertex: int) -> Action:
     return pin
 
 
+def isolating(spot: Spot) -> Action:
+    """Return the action that hides all but the part at *spot*, or shows everything again."""
+
+    def isolate(controller: Controller) -> None:
+        widgets, session = controller.widgets, controller.session
+        if widgets.surface.only is not None:
+            widgets.surface.only = None
+            controller.say("Everything is shown")
+            return
+        widgets.surface.only = widgets.mask_of(spot)
+        name = "this part" if spot.region is None else session.region_name(spot.region)
+        controller.say(f"Only {name} is shown. {controller.keys.cap('isolate')}: show everything")
+
+    return isolate
+
+
+def isolate(controller: Controller) -> None:
+    """Hide all but the part under the pointer, or show everything again."""
+    widgets = controller.widgets
+    spot = widgets.spot_at(controller.view.pointer(Phase.HOVER))
+    if spot is None and widgets.surface.only is None:
+        raise ConstraintError("Point at the part to isolate")
+    isolating(spot or Spot(0, None, None))(controller)
+
+
 def framing(spot: Spot) -> Action:
     """Return the action that frames the part at *spot*."""
     return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))

@@ -126,6 +126,7 @@ BINDINGS = (
     # How the mesh is shown.
     Binding("style", ("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding("show_regions", ("shift+g",), ALL, "Show regions", actions.toggle_regions),
+    Binding("isolate", ("slash",), ALL, "Isolate part, or show everything", actions.isolate),
     Binding("before_after", ("backslash",), ALL, "Hold: show the mesh at rest", actions.show_rest),
     *(
         Binding(name, (key,), ALL, label, action, while_busy=True, heading=VIEW)

@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import NamedTuple
 
-from vtk_segdeform.arrays import FloatArray
+import numpy as np
+
+from vtk_segdeform.arrays import BoolArray, FloatArray
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Options, Session, pulls
@@ -237,10 +239,14 @@ class WidgetSet:
 
     def part_of(self, spot: Spot) -> FloatArray:
         """Return the vertices (k, 3) of the region of *spot*, or else of the connected part."""
-        session = self.session
-        if session.regions is None or spot.region is None:
-            return session.vertices[self._picker.component(spot.vertex)]
-        return session.vertices[session.regions.members(spot.region)]
+        return self.session.vertices[self.mask_of(spot)]
+
+    def mask_of(self, spot: Spot) -> BoolArray:
+        """Return the same vertices as a mask, (n,)."""
+        regions = self.session.regions
+        if regions is None or spot.region is None:
+            return self._picker.component(spot.vertex)
+        return np.asarray(regions.membership[spot.region])
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""

@@ -18,6 +18,11 @@ _SHOWN: tuple[tuple[str, _Test, _Test | None], ...] = (
     ("show_regions", lambda e: e.session.regions is not None, lambda e: e.widgets.regions_wanted),
     ("show_cages", lambda e: bool(e.session.cages), lambda e: e.widgets.cages.is_shown),
     ("show_volume_change", lambda _: True, lambda e: e.widgets.overlay_wanted),
+    (
+        "isolate",
+        lambda e: e.widgets.surface.only is not None,
+        lambda e: e.widgets.surface.only is not None,
+    ),
     ("show_holes", lambda e: bool(e.controller.notices.text), None),
 )
 _VIEWS = ("front", "back", "right", "left", "top", "bottom")

@@ -54,7 +54,8 @@ style w, show_regions shift+g, before_after backslash, view_front kp_1, view_bac
 view_right kp_3, view_left ctrl+kp_3, view_top kp_7, view_bottom ctrl+kp_7, view_home kp_0,
 projection kp_5, frame_selection period, frame_all comma, keep_part shift+p, grow_part e,
 paint_stiffness s, smaller_limb bracketleft, larger_limb bracketright,
-hinge b
+hinge b,
+isolate slash
 """
 
 
