@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,9 +25,13 @@ from ..geometry import rigid_fit
 from . import pulls, solving
 from .handles import targets_of
 from .naming import fault_of
+from .pose_copies import copied_pose, require_alike
 from .poses import Poses
-from .state import State
+from .state import State, checked_state
 from .timeline import Timeline
+
+if TYPE_CHECKING:
+    from .session import Session
 
 
 class SavedPoses(Mapping[str, State]):
@@ -100,6 +105,59 @@ class SavedPoses(Mapping[str, State]):
         self._require(name)
         saved = self._own[name]
         return saved.pose is None or _has_cages(self._history.state, saved)
+
+    def copy(self, other: Session, *names: str) -> tuple[str, ...]:
+        """Save poses of another session, of a mesh with the same faces, in one undo step.
+
+        Every part turns and stretches as there, from its own shape; the volume is exact.
+
+        Parameters
+        ----------
+        other : Session
+            Its mesh has other positions, such as the scan of another person.
+        *names : str
+            Of its saved poses; by default all, or if there are none, its current pose.
+
+        Returns
+        -------
+        names : tuple of str
+            Under which they are saved here: those that they have there, or "pose 1".
+
+        Raises
+        ------
+        ConstraintError
+            If the faces differ, or there is no such pose.
+        CageError
+            If this session has no cages.
+        """
+        return self.add(self.copied(other, *names))
+
+    def add(self, poses: Mapping[str, State]) -> tuple[str, ...]:
+        """Save what `copied` returns, in one undo step, and return the names."""
+        checked = {_checked(name): checked_state(self._poses.mesh, poses[name]) for name in poses}
+        label = f"copy {next(iter(poses))}" if len(poses) == 1 else f"copy {len(poses)} poses"
+        self._history.commit()
+        self._step(label, {**self._own, **checked})
+        return tuple(poses)
+
+    def copied(self, other: Session, *names: str) -> dict[str, State]:
+        """Return the poses that `copy` saves, by name, without changing the session.
+
+        Binding may take seconds; this may run in another thread.
+        """
+        require_alike(self._poses.mesh, other.mesh)
+        theirs = other.saved_poses
+        for name in names:
+            theirs._require(name)
+        states = {name: theirs[name] for name in names or theirs} or {"pose 1": other.state}
+        mine, after = self._history.state, {}
+        for name, state in states.items():
+            posed = replace(mine.at_rest(), saved=())
+            if state.pose is not None:
+                x, y = other.mesh.vertices, other.poses.vertices(state)
+                posed = replace(posed, pose=copied_pose(self._poses, posed, x, y))
+            after[name] = posed
+        return after
 
     def places(self, name: str, vertices: IntArray) -> FloatArray | None:
         """Return the places (k, 3) of some *vertices* (k,) in a saved pose, within milliseconds.

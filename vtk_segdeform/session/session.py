@@ -209,9 +209,13 @@ class Session(Described):
         """
         return output.deformed(self.mesh, self.surface, self.vertices)
 
-    def write_deformed(self, path: str | Path) -> None:
-        """Write `deformed` to a mesh file, as `write_mesh` does."""
-        output.write_deformed(path, self.mesh, self.surface, self.vertices)
+    def write_deformed(self, path: str | Path, *, displacement: str | None = None) -> None:
+        """Write `deformed` to a mesh file, as `write_mesh` does.
+
+        *displacement* is the name of a point array to add: how far each point has moved, (p, 3).
+        """
+        parts = self.mesh, self.surface, self.vertices
+        output.write_deformed(path, *parts, displacement=displacement)
 
     def layers(self) -> dict[str, pv.PolyData]:
         """Return the surface and its cages in the current pose; see `output.layers`."""

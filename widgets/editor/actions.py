@@ -14,13 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import FinishedPose, State, blend_label
+from vtk_segdeform.session import FinishedPose, State, blend_label, load_session
 
 from ..handle_dragger import STEPS
 from ..region_selector import Paint, RegionSelector
@@ -148,13 +150,18 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        written = write_posed(session, path)
+        written = write_posed(session, path, displacement=controller.displacement)
         saved = f"Mesh saved to {path}{pose_remark(session)}"
         controller.say(". ".join([saved, *written.remarks]))
         controller.read_again(written)
         then()
 
     return once_settled(export)
+
+
+def saving_displacement(name: str | None) -> Action:
+    """Return the action that adds the displacement to saved meshes, as an array *name*, or not."""
+    return assigning(lambda controller: controller, "displacement", name)
 
 
 def open_file(controller: Controller) -> None:
@@ -486,6 +493,22 @@ def pinning(vertex: int) -> Action:
     return pin
 
 
+def next_up_axis(controller: Controller) -> None:
+    """Show the model upright about the next axis."""
+    turning_up((int(controller.camera.viewpoint.up.argmax()) + 1) % 3)(controller)
+
+
+def turning_up(axis: int) -> Action:
+    """Return the action that makes an axis the up axis, and shows the model upright."""
+
+    def turn_up(controller: Controller) -> None:
+        controller.camera.viewpoint.up = np.eye(3)[axis]
+        controller.camera.viewpoint.look_from("home")
+        controller.say(f"Up: {'XYZ'[axis]}. {controller.keys.cap('next_up_axis')}: next axis")
+
+    return turn_up
+
+
 def isolating(spot: Spot) -> Action:
     """Return the action that hides all but the part at *spot*, or shows everything again."""
 
@@ -523,6 +546,26 @@ def save_pose(controller: Controller) -> None:
     """Save the current pose by a new name."""
     name = controller.session.saved_poses.save()
     controller.say(f"Saved {name}. F2 renames it in the list")
+
+
+def copying_poses(path: Path) -> Action:
+    """Return the action that saves the poses of a session file here, as poses of this mesh."""
+
+    def copy(controller: Controller) -> None:
+        session, before = controller.session, controller.session.state
+
+        def work(_: Progress) -> dict[str, State]:
+            return session.saved_poses.copied(load_session(path))
+
+        def show(after: dict[str, State]) -> str:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while poses were being copied. Try again")
+            names = session.saved_poses.add(after)
+            return f"Copied {_count(len(names), 'pose')}. Select one in the list of poses"
+
+        controller.start(f"Copying poses of {path.name}", work, show)
+
+    return copy
 
 
 def going_to(name: str) -> Action:

@@ -143,6 +143,7 @@ BINDINGS = (
                     ("home", "kp_0", "Three-quarter view"),
                 )
             ),
+            ("next_up_axis", "shift+u", "Next up axis", actions.next_up_axis),
             ("projection", "kp_5", "Orthographic or perspective", actions.toggle_projection),
             ("frame_selection", "period", "Frame selection", actions.frame_selection),
             ("frame_all", "comma", "Frame all", actions.frame_all),
