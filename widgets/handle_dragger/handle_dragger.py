@@ -302,7 +302,7 @@ class HandleDragger(Widget):
                 if name not in session.handles or (has_moved and not session.is_dragging):
                     return  # a commit, undo or redo from elsewhere has ended the drag
                 reached = sent if self._live.has_reached() else reached
-                if self._motion is None:
+                if self._motion is not motion:  # a key has ended it
                     if base is self._base:
                         motion.exact(0.0)  # back through the same stops
                         stops = [move(stop @ base) for stop in motion.stops(reached)]
