@@ -9,7 +9,7 @@ from scenes import Scene, sausage
 from solids import rotation
 
 from vtk_segdeform import Session, models
-from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.errors import ArgumentError, ConstraintError
 from vtk_segdeform.geometry import rigid_fit
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -76,5 +76,7 @@ def test_saved_poses_are_copied_by_name_in_one_step(bent):
 
 
 def test_a_mesh_with_other_faces_is_refused(bent):
+    with pytest.raises(ArgumentError, match="other must be a Session"):
+        SCENE.session().saved_poses.copy(SCENE.mesh)
     with pytest.raises(ConstraintError, match="the other mesh has other faces"):
         Session(models.sphere(300)).saved_poses.copy(bent)

@@ -621,6 +621,7 @@ SPECIAL: dict[str, Callable[[], Any]] = {
     "VolumeMesh.write.path": lambda: Path("written.vtu"),
     "VolumeMesh.write.pose": lambda: volume().at_rest,
     "SurfaceDisplay.instead.value": lambda: None,
+    "SurfaceDisplay.only.value": lambda: None,
     "SurfaceDisplay.style.value": lambda: SurfaceStyle.EDGES,
     "VolumeOverlay.wanted_range.value": lambda: 0.2,
     "blend_at.points": lambda: mesh().vertices[:4],

@@ -13,15 +13,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, IntArray, frozen, is_number
 from ..checks import shown
-from ..errors import ConstraintError
+from ..errors import ArgumentError, ConstraintError
 from ..geometry import rigid_fit
+from ..mesh import Mesh
 from . import pulls, solving
 from .handles import targets_of
 from .naming import fault_of
@@ -30,8 +31,21 @@ from .poses import Poses
 from .state import State, checked_state
 from .timeline import Timeline
 
-if TYPE_CHECKING:
-    from .session import Session
+
+class Posed(Protocol):
+    """A session, whose poses are copied."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh at rest."""
+
+    @property
+    def state(self) -> State:
+        """The current state."""
+
+    @property
+    def saved_poses(self) -> SavedPoses:
+        """The saved poses by name."""
 
 
 class SavedPoses(Mapping[str, State]):
@@ -106,7 +120,7 @@ class SavedPoses(Mapping[str, State]):
         saved = self._own[name]
         return saved.pose is None or _has_cages(self._history.state, saved)
 
-    def copy(self, other: Session, *names: str) -> tuple[str, ...]:
+    def copy(self, other: Posed, *names: str) -> tuple[str, ...]:
         """Save poses of another session, of a mesh with the same faces, in one undo step.
 
         Every part turns and stretches as there, from its own shape; the volume is exact.
@@ -140,13 +154,15 @@ class SavedPoses(Mapping[str, State]):
         self._step(label, {**self._own, **checked})
         return tuple(poses)
 
-    def copied(self, other: Session, *names: str) -> dict[str, State]:
+    def copied(self, other: Posed, *names: str) -> dict[str, State]:
         """Return the poses that `copy` saves, by name, without changing the session.
 
         Binding may take seconds; this may run in another thread.
         """
+        theirs = getattr(other, "saved_poses", None)
+        if not isinstance(theirs, SavedPoses):
+            raise ArgumentError(f"other must be a Session; got {shown(other)}")
         require_alike(self._poses.mesh, other.mesh)
-        theirs = other.saved_poses
         for name in names:
             theirs._require(name)
         states = {name: theirs[name] for name in names or theirs} or {"pose 1": other.state}
@@ -154,7 +170,7 @@ class SavedPoses(Mapping[str, State]):
         for name, state in states.items():
             posed = replace(mine.at_rest(), saved=())
             if state.pose is not None:
-                x, y = other.mesh.vertices, other.poses.vertices(state)
+                x, y = other.mesh.vertices, theirs._poses.vertices(state)
                 posed = replace(posed, pose=copied_pose(self._poses, posed, x, y))
             after[name] = posed
         return after

@@ -25,7 +25,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
 from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray, as_numbers, as_points, plain
-from vtk_segdeform.checks import require
+from vtk_segdeform.checks import require, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
@@ -193,6 +193,13 @@ class SurfaceDisplay:
     @only.setter
     def only(self, vertices: BoolArray | None) -> None:
         mesh = self.session.mesh
+        if vertices is not None:
+            vertices = plain(vertices, "only")
+            if vertices.shape != (mesh.n_vertices,) or vertices.dtype != np.bool_:
+                raise ArgumentError(
+                    f"only must be a mask of {mesh.n_vertices} vertices or None; "
+                    f"got {shown(vertices)}"
+                )
         own = None if vertices is None else vertices[mesh.faces].all(axis=1)
         self._only = vertices
         self.shown_faces = None if own is None else np.flatnonzero(own)

@@ -157,9 +157,12 @@ def test_an_isolated_part_is_shown_and_grabbed_alone_until_everything_is_shown(b
     far = np.array(bench.hand.at(SCENE.mesh.vertices[SCENE.mesh.vertices[:, 0].argmin()] + 0.1))
     other = lambda: editor.widgets.spot_at(Pointer(Phase.HOVER, *far))  # noqa: E731
     assert other() is not None
+    bench.session.handles.pin(other().vertex)
     visible = editor.widgets.selector._picker.visible()
     assert visible[~SCENE.regions.membership[1]].any()
+    assert editor.widgets.puller._markers._shown.keys() == {"pin 1", "pull 1"}
     press(editor, "menu.isolate")
+    assert editor.widgets.puller._markers._shown.keys() == {"pull 1"}
     assert "Only arm is shown" in editor.status
     assert surface.polydata.GetNumberOfPolys() == own.sum()
     assert bench.entry("isolate").value
