@@ -241,12 +241,14 @@ class HandleDragger(Widget):
 
     @property
     def turning(self) -> str:
-        """What the running drag turns about: "limb", "view" or an axis; "" if it moves."""
+        """What the running drag turns about since an R: "limb", "view" or an axis; "" if not."""
         motion = self._motion
         if motion is None or motion.part.kind is not Kind.ROTATION:
             return ""
         if self._turned_limb is not None:
             return "limb"
+        if self._grabbed == self._pressed:
+            return ""
         return "view" if motion.part.axis is None else "xyz"[motion.part.axis]
 
     def _toggle_turning(self, pointer: Pointer) -> None:
