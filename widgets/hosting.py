@@ -19,12 +19,12 @@ from vtk_segdeform.arrays import FloatArray, IntArray
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.geometry import VertexNormals
 from vtk_segdeform.importing import imported
-from vtk_segdeform.io import of_its_kind, polydata_of, surface_of
+from vtk_segdeform.io import of_its_kind, surface_of
 from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.pictures import BODY, rgb
 from vtk_segdeform.session import Change, Session
 
-from .scene import Stop, SurfaceDisplay, SurfaceStyle, drawn_triangles
+from .scene import Stop, SurfaceDisplay, SurfaceStyle, some_triangles
 
 if TYPE_CHECKING:
     from .editor import DeformEditor, KeyChoice
@@ -132,6 +132,7 @@ class HostActors:
         is_same = self._editor.session is self._session  # otherwise the editor has opened another
         is_draft = any(draft.GetVisibility() for draft in shown.actors[1:])
         is_seen = is_same and not is_draft and shown.style is SurfaceStyle.SHADED
+        is_seen &= shown.only is None
         for each in self._actors:
             each.actor.visibility = is_seen
         if not (is_same and self._actors):
@@ -139,7 +140,8 @@ class HostActors:
         colours = shown.colours if is_seen else _ALL
         if colours is not self._colours:
             self._colours = colours
-            shown.polydata.SetPolys(self._coloured(colours))
+            triangles = shown.triangles if colours is _ALL else self._coloured(colours)
+            shown.polydata.SetPolys(triangles)
         time = shown.polydata.GetPoints().GetMTime()
         if is_seen and time != self._time:
             self._time = time
@@ -166,20 +168,12 @@ class HostActors:
             bar.SetPosition(x, max(y, line + _GAP) if line else y)
 
     def _coloured(self, colours: NDArray[np.uint8] | None) -> Any:
-        """Return the triangles (vtkCellArray) that the editor draws: all for `_ALL`.
-
-        Otherwise those of which all corners have another colour than the clay.
-        """
+        """Return the triangles of which all corners have another colour than the clay."""
         mesh = self._session.mesh
-        triangles, _ = drawn_triangles(mesh)
-        if colours is _ALL:
-            return triangles
         own = np.zeros(mesh.n_faces, dtype=bool)
         if colours is not None:
             own = (colours != rgb(BODY).astype(np.uint8)).any(axis=1)[mesh.faces].all(axis=1)
-        corners = vtk_to_numpy(triangles.GetConnectivityArray()).reshape(-1, 3)[own]
-        points = np.empty((corners.max(initial=-1) + 1, 3))
-        return polydata_of(points, np.full(len(corners), 3), corners.ravel()).GetPolys()
+        return some_triangles(mesh, own)
 
     def remove(self) -> None:
         """Show the surface as it was given."""

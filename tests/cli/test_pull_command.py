@@ -83,6 +83,8 @@ def test_places_far_from_the_origin_have_all_their_digits(tmp_path, capsys):
         (["--at", "{top}", "--to", "0,0,x"], "to must be x,y,z"),
         (["--at", "{top}", "--to", "-.1,0,9", "--pin", "-5,0,0"], "--pin is"),
         (["--at", "{top}", "--to", "0,0,9", "--local", "2"], "--local must be a number from 0 to"),
+        (["--at", "{top}", "--to", "0,0,9", "--limb", "-1"], "--limb must be None or a whole num"),
+        (["--at", "{top}", "--to", "0,0,9", "--hinge", "2"], "--hinge must be a number from 0 to"),
         (["--at", "{top}", "--to", "0,0,9", "--pin", "{top}"], "both pins and handle"),
     ],
 )

@@ -13,7 +13,7 @@ from real_meshes import path_of
 from scenes import sausage
 from scipy import linalg, sparse
 from scipy.sparse import csgraph
-from solids import icosphere
+from solids import icosphere, revolved
 
 from vtk_segdeform import models, sizes
 from vtk_segdeform.arrays import FloatArray
@@ -364,25 +364,6 @@ def bends(x, faces):
     return np.arctan2(sine, np.einsum("ij,ij->i", one, two))
 
 
-def turned(profile, around: int = 24) -> Mesh:
-    """Return the surface of revolution of a *profile* (k, 2): radii, heights; ends on the axis."""
-    profile = np.asarray(profile, dtype=float)
-    inner, phi = profile[1:-1], np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
-    rings = inner[:, 0, None, None] * np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
-    rings[:, :, 2] += inner[:, 1, None]
-    ends = [[0.0, 0.0, profile[0, 1]], [0.0, 0.0, profile[-1, 1]]]
-    k, j = np.meshgrid(np.arange(len(inner) - 1) * around, np.arange(around), indexing="ij")
-    a, b = (k + j).ravel(), (k + (j + 1) % around).ravel()
-    j, on = np.arange(around), (np.arange(around) + 1) % around
-    n, last = inner.shape[0] * around, (len(inner) - 1) * around
-    first = np.stack([np.full(around, n), on, j], axis=1)
-    final = np.stack([np.full(around, n + 1), last + j, last + on], axis=1)
-    sides = [np.stack([a, b, b + around], axis=1), np.stack([a, b + around, a + around], axis=1)]
-    return Mesh(
-        np.concatenate([rings.reshape(-1, 3), ends]), np.concatenate([first, *sides, final])
-    )
-
-
 def samples_of(mesh: Mesh) -> SurfaceSamples:
     i, j = mesh.adjacency.nonzero()
     lengths = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
@@ -405,7 +386,7 @@ def figure(neck: float) -> Mesh:
     between = np.linspace(body[-1], head[0], max(2, round(neck / 0.1)))[1:-1]
     profile = np.concatenate([body, between, head])
     profile[[0, -1], 0] = 0.0
-    return turned(profile)
+    return Mesh(*revolved(profile))
 
 
 def on_head(mesh: Mesh, angle: float) -> SurfacePoint:

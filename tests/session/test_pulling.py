@@ -515,10 +515,12 @@ def test_a_saved_pull_of_a_point_of_a_face_is_continued(tmp_path):
 def test_the_limb_of_a_pull_is_saved(tmp_path):
     state = pulled().state
     assert state.locality.depth == 0.0  # a sausage has no limbs
-    for depth in (0.0, 0.25 * D):
-        session = Session(MESH, state=replace(state, locality=replace(state.locality, depth=depth)))
-        save_session(tmp_path / f"{depth}.segdeform", session)
-        assert load_session(tmp_path / f"{depth}.segdeform").state.locality.depth == depth
+    for depth, hinge in ((0.0, 0.0), (0.25 * D, 0.0), (0.25 * D, 0.5)):
+        local = replace(state.locality, depth=depth, hinge=hinge)
+        path = tmp_path / f"{depth} {hinge}.segdeform"
+        save_session(path, Session(MESH, state=replace(state, locality=local)))
+        again = load_session(path).state.locality
+        assert (again.depth, again.hinge) == (depth, hinge)
 
 
 def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():

@@ -66,6 +66,24 @@ def two_components() -> tuple[FloatArray, FloatArray]:
     return np.concatenate([vertices, shifted]), np.concatenate([faces, faces + len(vertices)])
 
 
+def revolved(profile, around: int = 24) -> tuple[FloatArray, FloatArray]:
+    """Return the surface of revolution of a *profile* (k, 2): radii, heights; ends on the axis."""
+    profile = np.asarray(profile, dtype=float)
+    inner, phi = profile[1:-1], np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    rings = inner[:, 0, None, None] * np.stack([np.cos(phi), np.sin(phi), 0.0 * phi], axis=1)
+    rings[:, :, 2] += inner[:, 1, None]
+    ends = [[0.0, 0.0, profile[0, 1]], [0.0, 0.0, profile[-1, 1]]]
+    k, j = np.meshgrid(np.arange(len(inner) - 1) * around, np.arange(around), indexing="ij")
+    a, b = (k + j).ravel(), (k + (j + 1) % around).ravel()
+    j, on = np.arange(around), (np.arange(around) + 1) % around
+    n, last = inner.shape[0] * around, (len(inner) - 1) * around
+    first = np.stack([np.full(around, n), on, j], axis=1)
+    final = np.stack([np.full(around, n + 1), last + j, last + on], axis=1)
+    sides = [np.stack([a, b, b + around], axis=1), np.stack([a, b + around, a + around], axis=1)]
+    faces = np.concatenate([first, *sides, final])
+    return np.concatenate([rings.reshape(-1, 3), ends]), faces
+
+
 def rotation(axis: FloatArray, angle: float) -> FloatArray:
     """Return the (3, 3) rotation by *angle* radians about *axis* (Rodrigues)."""
     x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)

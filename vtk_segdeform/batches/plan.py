@@ -34,7 +34,7 @@ from ..version import __version__
 
 _KEYS = {
     "random": {"random", "seed", "degrees"},
-    "vertex": {"vertex", "to", "radius", "pins", "locality", "volumes"},
+    "vertex": {"vertex", "to", "radius", "pins", "locality", "limb", "hinge", "volumes"},
     "handle": {"fixed", "handles", "handle", "targets", "volumes"},
 }
 _MOST = 1_000_000  # random poses of an entry

@@ -83,7 +83,8 @@ def batch(
         - ``fixed``, and ``handles``, each with a selection under ``select`` and ``rotate``,
           ``translate``, ``matrix`` and ``pivot`` as of ``segdeform deform``; or ``handle`` and
           ``targets`` as of `deform`; or none but goals
-        - ``vertex`` and ``to``, with ``radius``, ``pins`` and ``locality``, as of `pull`
+        - ``vertex`` and ``to``, with ``radius``, ``pins``, ``locality``, ``limb`` and ``hinge``, as
+          of `pull`
         - ``random``, a number of poses, with ``seed`` and ``degrees``, as of `random_poses`
 
         Fixed vertices and pins are numbers, or selections such as "z<10%".  The first two kinds may

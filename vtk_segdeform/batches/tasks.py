@@ -238,8 +238,9 @@ def _pulling(deformer: Deformer, pose: Mapping[str, Any]) -> tuple[Deformer, lis
     locality = checked_locality(pose.get("locality"))
     locality = automatic_locality(len(fixed)) if locality is None else locality
     own = deformer.hold(fixed=fixed, handle=handle, volumes=pose.get("volumes"))
-    reach, follows, depth = own.reach_of_pull(point, radius, locality)
-    own = own.local(point, reach, SPREAD * radius, follows=follows, depth=depth)
+    reach, follows, depth = own.reach_of_pull(point, radius, locality, pose.get("limb"))
+    hinge = pose.get("hinge", 0.0)
+    own = own.local(point, reach, SPREAD * radius, follows=follows, depth=depth, hinge=hinge)
     return own, [checked_point(pose["to"])[None] - point.at(mesh.vertices) + mesh.vertices[handle]]
 
 

@@ -439,6 +439,10 @@ def _pull(parser: argparse.ArgumentParser) -> None:
         "with 1 or 2 pins 0.05, with more 0)"
     )
     add("--local", type=float, default=None, metavar="S", help=text)
+    text = "limb of the point that moves: 0 is the smallest, such as a finger (default: auto)"
+    add("--limb", type=int, default=None, metavar="N", help=text)
+    text = "where that limb bends: 0 along its length, 1 at its joint only (default: 0)"
+    add("--hinge", type=float, default=0.0, metavar="H", help=text)
     text = "point on the surface to keep in place; may be repeated"
     add("--pin", action="append", default=[], metavar="X,Y,Z", help=text)
     text = "number of regions (default: auto)"

@@ -50,6 +50,8 @@ def pull(options: Namespace, say: Say, progress: Progress) -> bool:
         radius,
         pins=pinned,
         locality=options.local,
+        limb=options.limb,
+        hinge=options.hinge,
         n_regions=options.regions,
         n_cage_vertices=options.cage_vertices,
         **constraints_of(options, surface, volume),

@@ -18,7 +18,7 @@ The files, in reading order:
     frame            the coordinates in which a mesh is deformed
     arguments        checks of its arguments
     locality         what stays when one point is pulled
-    limbs            parts of a body that bend at a joint, found from a grabbed point
+    limbs            parts of a body that bend at a joint, and hinges there
     binding          all that is computed once for a mesh, its regions and its cages
     binding_cache    bindings kept on disk
     clamping         regions of their own for fixed parts and rigid handles
@@ -34,6 +34,7 @@ from .arguments import (
     SPREAD,
     automatic_locality,
     checked_constraints,
+    checked_hinge,
     checked_limb,
     checked_locality,
     checked_place,
@@ -82,6 +83,7 @@ __all__ = [
     "changing_components",
     "checked_constraints",
     "checked_goals",
+    "checked_hinge",
     "checked_limb",
     "checked_locality",
     "checked_place",

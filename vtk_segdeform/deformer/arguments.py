@@ -208,6 +208,13 @@ def checked_limb(limb: int | None) -> int | None:
     return None if limb is None else int(limb)
 
 
+def checked_hinge(hinge: float) -> float:
+    """Return the *hinge* of a pull; ConstraintError unless it is from 0 to 1."""
+    if not (is_number(hinge, 0.0) and hinge <= 1.0):
+        raise ConstraintError(f"hinge must be a number from 0 to 1; got {shown(hinge)}")
+    return float(hinge)
+
+
 def automatic_locality(n_fixed: int) -> float:
     """Return the locality of a pull if none is given, with *n_fixed* fixed points elsewhere.
 

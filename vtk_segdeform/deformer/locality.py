@@ -263,6 +263,10 @@ class SurfaceSamples:
             found.append(Limb(joint.depth, joint.length, share))
         return tuple(found)
 
+    def within(self, point: SurfacePoint, depth: float) -> BoolArray:
+        """Return the samples of the limb of *point* whose joint has this *depth*, (s,)."""
+        return Levels.of(self._joined, int(self.cells[point.vertex])).within(depth)
+
     def _beyond(self, inside: BoolArray) -> FloatArray:
         """Return the distance of each sample from those *inside*, (s,)."""
         found = csgraph.dijkstra(
@@ -281,9 +285,8 @@ class SurfaceSamples:
         if np.isinf(reach):
             return np.zeros(len(self.points))
         if depth:
-            found = [Levels.of(self._joined, int(self.cells[each.vertex])) for each in points]
-            limbs = np.any([levels.within(depth) for levels in found], axis=0)
-            beyond = self._beyond(limbs) / max(reach, _SHORTEST)
+            limbs = [self.within(each, depth) for each in points]
+            beyond = self._beyond(np.any(limbs, axis=0)) / max(reach, _SHORTEST)
             away = 1.0 + np.maximum(beyond - _FADES, 0.0)
         else:
             away = np.min([self.distances(each) for each in points], axis=0)

@@ -19,6 +19,8 @@ from .arguments import (
     as_lids,
     automatic_locality,
     checked_constraints,
+    checked_hinge,
+    checked_limb,
     checked_locality,
     checked_place,
     checked_point,
@@ -42,6 +44,8 @@ def pull(
     *,
     pins: ArrayLike = (),
     locality: float | None = None,
+    limb: int | None = None,
+    hinge: float = 0.0,
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     volumes: Goals | None = None,
@@ -80,6 +84,12 @@ def pull(
         moves.  With less, more of it follows, above all the ends of limbs; with less than 0.2 also
         the body that the pulled limb is on; with 0 all is free.  By default 0.2 without pins, 0.05
         with one or two, and 0 with more.
+    limb : int, optional
+        The limb that moves, up to its joint, by its number in `Deformer.limbs`: 0 is the smallest
+        one of the point, and beyond the last one is the whole body.  By default the first one that
+        is longer than half the radius.
+    hinge : float
+        0 to 1: where that limb bends, with 0 along its length, with 1 at its joint only.
     n_regions : int or None
         How many regions; None lets `segment` choose.
     n_cage_vertices : int, optional
@@ -115,8 +125,8 @@ def pull(
     Raises
     ------
     ConstraintError
-        If *vertex*, *to*, *radius*, *pins* or *locality* are invalid, or the faces at the grabbed
-        point are so large that no vertex is within the radius.
+        If *vertex*, *to*, *radius*, *pins*, *locality*, *limb* or *hinge* are invalid, or the faces
+        at the grabbed point are so large that no vertex is within the radius.
     Cancelled
         If *progress* raised it.
 
@@ -141,6 +151,7 @@ def pull(
     fixed, handle = checked_constraints(mesh, pins, [point.vertex], "pins")
     target = checked_point(to)[None] - point.at(mesh.vertices) + mesh.vertices[handle]
     radius, locality = checked_radius(mesh, radius), checked_locality(locality)
+    limb, hinge = checked_limb(limb), checked_hinge(hinge)
     if fault := fault_of_grab(mesh, point, radius):
         raise ConstraintError(fault)
     if locality is None:
@@ -156,7 +167,9 @@ def pull(
         stiffness=stiffness, slides=slides, symmetry=symmetry, avoid_contact=avoid_contact,
         progress=next(stages),
     )  # fmt: skip
-    reach, follows, depth = deformer.reach_of_pull(point, radius, locality)
-    deformer = deformer.local(point, reach, SPREAD * radius, follows=follows, depth=depth)
+    reach, follows, depth = deformer.reach_of_pull(point, radius, locality, limb)
+    deformer = deformer.local(
+        point, reach, SPREAD * radius, follows=follows, depth=depth, hinge=hinge
+    )
     solution = deformer.solve(target, progress=next(stages))
     return finished(deformer, solution, refine, progress=next(stages))

@@ -16,6 +16,7 @@ The files, in reading order:
     separating     components that follow others, and those with regions of their own
     finishing      poses finished on the mesh itself
     saved_poses    poses by name: saved, applied and blended
+    pose_copies    a pose of one mesh given to another one
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes

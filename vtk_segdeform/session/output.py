@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import FloatArray
+from ..checks import as_text
 from ..geometry import local_volume_change
 from ..importing import imported
 from ..mesh import Mesh
@@ -19,27 +20,37 @@ if TYPE_CHECKING:
     from ..io import Surface
 
 
-def deformed(mesh: Mesh, surface: Surface | None, vertices: FloatArray) -> pv.PolyData:
-    """Return *surface*, or else *mesh*, with its mesh at *vertices* (n, 3)."""
+def deformed(
+    mesh: Mesh, surface: Surface | None, vertices: FloatArray, displacement: str | None = None
+) -> pv.PolyData:
+    """Return *surface*, or else *mesh*, with its mesh at *vertices* (n, 3).
+
+    *displacement* is the name of a point array to add.
+    """
     if surface is not None:
-        return surface.moved(vertices)
+        return surface.moved(vertices, displacement=displacement)
     imported("vtk_segdeform.io")  # imports pyvista
     from ..io import to_polydata
 
-    return to_polydata(mesh.with_vertices(vertices))
+    moved = to_polydata(mesh.with_vertices(vertices))
+    if displacement is not None:
+        moved.point_data[as_text(displacement, "displacement")] = vertices - mesh.vertices
+    return moved
 
 
 def write_deformed(
-    path: str | Path, mesh: Mesh, surface: Surface | None, vertices: FloatArray
+    path: str | Path,
+    mesh: Mesh,
+    surface: Surface | None,
+    vertices: FloatArray,
+    *,
+    displacement: str | None,
 ) -> None:
     """Write `deformed` to a mesh file, as `write_mesh` does."""
     imported("vtk_segdeform.io")  # imports pyvista
     from ..io import write_mesh
 
-    if surface is not None:
-        surface.write(path, vertices)
-    else:
-        write_mesh(path, mesh.with_vertices(vertices))
+    write_mesh(path, deformed(mesh, surface, vertices, displacement))
 
 
 def layers(

@@ -60,6 +60,8 @@ class Grip(NamedTuple):
     """0 to 1; None is `locality_of`."""
     limb: int | None
     """The number of the limb that is pulled; see `Deformer.reach_of_pull`."""
+    hinge: float
+    """0 to 1: where the limb bends; see `Deformer.local`."""
     turns: bool
     """Whether a patch around the point turns with the motion, which a single vertex cannot."""
 
@@ -144,7 +146,7 @@ def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Gr
 
     ConstraintError if the point is fixed, or no vertex is near it.
     """
-    mesh, (point, radius, locality, limb, turns) = bound.mesh, grip
+    mesh, (point, radius, locality, limb, hinge, turns) = bound.mesh, grip
     if np.isin(point.vertex, state.fixed):
         raise ConstraintError("this point is fixed; grab another one, or erase the fixed vertices")
     if fault := fault_of_grab(mesh, point, radius):
@@ -183,7 +185,7 @@ def grasp(bound: Deformer, state: State, vertices: FloatArray, grip: Grip) -> Gr
     reach, follows, depth = bound.reach_of_pull(point, radius, locality, limb)
     if len(handles[name]) > 1:  # which moves as a whole
         point = SurfacePoint.at_vertex(point.vertex)
-    local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices, depth)
+    local = Locality(point, reach, SPREAD * radius, follows, pose.cage_vertices, depth, hinge)
     after = replace(state, handles=handles, pulls=pulls, pose=pose, locality=local)
     return Grasp(grip, after, name, grip.point.at(vertices), MappingProxyType(carried))
 
@@ -214,7 +216,7 @@ def kept(state: State, vertices: FloatArray) -> State:
     pose, locality = state.pose, state.locality
     if pose is None or locality is None or not locality.reach:
         return state
-    here = replace(locality, reach=0.0, depth=0.0, cage_vertices=pose.cage_vertices)
+    here = replace(locality, reach=0.0, depth=0.0, hinge=0.0, cage_vertices=pose.cage_vertices)
     return replace(released(state, vertices), locality=here)
 
 
@@ -260,9 +262,13 @@ def localised(constrained: Deformer, locality: Locality, x: FloatArray) -> Defor
         other.reset()  # to the shape that has the volumes which are set
     else:
         other.resume(locality.cage_vertices, x[other.handle])
-    follows, depth = locality.follows, locality.depth
     return other.local(
-        locality.point, locality.reach, locality.spread, follows=follows, depth=depth
+        locality.point,
+        locality.reach,
+        locality.spread,
+        follows=locality.follows,
+        depth=locality.depth,
+        hinge=locality.hinge,
     )
 
 

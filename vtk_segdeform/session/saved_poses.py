@@ -13,20 +13,39 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..arrays import FloatArray, frozen, is_number
+from ..arrays import FloatArray, IntArray, frozen, is_number
 from ..checks import shown
-from ..errors import ConstraintError
+from ..errors import ArgumentError, ConstraintError
 from ..geometry import rigid_fit
+from ..mesh import Mesh
 from . import pulls, solving
 from .handles import targets_of
 from .naming import fault_of
+from .pose_copies import copied_pose, require_alike
 from .poses import Poses
-from .state import State
+from .state import State, checked_state
 from .timeline import Timeline
+
+
+class Posed(Protocol):
+    """A session, whose poses are copied."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh at rest."""
+
+    @property
+    def state(self) -> State:
+        """The current state."""
+
+    @property
+    def saved_poses(self) -> SavedPoses:
+        """The saved poses by name."""
 
 
 class SavedPoses(Mapping[str, State]):
@@ -100,6 +119,78 @@ class SavedPoses(Mapping[str, State]):
         self._require(name)
         saved = self._own[name]
         return saved.pose is None or _has_cages(self._history.state, saved)
+
+    def copy(self, other: Posed, *names: str) -> tuple[str, ...]:
+        """Save poses of another session, of a mesh with the same faces, in one undo step.
+
+        Every part turns and stretches as there, from its own shape; the volume is exact.
+
+        Parameters
+        ----------
+        other : Session
+            Its mesh has other positions, such as the scan of another person.
+        *names : str
+            Of its saved poses; by default all, or if there are none, its current pose.
+
+        Returns
+        -------
+        names : tuple of str
+            Under which they are saved here: those that they have there, or "pose 1".
+
+        Raises
+        ------
+        ConstraintError
+            If the faces differ, or there is no such pose.
+        CageError
+            If this session has no cages.
+        """
+        return self.add(self.copied(other, *names))
+
+    def add(self, poses: Mapping[str, State]) -> tuple[str, ...]:
+        """Save what `copied` returns, in one undo step, and return the names."""
+        checked = {_checked(name): checked_state(self._poses.mesh, poses[name]) for name in poses}
+        label = f"copy {next(iter(poses))}" if len(poses) == 1 else f"copy {len(poses)} poses"
+        self._history.commit()
+        self._step(label, {**self._own, **checked})
+        return tuple(poses)
+
+    def copied(self, other: Posed, *names: str) -> dict[str, State]:
+        """Return the poses that `copy` saves, by name, without changing the session.
+
+        Binding may take seconds; this may run in another thread.
+        """
+        theirs = getattr(other, "saved_poses", None)
+        if not isinstance(theirs, SavedPoses):
+            raise ArgumentError(f"other must be a Session; got {shown(other)}")
+        require_alike(self._poses.mesh, other.mesh)
+        for name in names:
+            theirs._require(name)
+        states = {name: theirs[name] for name in names or theirs} or {"pose 1": other.state}
+        mine, after = self._history.state, {}
+        for name, state in states.items():
+            posed = replace(mine.at_rest(), saved=())
+            if state.pose is not None:
+                x, y = other.mesh.vertices, theirs._poses.vertices(state)
+                posed = replace(posed, pose=copied_pose(self._poses, posed, x, y))
+            after[name] = posed
+        return after
+
+    def places(self, name: str, vertices: IntArray) -> FloatArray | None:
+        """Return the places (k, 3) of some *vertices* (k,) in a saved pose, within milliseconds.
+
+        None if they cannot be known so soon: it was saved with other cages, which are not bound.
+        """
+        self._require(name)
+        saved, pose = self._own[name], self._own[name].pose
+        if pose is None:
+            return np.asarray(self._poses.mesh.vertices[vertices])
+        if pose.finished is not None:
+            return np.asarray(pose.finished.vertices[vertices])
+        state = self._history.state
+        if not (_has_cages(state, saved) and self._poses.is_bound(state)):
+            return None
+        rows = self._poses.bind(state).subspace.at(vertices)
+        return np.asarray(rows @ np.concatenate(pose.cage_vertices))
 
     def blend(
         self, first: str | None, second: str | None, share: float, *, max_steps: int | None = None

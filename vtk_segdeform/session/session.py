@@ -44,6 +44,7 @@ from ..deformer import (
     Deformer,
     Slide,
     checked_constraints,
+    checked_hinge,
     checked_limb,
     checked_locality,
     checked_place,
@@ -208,9 +209,13 @@ class Session(Described):
         """
         return output.deformed(self.mesh, self.surface, self.vertices)
 
-    def write_deformed(self, path: str | Path) -> None:
-        """Write `deformed` to a mesh file, as `write_mesh` does."""
-        output.write_deformed(path, self.mesh, self.surface, self.vertices)
+    def write_deformed(self, path: str | Path, *, displacement: str | None = None) -> None:
+        """Write `deformed` to a mesh file, as `write_mesh` does.
+
+        *displacement* is the name of a point array to add: how far each point has moved, (p, 3).
+        """
+        parts = self.mesh, self.surface, self.vertices
+        output.write_deformed(path, *parts, displacement=displacement)
 
     def layers(self) -> dict[str, pv.PolyData]:
         """Return the surface and its cages in the current pose; see `output.layers`."""
@@ -496,6 +501,7 @@ class Session(Described):
         radius: float | None = None,
         locality: float | None = None,
         limb: int | None = None,
+        hinge: float = 0.0,
         max_steps: int | None = None,
     ) -> Solution:
         """Pull one point of the surface, as part of a drag like `drag`; see `pulling`.
@@ -520,6 +526,8 @@ class Session(Described):
             The limb that moves, up to its joint, by its number in `Deformer.limbs`: 0 is the
             smallest one of the point, and beyond the last one is the whole body.  By default the
             first one that is longer than half the radius.
+        hinge : float
+            0 to 1: where that limb bends, with 0 along its length, with 1 at its joint only.
         max_steps : int, optional
             As in `drag`.
 
@@ -531,23 +539,24 @@ class Session(Described):
 
         Notes
         -----
-        Calls with the same point, radius, locality and limb belong to one pull until `commit`.  It
-        leaves a handle at the vertex nearest to it.  When the first map follows points, the surface
-        around the point keeps its current shape; see `turned`.
+        Calls with the same point and options belong to one pull until `commit`.  It leaves a handle
+        at the vertex nearest to it.  When the first map follows points, the surface around the
+        point keeps its current shape; see `turned`.
         """
         point = checked_place(self.mesh, vertex)
         radius = checked_radius(self.mesh, radius)
         locality, limb = checked_locality(locality), checked_limb(limb)
+        hinge = checked_hinge(hinge)
         motion = pulls.checked_motion(self.mesh, to)
         turns = motion.shape == (4, 4)
         before = self._grasp
-        if before is None or before.grip[:4] != (point, radius, locality, limb):
+        if before is None or before.grip[:5] != (point, radius, locality, limb, hinge):
             self.commit()
             before = None
         start = self.state if self.history.drag is None else self.history.drag.start
         grasp = before
         if grasp is None or (turns and not grasp.grip.turns):
-            grip = pulls.Grip(point, radius, locality, limb, turns)
+            grip = pulls.Grip(point, radius, locality, limb, hinge, turns)
             grasp = pulls.grasp(self.poses.bind(start), start, self.poses.vertices(start), grip)
             if before is not None:  # the handle becomes a patch, of the shape that it has now
                 grasp = pulls.as_it_is(grasp, self.turned(), self.vertices)

@@ -27,6 +27,7 @@ from ..deformer import (
     Stiffness,
     checked_constraints,
     checked_goals,
+    checked_hinge,
     checked_place,
     checked_slides,
 )
@@ -210,6 +211,8 @@ class Locality(Frozen):
     """At the press; the rest stays in this pose."""
     depth: float = 0.0
     """Of the joint of the pulled limb, in the mesh's unit; 0 without one."""
+    hinge: float = 0.0
+    """0 to 1: where this limb bends."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -516,6 +519,7 @@ def _checked_locality(mesh: Mesh, cages: Sequence[Cage], locality: Locality) -> 
         raise ConstraintError(f"follows must be from 0 to 1; got {shown(locality.follows)}")
     if not is_number(locality.depth, 0.0):
         raise ConstraintError(f"depth must be 0 or positive; got {shown(locality.depth)}")
+    checked_hinge(locality.hinge)
     return replace(locality, point=point, cage_vertices=start.cage_vertices)
 
 

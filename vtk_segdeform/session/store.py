@@ -220,6 +220,8 @@ def _write(
         header["locality"] = [point.vertex, reach, last.spread, last.follows]
         if last.depth:
             header["pulled_limb"] = last.depth
+        if last.hinge:
+            header["hinge"] = last.hinge
         if not point.is_vertex:
             header["pulled_point"] = [point.corners, point.shares]
         arrays["locality"] = np.concatenate(state.locality.cage_vertices)
@@ -313,7 +315,8 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
             corners, shares = field(header, "pulled_point", shape)
             point = SurfacePoint(tuple(corners), tuple(shares))
         depth = field(header, "pulled_limb", number) if "pulled_limb" in header else 0.0
-        locality = Locality(point, reach, spread, follows, tuple(kept), depth)
+        hinge = field(header, "hinge", number) if "hinge" in header else 0.0
+        locality = Locality(point, reach, spread, follows, tuple(kept), depth, hinge)
     handles, more = dict(zip(sizes, ids, strict=True)), dict[str, Any]()
     if "pivots" in header:
         pivots = field(header, "pivots", map_of(row_of(number, number, number)))

@@ -10,6 +10,7 @@ from qtpy import QtCore, QtGui, QtWidgets
 
 from vtk_segdeform.version import __version__
 
+from ..panel import press
 from ..qt import add_entry, add_view_entries, name_keys
 from . import saving
 from .dialogs import show_about
@@ -63,6 +64,14 @@ class Menus:
             ("Export &picture ...", saving.export_picture, None),
         ):
             self._need_mesh.append(self._add(menu, text, _calling(save, window), keys))
+        self._displacement = self._add(
+            menu, "Meshes with &displacement", lambda: press(window.editor, "save.displacement")
+        )
+        self._displacement.setCheckable(True)
+        self._need_mesh.append(self._displacement)
+        menu.aboutToShow.connect(self._update_displacement)
+        copy = self._add(menu, "&Copy poses of a session ...", window.copy_poses)
+        self._need_mesh.append(copy)
         menu.addSeparator()
         self._add(menu, "&Quit", window.close, _Keys.Quit).setMenuRole(_role("QuitRole"))
 
@@ -104,6 +113,11 @@ class Menus:
         clear = add_entry(menu, "&Clear list")
         clear.setEnabled(bool(window.recent.paths))
         clear.triggered.connect(lambda: window.clear_recent())
+
+    def _update_displacement(self) -> None:
+        window = self._window
+        is_wanted = window.has_mesh and window.editor.controller.displacement is not None
+        self._displacement.setChecked(is_wanted)
 
     def _update_steps(self) -> None:
         window = self._window

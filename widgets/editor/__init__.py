@@ -24,7 +24,7 @@ The files, in reading order:
 """
 
 from . import actions
-from .actions import Action, exporting, opening, saving
+from .actions import Action, copying_poses, exporting, opening, saving
 from .autosave import About, Autosaves, Slot
 from .autosaver import INTERVAL, Autosaver
 from .bindings import PRESETS, KeyChoice, keys_of
@@ -69,6 +69,7 @@ __all__ = [
     "Task",
     "WrittenMesh",
     "actions",
+    "copying_poses",
     "error_text",
     "exporting",
     "file_types",

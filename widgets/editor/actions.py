@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
@@ -27,6 +29,7 @@ from vtk_segdeform.session import (
     State,
     blend_label,
     finishing,
+    load_session,
     preparing,
     separating,
     solving,
@@ -161,13 +164,18 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         if session.is_dragging:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
-        written = write_posed(session, path)
+        written = write_posed(session, path, displacement=controller.displacement)
         saved = f"Mesh saved to {path}{pose_remark(session)}"
         controller.say(". ".join([saved, *written.remarks]))
         controller.read_again(written)
         then()
 
     return once_settled(export)
+
+
+def saving_displacement(name: str | None) -> Action:
+    """Return the action that adds the displacement to saved meshes, as an array *name*, or not."""
+    return assigning(lambda controller: controller, "displacement", name)
 
 
 def open_file(controller: Controller) -> None:
@@ -359,6 +367,13 @@ def changing_limb(steps: int) -> Action:
     return lambda controller: controller.say(controller.widgets.puller.change_limb(steps))
 
 
+def next_hinge(controller: Controller) -> None:
+    """Let limbs bend along their length, half at their joint, or at their joint only."""
+    puller = controller.widgets.puller
+    puller.hinge = 0.0 if puller.hinge == 1.0 else 0.5 if puller.hinge < 0.5 else 1.0
+    controller.say(f"Hinge: {100.0 * puller.hinge:.0f} %")
+
+
 def auto_locality(controller: Controller) -> None:
     """Let pins decide how local a pull is, and the radius which limb it moves."""
     controller.widgets.puller.locality = controller.widgets.puller.limb = None
@@ -501,6 +516,47 @@ def pinning(vertex: int) -> Action:
     return pin
 
 
+def next_up_axis(controller: Controller) -> None:
+    """Show the model upright about the next axis."""
+    turning_up((int(controller.camera.viewpoint.up.argmax()) + 1) % 3)(controller)
+
+
+def turning_up(axis: int) -> Action:
+    """Return the action that makes an axis the up axis, and shows the model upright."""
+
+    def turn_up(controller: Controller) -> None:
+        controller.camera.viewpoint.up = np.eye(3)[axis]
+        controller.camera.viewpoint.look_from("home")
+        controller.say(f"Up: {'XYZ'[axis]}. {controller.keys.cap('next_up_axis')}: next axis")
+
+    return turn_up
+
+
+def isolating(spot: Spot) -> Action:
+    """Return the action that hides all but the part at *spot*, or shows everything again."""
+
+    def isolate(controller: Controller) -> None:
+        widgets, session = controller.widgets, controller.session
+        if widgets.surface.only is not None:
+            widgets.surface.only = None
+            controller.say("Everything is shown")
+            return
+        widgets.surface.only = widgets.mask_of(spot)
+        name = "this part" if spot.region is None else session.painting.name(spot.region)
+        controller.say(f"Only {name} is shown. {controller.keys.cap('isolate')}: show everything")
+
+    return isolate
+
+
+def isolate(controller: Controller) -> None:
+    """Hide all but the part under the pointer, or show everything again."""
+    widgets = controller.widgets
+    spot = widgets.spot_at(controller.view.pointer(Phase.HOVER))
+    if spot is None and widgets.surface.only is None:
+        raise ConstraintError("Point at the part to isolate")
+    isolating(spot or Spot(0, None, None))(controller)
+
+
 def framing(spot: Spot) -> Action:
     """Return the action that frames the part at *spot*."""
     return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
@@ -513,6 +569,26 @@ def save_pose(controller: Controller) -> None:
     """Save the current pose by a new name."""
     name = controller.session.saved_poses.save()
     controller.say(f"Saved {name}. F2 renames it in the list")
+
+
+def copying_poses(path: Path) -> Action:
+    """Return the action that saves the poses of a session file here, as poses of this mesh."""
+
+    def copy(controller: Controller) -> None:
+        session, before = controller.session, controller.session.state
+
+        def work(_: Progress) -> dict[str, State]:
+            return session.saved_poses.copied(load_session(path))
+
+        def show(after: dict[str, State]) -> str:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while poses were being copied. Try again")
+            names = session.saved_poses.add(after)
+            return f"Copied {_count(len(names), 'pose')}. Select one in the list of poses"
+
+        controller.start(f"Copying poses of {path.name}", work, show)
+
+    return copy
 
 
 def going_to(name: str) -> Action:

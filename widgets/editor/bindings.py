@@ -82,8 +82,9 @@ BINDINGS = (
     Binding("more_local", ("plus", "equal"), P, "More local", actions.changing_locality(0.1)),
     Binding("less_local", ("minus",), P, "Less local", actions.changing_locality(-0.1)),
     Binding("auto_locality", ("a",), P, "Automatic locality", actions.auto_locality),
+    Binding("hinge", ("b",), P, "Bend limbs at the joint: 0, 50, 100 %", actions.next_hinge),
     Binding("remove_pins", ("u",), P, "Remove all points", actions.unpin_all),
-    Binding("", ("r",), P, "While pulling: turn the limb, turn in the view, move", None),
+    Binding("", ("r",), DRAGGING, "While dragging: turn the limb, turn in the view, move", None),
     Binding("select_through", ("v",), PAINTING, "Select through (X-ray)", actions.toggle_through),
     Binding(
         "grow", ("plus", "equal"), PAINTING, "Grow by one ring", lambda c: c.widgets.selector.grow()
@@ -125,6 +126,7 @@ BINDINGS = (
     # How the mesh is shown.
     Binding("style", ("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding("show_regions", ("shift+g",), ALL, "Show regions", actions.toggle_regions),
+    Binding("isolate", ("slash",), ALL, "Isolate part, or show everything", actions.isolate),
     Binding("before_after", ("backslash",), ALL, "Hold: show the mesh at rest", actions.show_rest),
     *(
         Binding(name, (key,), ALL, label, action, while_busy=True, heading=VIEW)
@@ -141,6 +143,7 @@ BINDINGS = (
                     ("home", "kp_0", "Three-quarter view"),
                 )
             ),
+            ("next_up_axis", "shift+u", "Next up axis", actions.next_up_axis),
             ("projection", "kp_5", "Orthographic or perspective", actions.toggle_projection),
             ("frame_selection", "period", "Frame selection", actions.frame_selection),
             ("frame_all", "comma", "Frame all", actions.frame_all),

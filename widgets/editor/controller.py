@@ -74,6 +74,8 @@ class Controller:
         What the last right click was on; None beside the mesh.
     messages : Messages
         The status line.
+    displacement : str or None
+        The name of a point array that saved meshes get: how far each point has moved.
     notices : Notices
         How the mesh differs from what was given, and where; above the status line.
     camera : Camera
@@ -94,6 +96,7 @@ class Controller:
         self.messages = Messages(view)
         self.messages.note(advice() or (_FIRST_RUN if is_compiling() else ""))
         self.notices = Notices(view, lambda: self.messages.height)
+        self.displacement: str | None = None
         self._mode = Mode.PULL
         self._is_on = self._was_busy = False
         self._interrupted = False, False  # by turning off: settling, and finishing
@@ -309,7 +312,9 @@ class Controller:
             widget.AddObserver("StartInteractionEvent", self._gesture_began)
             widget.AddObserver("InteractionEvent", self._gesture_moved)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
-        self.widgets.puller.AddObserver("ModifiedEvent", lambda *_: self.refresh())
+        self.widgets.puller.says = self.say
+        for widget in (self.widgets.puller, self.widgets.dragger):
+            widget.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:
         if widget.remark:

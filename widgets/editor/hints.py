@@ -139,8 +139,8 @@ def _volume_off(keys: Keys) -> str:
 
 def _deform_hint(widgets: WidgetSet, keys: Keys) -> str:
     session = widgets.session
-    if session.is_dragging:
-        return _drag_hint(widgets)
+    if session.is_dragging or widgets.dragger.turning:
+        return _drag_hint(widgets, f"{_TURNING[widgets.dragger.turning]}. ")
     stuck = _out_of_reach(widgets)
     if stuck:
         return stuck

@@ -144,10 +144,10 @@ def pose_remark(session: Session) -> str:
     return ". The pose had not settled" if session.is_unsettled else ""
 
 
-def write_posed(session: Session, path: Path) -> WrittenMesh:
-    """Write the surface of *session* in its pose."""
+def write_posed(session: Session, path: Path, *, displacement: str | None = None) -> WrittenMesh:
+    """Write the surface of *session* in its pose; see `Session.write_deformed`."""
     with _warnings() as warnings:
-        session.write_deformed(path)
+        session.write_deformed(path, displacement=displacement)
     remarks = tuple(map(_shortened, warnings))
     lids = session.options.lids
     return WrittenMesh(session.mesh, session.surface, session.vertices, path, lids, remarks)

@@ -12,7 +12,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import NamedTuple
 
-from vtk_segdeform.arrays import FloatArray
+import numpy as np
+
+from vtk_segdeform.arrays import BoolArray, FloatArray
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.progress import Progress, part
 from vtk_segdeform.session import Options, Session, pulls
@@ -80,11 +82,7 @@ class WidgetSet:
         self.puller.binds = False  # the editor does, in the background
         self.puller.is_locked = lambda name: name in self.dragger.locked
         self.puller.is_hidden = lambda name: name in self.dragger.hidden
-        self.dragger.pulls_with = lambda: {
-            "radius": self.puller.radius,
-            "locality": self.puller.locality,
-            "limb": self.puller.limb,
-        }
+        self.dragger.pulls_with = lambda: self.puller.options
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
@@ -203,6 +201,7 @@ class WidgetSet:
         mine.radius = size * its.radius
         self.puller.radius = size * before.puller.radius
         self.puller.locality, self.puller.limb = before.puller.locality, before.puller.limb
+        self.puller.hinge = before.puller.hinge
         self.dragger.local = before.dragger.local
         self.overlay.wanted_range = before.overlay.wanted_range
         self.surface.style = before.surface.style
@@ -240,10 +239,14 @@ class WidgetSet:
 
     def part_of(self, spot: Spot) -> FloatArray:
         """Return the vertices (k, 3) of the region of *spot*, or else of the connected part."""
-        session = self.session
-        if session.regions is None or spot.region is None:
-            return session.vertices[self._picker.component(spot.vertex)]
-        return session.vertices[session.regions.members(spot.region)]
+        return self.session.vertices[self.mask_of(spot)]
+
+    def mask_of(self, spot: Spot) -> BoolArray:
+        """Return the same vertices as a mask, (n,)."""
+        regions = self.session.regions
+        if regions is None or spot.region is None:
+            return self._picker.component(spot.vertex)
+        return np.asarray(regions.membership[spot.region])
 
     def bind(self, progress: Progress) -> None:
         """Precompute the data of the first drag; in any thread, while all widgets are off."""

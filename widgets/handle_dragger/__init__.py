@@ -14,16 +14,18 @@ The files, in reading order:
 """
 
 from .gizmo import AXIS_COLOURS, Gizmo
-from .gizmo_shapes import FREE, Kind, Part
+from .gizmo_shapes import FREE, LIMB, TURN, Kind, Part
 from .handle_dragger import HandleDragger
-from .handle_motion import Grip, Motion, next_constraint, step_of
+from .handle_motion import Grip, Motion, axes_along, next_constraint, step_of
 from .live_solve import STEPS, LiveSolve
 from .number_entry import NumberEntry
 
 __all__ = [
     "AXIS_COLOURS",
     "FREE",
+    "LIMB",
     "STEPS",
+    "TURN",
     "Gizmo",
     "Grip",
     "HandleDragger",
@@ -32,6 +34,7 @@ __all__ = [
     "Motion",
     "NumberEntry",
     "Part",
+    "axes_along",
     "next_constraint",
     "step_of",
 ]

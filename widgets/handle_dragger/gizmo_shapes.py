@@ -32,12 +32,16 @@ class Part(NamedTuple):
 
 
 FREE = Part(Kind.FREE)
+TURN = Part(Kind.ROTATION)
+"""About the line of sight."""
+LIMB = Part(Kind.ROTATION, 2)
+"""About the axis of a limb, with `axes_along` it."""
 PARTS = (
     FREE,
     *(Part(Kind.AXIS, axis) for axis in range(3)),
     *(Part(Kind.PLANE, axis) for axis in range(3)),
     *(Part(Kind.ROTATION, axis) for axis in range(3)),
-    Part(Kind.ROTATION),
+    TURN,
 )
 
 BALL = 0.09  # radius

@@ -7,6 +7,8 @@ plane.  A pin or pulled point is moved by a pull, so that the pose around it is 
 
     x, y, z     while moving: constrain to the axis; again: to the plane perpendicular to it;
                 again: no constraint.  While rotating: about the axis; again: no constraint
+    r           turn the limb about its axis, or without one about the line of sight; again: that;
+                again: as before
     control     move in steps of about 1 % of the diagonal, rotate in steps of 5 degrees
     shift       move slowly; with control in finer steps
     a number, enter             move by exactly that much; see `number_entry`
@@ -42,9 +44,9 @@ from vtk_segdeform.solver import Solution
 from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget
 from .gizmo import Gizmo
-from .gizmo_shapes import FREE, Kind, Part
+from .gizmo_shapes import FREE, LIMB, TURN, Kind, Part
 from .handle_marks import HandleMarks
-from .handle_motion import Grip, Motion, next_constraint, step_of
+from .handle_motion import Grip, Motion, axes_along, next_constraint, step_of
 from .live_solve import LiveSolve
 from .number_entry import NumberEntry
 
@@ -87,7 +89,12 @@ class HandleDragger(Widget):
         self._locked: frozenset[str] = frozenset()
         self._grabbed: Part | None = None  # the part of the running gesture
         self._constraint: Part | None = None  # set by keys during the gesture
-        self._motion: Motion | None = None  # of the running gesture
+        self._motion: Motion | None = None  # of the running gesture, since the press or an R
+        self._moved = self._base = np.eye(4)  # by the gesture so far, and before the motion
+        self._pressed = FREE  # the part at the press
+        self._limb: Grip | None = None  # of the limb, while that is turned
+        self._grip: Grip
+        self._since: Pointer
         self._entry = NumberEntry()  # of the running gesture
         self._live = LiveSolve(self.view, session, self.cancel)
         self._last_handles = session.handles  # to recognise a renamed handle
@@ -219,12 +226,62 @@ class HandleDragger(Widget):
         axis = "xyz".find(key.lower()) if len(key) == 1 else -1
         if axis >= 0:
             self._constraint = next_constraint(self._grabbed, self._constraint, axis)
+            is_same = self._motion is not None and self._motion.part == self._part
+            if self._limb is not None or not is_same:
+                self._motion = None
+        elif key.lower() == "r":
+            self._toggle_turning(pointer)
         elif self._entry.is_enter(key):
             return self._live.is_refused or self.finish()
         elif not self._entry.type(key):
             return False
         self._send(Phase.MOVE, "InteractionEvent")
+        self._invoke("ModifiedEvent")  # the hint names what it turns about
         return True
+
+    @property
+    def turning(self) -> str:
+        """What the running drag turns about since an R: "limb", "view" or an axis; "" if not."""
+        motion = self._motion
+        if motion is None or motion.part.kind is not Kind.ROTATION:
+            return ""
+        if self._turned_limb is not None:
+            return "limb"
+        if self._grabbed == self._pressed:
+            return ""
+        return "view" if motion.part.axis is None else "xyz"[motion.part.axis]
+
+    def _toggle_turning(self, pointer: Pointer) -> None:
+        """Turn the limb, then about the line of sight, then go on as at the press.
+
+        The motion so far stays.
+        """
+        self._base, self._constraint, self._entry = self._moved, None, NumberEntry()
+        if self._limb is not None:
+            self._grabbed, self._limb = TURN, None
+        elif self._grabbed != self._pressed:
+            self._grabbed = self._pressed
+        else:
+            self._limb = self._limb_grip()
+            self._grabbed = TURN if self._limb is None else LIMB
+        self._motion, self._since = None, pointer
+        self._grip = replace(self._own_grip(), has_arm=False)
+
+    def _own_grip(self) -> Grip:
+        """Return the grip of the active handle at its pivot."""
+        pivot = self.session.handles.pivot(str(self._handle))
+        step = step_of(self.session.mesh.diagonal)
+        return Grip(pivot, pivot, self._axes, self.gizmo.radius, step)
+
+    def _limb_grip(self) -> Grip | None:
+        """Return the grip by which the limb of the active handle turns; None without one."""
+        session, number = self.session, self.pulls_with().get("limb") or 0
+        vertex = pulls.middle_vertex(session.mesh, session.handles[str(self._handle)])
+        limbs = [limb for limb in session.deformer.limbs(vertex) if not limb.is_whole]
+        if not limbs:
+            return None
+        joint, axis = limbs[min(number, len(limbs) - 1)].axis(session.mesh, session.vertices)
+        return replace(self._own_grip(), centre=joint, axes=axes_along(axis), has_arm=False)
 
     def _drag(self, part: Part, point: FloatArray | None, press: Pointer) -> Gesture:
         """Move the active handle by *part* of the gizmo, or by a *point* of its surface."""
@@ -233,12 +290,12 @@ class HandleDragger(Widget):
         self._live.pause()
         assert gizmo.centre is not None  # the press was on the gizmo or on a visible handle
         tolerance = 0.0 if point is None else _CLICK_TOLERANCE
-        point = gizmo.centre if point is None else point
-        step = step_of(session.mesh.diagonal)
-        grip = Grip(point, gizmo.centre, gizmo.axes, gizmo.radius, step)
-        motion = self._motion = self._motion_of(part, grip, press)
-        self._grabbed, self._constraint = part, None
-        entry = self._entry = NumberEntry()
+        grip = self._own_grip()
+        self._grip, self._since = (grip if point is None else replace(grip, point=point)), press
+        self._grabbed = self._pressed = part
+        self._constraint, self._limb, self._entry = None, None, NumberEntry()
+        self._moved = self._base = base = np.eye(4)
+        motion = self._motion = self._begun_motion()
         move = self._mover(name)
         has_moved = committed = False
         sent = reached = 0.0  # angles of a rotation: of the last targets, and of the pose
@@ -247,31 +304,37 @@ class HandleDragger(Widget):
                 if name not in session.handles or (has_moved and not session.is_dragging):
                     return  # a commit, undo or redo from elsewhere has ended the drag
                 reached = sent if self._live.has_reached() else reached
-                if motion.part != (self._constraint or part):
-                    motion.exact(0.0)  # back through the same stops
-                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
-                    sent = reached = 0.0
-                    motion = self._motion_of(self._constraint or part, grip, press)
-                    self._motion = motion
+                if self._motion is not motion:  # a key has ended it
+                    if base is self._base:
+                        motion.exact(0.0)  # back through the same stops
+                        stops = [move(stop @ base) for stop in motion.stops(reached)]
+                        self._live.solve_through(stops)
+                    base, sent, reached = self._base, 0.0, 0.0
+                    motion = self._motion = self._begun_motion()
+                entry = self._entry
                 matrix = entry.matrix(motion) if entry.text else motion.matrix(pointer)
                 distance = float(np.linalg.norm(pointer.position - press.position))
                 is_far = distance > tolerance or bool(entry.text)
                 if matrix is not None and (has_moved or (is_far and (matrix != np.eye(4)).any())):
-                    self._live.solve_through([move(stop) for stop in motion.stops(reached)])
-                    self._live.solve(move(matrix))
+                    stops = [move(stop @ base) for stop in motion.stops(reached)]
+                    self._live.solve_through(stops)
+                    self._moved = matrix @ base
+                    self._live.solve(move(self._moved))
                     sent = motion.turn
                     has_moved = has_moved or session.is_dragging  # not if it was refused
                 if has_moved or entry.text:
                     gizmo.set_caption(entry.caption(motion))
             if pointer.phase is Phase.RELEASE:
-                session.commit(f"{'rotate' if part.kind is Kind.ROTATION else 'drag'} {name}")
+                is_turn = self._part.kind is Kind.ROTATION
+                session.commit(f"{'rotate' if is_turn else 'drag'} {name}")
                 committed = True
         finally:
-            self._grabbed = self._motion = None
+            self._grabbed = self._motion = self._limb = None
             gizmo.set_caption("")
             gizmo.show_only(None)
             if not committed:  # last, as listeners of the session may raise
                 session.revert()
+            self._update_gizmo()
             self._live.resume()
 
     @property
@@ -290,7 +353,7 @@ class HandleDragger(Widget):
     def angles(self) -> FloatArray:
         """(3,) float: by how many degrees the running drag has turned about x, y and z."""
         motion, angles = self._motion, np.zeros(3)
-        if motion is not None and motion.part.axis is not None:
+        if motion is not None and motion.part.axis is not None and self.turning != "limb":
             angles[motion.part.axis] = np.degrees(motion.turn)
         return angles
 
@@ -390,12 +453,25 @@ class HandleDragger(Widget):
         session.handles.set_pivot(name, None)
         return True
 
-    def _motion_of(self, part: Part, grip: Grip, press: Pointer) -> Motion:
-        """Return the motion by *part* since the press, and show only that part."""
+    def _begun_motion(self) -> Motion:
+        """Return the motion from here by the constraint or the part, and show only that part."""
+        part = self._part
         self._marks.highlight(None)
         self.gizmo.highlight(part)
         self.gizmo.show_only(part)
-        return Motion(self.view, part, grip, press)
+        self._update_gizmo()
+        return Motion(self.view, part, self._turned_limb or self._grip, self._since)
+
+    @property
+    def _part(self) -> Part:
+        """The part by which the running gesture moves."""
+        part = self._constraint or self._grabbed
+        assert part is not None
+        return part
+
+    @property
+    def _turned_limb(self) -> Grip | None:
+        return self._limb if self._constraint is None else None
 
     def _handle_at(self, pointer: Pointer) -> tuple[str, FloatArray] | None:
         """Return the visible handle at *pointer* and the point of its surface there."""
@@ -450,7 +526,11 @@ class HandleDragger(Widget):
         if name is None or not is_shown or self._is_out_of_reach(name):
             self.gizmo.place(None)
             return
-        self.gizmo.place(session.handles.pivot(name), self._axes)
+        limb = self._turned_limb
+        if limb is None:
+            self.gizmo.place(session.handles.pivot(name), self._axes)
+        else:
+            self.gizmo.place(limb.centre, limb.axes)
 
     @property
     def _axes(self) -> FloatArray:

@@ -52,6 +52,13 @@ def next_constraint(grabbed: Part, constraint: Part | None, axis: int) -> Part |
     return choices[following] if following < len(choices) else None
 
 
+def axes_along(z: FloatArray) -> FloatArray:
+    """Return axes (3, 3) as rows, of which the last is *z*, (3,) of length 1."""
+    x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z])
+
+
 def step_of(diagonal: float) -> float:
     """Return the step of translations with Control: 1 % of *diagonal*, rounded to 1, 2 or 5.
 

@@ -17,6 +17,7 @@ The files, in reading order:
                 the sections
     toolbar     the toolbar and the menu about the view
     menu        the menu of the right button
+    thumbnails  small pictures of saved poses
     status      the status and the history
 """
 

@@ -102,6 +102,8 @@ class Row:
     """One for each column of the table."""
     selected: bool = False
     renamable: bool = False
+    picture: str = ""
+    """A data URL of a picture to show instead of the colour."""
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,15 @@ def menu(editor: DeformEditor) -> tuple[Field | None, ...]:
         ),
         None,
         Field(
+            "menu.isolate",
+            "toggle",
+            f"Isolate {name}",
+            "Hides everything else, until it is chosen again",
+            "isolate",
+            value=widgets.surface.only is not None,
+            act=lambda _: actions.isolating(spot),
+        ),
+        Field(
             "menu.frame",
             "button",
             f"Frame {name}",

@@ -9,6 +9,7 @@ from vtk_segdeform.session import blend_label
 
 from ..editor import Action, Controller, DeformEditor, actions
 from .fields import Field, Row, Section, Table, as_rgb
+from .thumbnails import thumbnail
 
 _REST = "rest"  # the choice of the rest pose; of others "pose:NAME"
 _LIVE = 20_000  # vertices up to which the mesh follows the slider; of more, when it is released
@@ -32,6 +33,7 @@ def poses_section(editor: DeformEditor) -> Section:
             as_rgb(rgb(BODY)),
             selected=(None if each.pose is None else each.pose.cage_vertices) is shown,
             renamable=True,
+            picture=thumbnail(editor, name),
         )
         for name, each in saved.items()
     )

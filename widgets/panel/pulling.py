@@ -55,6 +55,18 @@ def pull_section(editor: DeformEditor) -> Section:
                 unit="%",
                 act=lambda share: _with_locality(0.01 * share),
             ),
+            Field(
+                "pull.hinge",
+                "slider",
+                "Hinge",
+                "Where the pulled limb bends: along its length at the left, at its joint only at "
+                "the right",
+                "hinge",
+                value=round(100.0 * puller.hinge),
+                maximum=100.0,
+                unit="%",
+                act=lambda share: actions.assigning(_puller, "hinge", 0.01 * share),
+            ),
             volume_label(editor, "pull.volume"),
             (
                 Field(

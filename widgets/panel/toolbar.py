@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from ..editor import Controller, DeformEditor, Mode, actions, keys_of
 from .fields import Act, Field, key_button
 
@@ -18,6 +16,11 @@ _SHOWN: tuple[tuple[str, _Test, _Test | None], ...] = (
     ("show_regions", lambda e: e.session.regions is not None, lambda e: e.widgets.regions_wanted),
     ("show_cages", lambda e: bool(e.session.cages), lambda e: e.widgets.cages.is_shown),
     ("show_volume_change", lambda _: True, lambda e: e.widgets.overlay_wanted),
+    (
+        "isolate",
+        lambda e: e.widgets.surface.only is not None,
+        lambda e: e.widgets.surface.only is not None,
+    ),
     ("show_holes", lambda e: bool(e.controller.notices.text), None),
 )
 _VIEWS = ("front", "back", "right", "left", "top", "bottom")
@@ -39,6 +42,14 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
                 Field("save.session", "file", "Save session"),
                 Field("save.session_as", "file", "Save session as ..."),
                 Field("save.mesh_as", "file", "Save mesh as ..."),
+                Field(
+                    "save.displacement",
+                    "toggle",
+                    "Meshes with displacement",
+                    "Saved meshes get a point array, displacement: how far each point has moved",
+                    value=controller.displacement is not None,
+                    act=lambda on: actions.saving_displacement("displacement" if on else None),
+                ),
             ),
         ),
         _step("undo", controller.history.undo_label, is_free=is_free),
@@ -93,8 +104,8 @@ def view_entries(editor: DeformEditor | None) -> tuple[Field | None, ...]:
     views.append(_camera(editor, "home", "Three-quarter", "view_home"))
     views.append(_camera(editor, "iso", "Isometric", act=lambda _: actions.looking_from("iso")))
     ups = [
-        _camera(editor, f"up_{name.lower()}", name, act=_upright(axis), shows=_is_up(axis))
-        for axis, name in enumerate("XYZ")
+        _camera(editor, f"up_{name}", f"Up: {name.upper()}", act=_upright(axis), shows=_is_up(axis))
+        for axis, name in enumerate("xyz")
     ]
     return (
         *(_shown(editor, *each) for each in _SHOWN),
@@ -102,7 +113,9 @@ def view_entries(editor: DeformEditor | None) -> tuple[Field | None, ...]:
         _camera(editor, "frame_all", "Fit to view", "frame_all"),
         _camera(editor, "frame_selection", "Fit selection", "frame_selection"),
         replace(_camera(editor, "viewpoint", "Viewpoint"), kind="menu", items=tuple(views)),
-        replace(_camera(editor, "up", "Up axis"), kind="menu", items=tuple(ups)),
+        None,
+        *ups,
+        None,
         _camera(
             editor,
             "orthographic",
@@ -158,14 +171,7 @@ def _camera(
 
 
 def _upright(axis: int) -> Act:
-    """Return what makes an axis the up axis, and shows the model upright."""
-
-    def turn_up(controller: Controller) -> None:
-        controller.camera.viewpoint.up = np.eye(3)[axis]
-        controller.camera.viewpoint.look_from("home")
-        controller.say(f"Up: {'XYZ'[axis]}")
-
-    return lambda _: turn_up
+    return lambda _: actions.turning_up(axis)
 
 
 def _toggle_cube(controller: Controller) -> None:

@@ -45,6 +45,7 @@ class _Visibility:
     display: FloatArray  # (n, 3) display coordinates of the vertices
     is_tested: BoolArray  # (n,) the vertices tested so far
     is_visible: BoolArray  # (n,) the visible vertices among them
+    only: BoolArray | None  # (n,) the vertices that are shown at all
 
 
 class Picker:
@@ -67,9 +68,11 @@ class Picker:
         if not (np.isfinite(near).all() and np.isfinite(far).all()):
             return []
         tolerance = _INTERSECTION_TOLERANCE * self._mesh.diagonal
+        ids = self._surface.shown_faces
         places, met = intersections(
-            self._surface.points, self._mesh.faces, near, far, tolerance=tolerance
+            self._surface.points, self._faces, near, far, tolerance=tolerance
         )
+        met = met if ids is None else ids[met]
         return [self._hit(place, int(face)) for place, face in zip(places, met, strict=True)]
 
     def hit(self, pointer: Pointer) -> Hit | None:
@@ -78,8 +81,7 @@ class Picker:
 
     def sees(self, point: FloatArray, *, within: float) -> bool:
         """Return whether the surface does not hide *point* (3,); see `is_seen`."""
-        faces = self._mesh.faces
-        return is_seen(self._view, point, self._surface.points, faces, within=within)
+        return is_seen(self._view, point, self._surface.points, self._faces, within=within)
 
     def distances(self, hits: Sequence[Hit], radius: float) -> FloatArray:
         """Return the distance along the surface of each vertex to the nearest of *hits*.
@@ -129,9 +131,17 @@ class Picker:
         cache = self._current_visibility()
         untested = ~cache.is_tested if among is None else among & ~cache.is_tested
         if untested.any():
-            cache.is_visible[visible_vertices(cache.display, self._mesh.faces, untested)] = True
+            cache.is_visible[visible_vertices(cache.display, self._faces, untested)] = True
             cache.is_tested[untested] = True
+            if cache.only is not None:
+                cache.is_visible[~cache.only] = False
         return cache.is_visible if among is None else cache.is_visible & among
+
+    @property
+    def _faces(self) -> IntArray:
+        """The faces that are shown, (f, 3)."""
+        ids = self._surface.shown_faces
+        return self._mesh.faces if ids is None else self._mesh.faces[ids]
 
     def _current_visibility(self) -> _Visibility:
         modified = self._surface.polydata.GetPoints().GetMTime()
@@ -140,10 +150,12 @@ class Picker:
         if (
             cache is None
             or cache.modified != modified
+            or cache.only is not self._surface.only
             or not np.array_equal(cache.box, box, equal_nan=True)
         ):
             none = np.zeros(self._mesh.n_vertices, dtype=bool)
-            cache = _Visibility(modified, box, self.display_points(), none, none.copy())
+            only, display = self._surface.only, self.display_points()
+            cache = _Visibility(modified, box, display, none, none.copy(), only)
             self._visibility = cache
         return cache
 

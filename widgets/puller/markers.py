@@ -97,7 +97,12 @@ class Markers:
 
     @property
     def _shown(self) -> dict[str, int]:
-        return {name: v for name, v in self._vertices.items() if not self._is_hidden(name)}
+        only = self._surface.only
+        return {
+            name: vertex
+            for name, vertex in self._vertices.items()
+            if not self._is_hidden(name) and (only is None or only[vertex])
+        }
 
     def _lay_out(self) -> None:
         """Place the dots in front of the surface, as seen from the camera."""

@@ -9,10 +9,18 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray
 
-from ..handle_dragger import FREE, Grip, Kind, Motion, NumberEntry, Part, next_constraint
+from ..handle_dragger import (
+    FREE,
+    LIMB,
+    TURN,
+    Grip,
+    Motion,
+    NumberEntry,
+    Part,
+    axes_along,
+    next_constraint,
+)
 from ..scene import Pointer, Projection
-
-TURN = Part(Kind.ROTATION)  # about the line of sight
 
 
 class PullMotion:
@@ -68,10 +76,7 @@ class PullMotion:
         """(3, 3) float: the axes of `part`, as rows; z is that of a turned limb."""
         if self._axis is None or not self.turns_limb:
             return np.eye(3)
-        z = self._axis[1]
-        x = np.cross(np.eye(3)[np.abs(z).argmin()], z)
-        x /= np.linalg.norm(x)
-        return np.stack([x, np.cross(z, x), z])
+        return axes_along(self._axis[1])
 
     @property
     def place(self) -> FloatArray:
@@ -141,7 +146,7 @@ class PullMotion:
     @property
     def _unconstrained(self) -> Part:
         if self._axis is not None:
-            return Part(Kind.ROTATION, 2)
+            return LIMB
         return TURN if self.is_turning else FREE
 
     def _begin(self) -> None:

@@ -5,7 +5,7 @@ shows the radius, and the limb that would move is tinted.  A press on a pin or a
 as dots, grabs that.
 
     shift + click       pin the point, or remove the pin or pulled point there
-    shift + wheel       smaller, larger radius
+    shift + wheel       smaller, larger radius; with control a smaller, larger limb
     while pulling:
     x, y, z     constrain to the axis; again: to the plane perpendicular to it; again: no constraint
     r           turn the limb about its axis, or without one the surface around the point about
@@ -28,7 +28,7 @@ import numpy as np
 
 from vtk_segdeform.arrays import FloatArray, is_number
 from vtk_segdeform.checks import require, shown
-from vtk_segdeform.deformer import Limb, checked_limb, checked_locality
+from vtk_segdeform.deformer import Limb, checked_hinge, checked_limb, checked_locality
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.pictures import PAPER, rgb
 from vtk_segdeform.session import Change, Session, SurfacePoint, pulls
@@ -75,6 +75,8 @@ class Puller(Widget):
         Whether the first pull binds the session if need be; otherwise it waits until that is done.
     is_locked, is_hidden : callable
         Of a name: whether a pin or pulled point must not be grabbed, or is not shown; none is.
+    says : callable
+        Called with a text about a limb that the wheel chose.
     waiting : Waiting
         The pull that waits until the session is ready.
     """
@@ -86,6 +88,7 @@ class Puller(Widget):
         self.binds = True
         self.is_locked: Callable[[str], bool] = lambda _: False
         self.is_hidden: Callable[[str], bool] = lambda _: False
+        self.says: Callable[[str], object] = lambda _: None
         self._own_surface = surface is None
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         changed = partial(self._invoke, "ModifiedEvent")
@@ -96,6 +99,7 @@ class Puller(Widget):
         self._tint = LimbTint(self._surface, self._limb_of_pull)
         self._gizmo = Gizmo(self.view)
         self._limb: int | None = None
+        self._hinge = 0.0
         self._radius = _RADIUS * session.mesh.diagonal
         self._locality: float | None = None
         self._motion: PullMotion | None = None  # of the running gesture
@@ -142,6 +146,26 @@ class Puller(Widget):
     def limb(self, limb: int | None) -> None:
         self._limb = checked_limb(limb)
         self._invoke("ModifiedEvent")
+
+    @property
+    def hinge(self) -> float:
+        """Where a pulled limb bends, 0 to 1: along its length, or at its joint only."""
+        return self._hinge
+
+    @hinge.setter
+    def hinge(self, hinge: float) -> None:
+        self._hinge = checked_hinge(hinge)
+        self._invoke("ModifiedEvent")
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The radius, locality, limb and hinge, as of `Session.pull`."""
+        return {
+            "radius": self.radius,
+            "locality": self.locality,
+            "limb": self.limb,
+            "hinge": self.hinge,
+        }
 
     def change_limb(self, steps: int) -> str:
         """Let a pull move a larger limb of the point under the pointer, or a smaller one.
@@ -263,12 +287,18 @@ class Puller(Widget):
         return self._pull(point, press) if can_grab else self._refuse(_TOO_COARSE)
 
     def on_wheel(self, pointer: Pointer, clicks: int) -> bool:
-        """Change the radius over the mesh with Shift held; else pass the wheel to the camera."""
+        """Change the radius, or with Control the limb, over the mesh with Shift held.
+
+        Otherwise pass the wheel to the camera.
+        """
         if self.is_grabbing:
             return True  # camera and radius stay the same during a pull
         if not pointer.shift or self._picker.hit(pointer) is None:
             return False
-        self._resize(clicks, pointer)
+        if pointer.control:
+            self.says(self.change_limb(clicks))
+        else:
+            self._resize(clicks, pointer)
         return True
 
     def on_key(self, key: str, pointer: Pointer) -> bool:
@@ -308,9 +338,7 @@ class Puller(Widget):
         start, step = point.at(self._surface.points), step_of(session.mesh.diagonal)
         motion = self._motion = PullMotion(self.view, start, press, self._gizmo.size, step)
         self._pulled = point
-        pull = partial(
-            session.pull, point, radius=self.radius, locality=self.locality, limb=self.limb
-        )
+        pull = partial(session.pull, point, **self.options)
         to: FloatArray | None = None  # where to pull to, once the pointer has moved
         has_moved = wants = committed = False
         try:

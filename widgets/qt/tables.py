@@ -5,6 +5,7 @@ A double click on a name, or F2, renames the row in place.
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
@@ -16,6 +17,8 @@ Qt = QtCore.Qt
 _RIGHT = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 _LEFT = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 _MOST_ROWS = 14  # shown without scrolling
+_PICTURES = 2.5  # rows with pictures that are seen at least
+_PICTURE, _ASPECT = 2.2, 4.0 / 3.0  # height in lines of text, and width by height
 _NAME_LETTERS = 15  # of the first column, with its icon
 
 
@@ -34,6 +37,7 @@ class TableView(QtWidgets.QTreeWidget):
         super().__init__()
         self._press, self._table = press, table
         self._rows: tuple[Row, ...] = ()  # as drawn
+        self._has_pictures = any(row.picture for row in table.rows)
         self.setItemDelegate(_Ticks(self))
         views = QtWidgets.QAbstractItemView
         self.setEditTriggers(views.EditTrigger.DoubleClicked | views.EditTrigger.EditKeyPressed)
@@ -107,10 +111,17 @@ class TableView(QtWidgets.QTreeWidget):
         self.setMaximumHeight(self._height_of(n_rows))
 
     def _height_of(self, n_rows: float) -> int:
-        return int((n_rows + 1.5) * 1.3 * self.fontMetrics().height() + 0.5)
+        row = self.iconSize().height() + 4 if self._has_pictures else 0
+        line = 1.3 * self.fontMetrics().height()
+        return int(1.5 * line + n_rows * max(line, row) + 0.5)
 
     def _draw_rows(self, rows: tuple[Row, ...]) -> None:
-        self._rows = rows
+        self._rows, self._has_pictures = rows, any(row.picture for row in rows)
+        side = _PICTURE if self._has_pictures else 1.0
+        high = round(side * self.fontMetrics().height())
+        self.setIconSize(QtCore.QSize(round(_ASPECT * high) if self._has_pictures else high, high))
+        if self._has_pictures:
+            self.setMinimumHeight(self._height_of(min(len(rows), _PICTURES)))
         self._leave_room(min(max(len(rows), self._table.n_rows), _MOST_ROWS))
         while self.topLevelItemCount() > len(rows):
             self.takeTopLevelItem(len(rows))
@@ -123,7 +134,7 @@ class TableView(QtWidgets.QTreeWidget):
             # The name may be elided.
             item.setToolTip(0, f"{row.label} (F2 to rename)" if row.renamable else row.label)
             item.setFlags(item.flags() | editable if row.renamable else item.flags() & ~editable)
-            item.setIcon(0, _swatch(row.colour, self))
+            item.setIcon(0, _picture(row.picture) or _swatch(row.colour, self))
             for place, (column, cell) in enumerate(
                 zip(self._table.columns, row.cells, strict=True), 1
             ):
@@ -174,6 +185,17 @@ class _Ticks(QtWidgets.QStyledItemDelegate):
             kind = QtWidgets.QStyle.SubElement.SE_ItemViewItemCheckIndicator
             box = table.style().subElementRect(kind, how, table)
             box_frame(painter, box, table.palette())
+
+
+def _picture(url: str) -> Any:
+    """Return an icon of a data URL; None of ""."""
+    if not url:
+        return None
+    picture = QtGui.QPixmap()
+    picture.loadFromData(base64.b64decode(url.partition(",")[2]))
+    icon = QtGui.QIcon(picture)
+    icon.addPixmap(picture, QtGui.QIcon.Mode.Selected)  # otherwise tinted
+    return icon
 
 
 def _swatch(colour: tuple[int, int, int], widget: Any) -> Any:

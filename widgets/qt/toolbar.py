@@ -52,6 +52,7 @@ class Toolbar(QtWidgets.QWidget):
             "save.mesh_as": self.ask_and_export,
         }
         self._modes = QtWidgets.QButtonGroup(self)
+        self._toggles: dict[str, Any] = {}  # entries of menus, by name
         fields = toolbar(editor)
         self.buttons = {field.name: self._made(field) for field in fields}
         self._icons = {field.name: field.icon for field in fields}
@@ -77,6 +78,9 @@ class Toolbar(QtWidgets.QWidget):
             button.setToolTip(tooltip(field, self._editor.keys))
             if button.isCheckable():
                 button.setChecked(field.value)
+            for entry in filter(None, field.items):
+                if entry.name in self._toggles:
+                    self._toggles[entry.name].setChecked(entry.value)
 
     def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Show as many names as there is room for."""
@@ -104,7 +108,13 @@ class Toolbar(QtWidgets.QWidget):
                 add_view_entries(menu, lambda: self._editor)
             else:
                 for entry in filter(None, field.items):
-                    add_entry(menu, entry.label).triggered.connect(self._asker(entry.name))
+                    action = add_entry(menu, entry.label)
+                    if entry.kind == "toggle":
+                        action.setCheckable(True)
+                        action.triggered.connect(lambda on, name=entry.name: press(name, on))
+                        self._toggles[entry.name] = action
+                    else:
+                        action.triggered.connect(self._asker(entry.name))
         elif field.kind == "file":
             button.clicked.connect(self._asker(name))
         elif field.kind == "hold":

@@ -15,7 +15,7 @@ _Use = Callable[[str], object]
 _DEFAULT = keys_of("pyvista")
 # The letters that select entries while the menu is open.
 _LETTERS = {
-    "frame_all": "F", "frame_selection": "s", "viewpoint": "w", "up": "U", "orthographic": "O",
+    "frame_all": "F", "frame_selection": "s", "viewpoint": "w", "orthographic": "O",
     "cube": "b", "front": "F", "back": "B", "right": "R", "left": "L", "top": "T", "bottom": "o",
     "home": "h", "iso": "I", "up_x": "X", "up_y": "Y", "up_z": "Z",
 }  # fmt: skip

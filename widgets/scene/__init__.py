@@ -33,7 +33,7 @@ from .labels import Panel, Text, set_font
 from .navigation import Navigation
 from .orientation_cube import OrientationCube
 from .projection import Projection
-from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles
+from .surface_display import SurfaceDisplay, SurfaceStyle, drawn_triangles, some_triangles
 from .view import Stop, View
 from .viewpoint import VIEWS, Viewpoint
 from .widget import Widget
@@ -67,4 +67,5 @@ __all__ = [
     "set_background",
     "set_font",
     "set_lights",
+    "some_triangles",
 ]

@@ -24,8 +24,8 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
 from vtk_segdeform import sizes
-from vtk_segdeform.arrays import FloatArray, IntArray, as_numbers, as_points, plain
-from vtk_segdeform.checks import require
+from vtk_segdeform.arrays import BoolArray, FloatArray, IntArray, as_numbers, as_points, plain
+from vtk_segdeform.checks import require, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.freezing import read_only
 from vtk_segdeform.geometry import VertexNormals
@@ -61,6 +61,14 @@ def drawn_triangles(mesh: Mesh) -> tuple[Any, IntArray]:
     return known
 
 
+def some_triangles(mesh: Mesh, own: BoolArray | IntArray) -> Any:
+    """Return `drawn_triangles` of the faces *own*, a mask (m,) or numbers (f,), likewise."""
+    triangles, _ = drawn_triangles(mesh)
+    corners = vtk_to_numpy(triangles.GetConnectivityArray()).reshape(-1, 3)[own]
+    points = np.empty((corners.max(initial=-1) + 1, 3))
+    return polydata_of(points, np.full(len(corners), 3), corners.ravel()).GetPolys()
+
+
 class SurfaceStyle(enum.Enum):
     """How a surface is drawn."""
 
@@ -87,6 +95,9 @@ class SurfaceDisplay:
         self._tint: FloatArray | None = None
         self._style = SurfaceStyle.SHADED
         self._instead: FloatArray | None = None
+        self._only: BoolArray | None = None
+        self.shown_faces: IntArray | None = None
+        """The numbers of the faces that are shown, (f,); None shows all."""
         mesh = session.mesh
         self._vertex_normals = VertexNormals(mesh)
         triangles, self._twice = drawn_triangles(mesh)
@@ -174,6 +185,37 @@ class SurfaceDisplay:
             self._instead = vertices
             self.update()
 
+    @property
+    def only(self) -> BoolArray | None:
+        """(n,) bool: the vertices that are shown and can be picked; None shows all."""
+        return self._only
+
+    @only.setter
+    def only(self, vertices: BoolArray | None) -> None:
+        mesh = self.session.mesh
+        if vertices is not None:
+            vertices = plain(vertices, "only")
+            if vertices.shape != (mesh.n_vertices,) or vertices.dtype != np.bool_:
+                raise ArgumentError(
+                    f"only must be a mask of {mesh.n_vertices} vertices or None; "
+                    f"got {shown(vertices)}"
+                )
+        own = None if vertices is None else vertices[mesh.faces].all(axis=1)
+        self._only = vertices
+        self.shown_faces = None if own is None else np.flatnonzero(own)
+        if self._is_draft:
+            self._set_draft(False)
+        self.polydata.SetPolys(self.triangles)
+        self.view.request_render()
+
+    @property
+    def triangles(self) -> Any:
+        """The triangles that are shown, as a vtkCellArray."""
+        mesh, ids = self.session.mesh, self.shown_faces
+        if ids is None:
+            return drawn_triangles(mesh)[0]
+        return some_triangles(mesh, ids)
+
     def set_colours(self, layer: str, colours: NDArray[np.uint8] | None) -> None:
         """Set the vertex *colours* (n, 3) uint8 of a layer, or remove the layer with None.
 
@@ -255,6 +297,7 @@ class SurfaceDisplay:
             self.view.request_render()
             return
         is_plain = self._style is SurfaceStyle.SHADED and bool(self.actor.GetVisibility())
+        is_plain &= self._only is None
         is_slow = self._drafts.seconds > SLOW
         if self.session.mesh.n_vertices <= sizes.DRAFT or not (is_slow and is_plain):
             return

@@ -118,6 +118,7 @@ class PageDrawing:
         editor, surface = self._editor, self._editor.widgets.surface
         has_surface = self._is_held and self._stream.session is editor.session
         is_plain = surface.style is SurfaceStyle.SHADED and surface.instead is None
+        is_plain &= surface.only is None
         if not (has_surface and is_plain and not editor.is_busy and self._stream.is_encoded):
             return False
         renderer = editor.view.renderer

@@ -175,7 +175,7 @@ class Transfer:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if place.suffix != _SESSION:
-            return write_posed(session, place)
+            return write_posed(session, place, displacement=editor.controller.displacement)
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
         return None

@@ -428,6 +428,12 @@ def test_a_mesh_is_saved_with_all_its_arrays_and_not_over_the_original(
     (tmp_path / "bent.vtp").unlink()
     hand.choose("File", "Save mesh")  # the file is known now
     assert (tmp_path / "bent.vtp").exists()
+    hand.choose("File", "Meshes with displacement")
+    hand.choose("File", "Save mesh")
+    assert not convert.read_polydata(tmp_path / "bent.vtp").point_data["displacement"].any()
+    hand.choose("File", "Meshes with displacement")
+    hand.choose("File", "Save mesh")
+    assert "displacement" not in convert.read_polydata(tmp_path / "bent.vtp").point_data
     boxes.answers.append("Cancel")
     hand.choose("File", "Save mesh as")  # "bent" becomes bent.vtp, which exists
     assert boxes.seen[-1].startswith("Replace bent.vtp?")
@@ -549,6 +555,25 @@ def test_keys_are_changed_in_a_dialog_and_kept(start, arm_file):
     QtTest.QTest.keyClick(window.editor_widget.plotter, Qt.Key_F5)
     assert len(window.session.fixed) == before
     assert start().window.keys.changes == changed  # another run of the program
+
+
+def test_poses_of_another_session_are_copied_from_the_menu(
+    start, bent, arm_file, tmp_path, monkeypatch
+):
+    hand = start(arm_file)
+    save_session(tmp_path / "bent.segdeform", bent)
+    choose_file(monkeypatch, tmp_path / "bent.segdeform")
+    hand.choose("File", "Copy poses")
+    hand.settle()
+    session = hand.window.session
+    assert list(session.saved_poses) == ["pose 1"]
+    assert "Copied 1 pose" in hand.window.editor.status
+    session.saved_poses.apply("pose 1")
+    assert_allclose(session.vertices, bent.vertices, atol=1e-4 * bent.mesh.diagonal)
+    choose_file(monkeypatch, arm_file.with_name("missing.segdeform"))
+    hand.choose("File", "Copy poses")
+    hand.settle()
+    assert "cannot be read" in hand.window.editor.status
 
 
 def test_a_picture_shows_the_view_without_status_line_and_gizmo(

@@ -289,6 +289,18 @@ def test_the_mesh_at_rest_stays_while_the_camera_moves_until_a_press_on_it(bench
     assert bench.editor.session.history.position == position
 
 
+def test_the_next_axis_is_up_by_a_key():
+    bench = Bench()
+    viewpoint = bench.editor.controller.camera.viewpoint
+    viewpoint.up = np.eye(3)[2]
+    for axis in (0, 1, 2):
+        bench.hand.types("shift+u")
+        assert np.array_equal(viewpoint.up, np.eye(3)[axis])
+        assert f"Up: {'XYZ'[axis]}" in bench.editor.status
+        bench.hand.tick(60)  # until the camera has moved there
+        assert bench.view.camera.GetViewUp()[axis] > 0.8
+
+
 @pytest.mark.parametrize("axis", [1, 2])
 def test_each_face_of_the_cube_is_named_upright_in_its_view(axis):
     bench = Bench()

@@ -53,7 +53,9 @@ remove_handle delete, convert_handle m, local_axes l, pivot v, show_volume_chang
 style w, show_regions shift+g, before_after backslash, view_front kp_1, view_back ctrl+kp_1,
 view_right kp_3, view_left ctrl+kp_3, view_top kp_7, view_bottom ctrl+kp_7, view_home kp_0,
 projection kp_5, frame_selection period, frame_all comma, keep_part shift+p, grow_part e,
-paint_stiffness s, smaller_limb bracketleft, larger_limb bracketright
+paint_stiffness s, smaller_limb bracketleft, larger_limb bracketright,
+hinge b,
+isolate slash, next_up_axis shift+u
 """
 
 

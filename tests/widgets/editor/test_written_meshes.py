@@ -13,8 +13,10 @@ from numpy.testing import assert_allclose
 from vtk_segdeform import Mesh, Session, Surface, models
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io import meshlab, read_polydata, stored, to_polydata, triangles_of
+from vtk_segdeform.regions import Regions
 from vtk_segdeform.widgets import DeformEditor
 from vtk_segdeform.widgets.editor import Task, exporting, write_posed
+from vtk_segdeform.widgets.panel import press
 
 pytestmark = pytest.mark.usefixtures("unprepared")
 UTM = np.array([500_000.0, 5_400_000.0, 100.0])
@@ -126,6 +128,28 @@ def test_a_file_that_cannot_be_read_again_is_said_to_be_so(edited, gate, tmp_pat
     assert str(path) in editor.status
     editor.do(exporting(path.with_suffix(".ply")))
     assert editor.controller.saved_intact()
+
+
+@pytest.mark.parametrize("has_surface", [True, False])
+def test_the_displacement_is_written_while_it_is_wanted(edited, tmp_path, has_surface):
+    editor, path = edited(BALL, has_surface=has_surface), tmp_path / "ball.vtp"
+    session = editor.session
+    session.change_options(n_cage_vertices=24)
+    session.set_regions(Regions.single(session.mesh))
+    session.fit_cages()
+    session.move_cage(0, session.cages[0].vertices + np.array([0.0, 0.0, 0.2]))
+    session.commit()
+    editor.do(exporting(path))
+    assert "displacement" not in read_polydata(path).point_data
+    assert press(editor, "save.displacement", True) is None
+    editor.do(exporting(path))
+    away = read_polydata(path).point_data["displacement"]
+    assert_allclose(away, session.vertices - BALL.vertices, atol=1e-12)
+    assert_allclose(away.mean(axis=0), [0.0, 0.0, 0.2], atol=1e-3)
+    assert editor.controller.saved_intact()
+    press(editor, "save.displacement", False)
+    editor.do(exporting(path))
+    assert "displacement" not in read_polydata(path).point_data
 
 
 def test_during_a_job_it_is_said_afterwards(edited, tmp_path):

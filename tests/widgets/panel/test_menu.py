@@ -11,6 +11,7 @@ from scenes import sausage
 from vtk_segdeform import Session
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel import menu, press
+from vtk_segdeform.widgets.scene import Phase, Pointer
 
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 SCENE = sausage(is_coarse=True)
@@ -145,3 +146,38 @@ def test_points_are_pinned_parts_rigid_kept_and_enlarged_handles_locked(bench, a
     press(editor, "menu.reset_pose")
     assert session.state.pose is None
     assert not bench.entry("reset").enabled
+
+
+def test_an_isolated_part_is_shown_and_grabbed_alone_until_everything_is_shown(bench, arm):
+    editor, surface = bench.editor, bench.editor.widgets.surface
+    own = SCENE.regions.membership[1][SCENE.mesh.faces].all(axis=1)
+    far = np.array(bench.hand.at(SCENE.mesh.vertices[SCENE.mesh.vertices[:, 0].argmin()] + 0.1))
+    other = lambda: editor.widgets.spot_at(Pointer(Phase.HOVER, *far))  # noqa: E731
+    assert other() is not None
+    bench.session.handles.pin(other().vertex)
+    visible = editor.widgets.selector._picker.visible()
+    assert visible[~SCENE.regions.membership[1]].any()
+    assert editor.widgets.puller._markers._shown.keys() == {"pin 1", "pull 1"}
+    press(editor, "menu.isolate")
+    assert editor.widgets.puller._markers._shown.keys() == {"pull 1"}
+    assert "Only arm is shown" in editor.status
+    assert surface.polydata.GetNumberOfPolys() == own.sum()
+    assert bench.entry("isolate").value
+    assert other() is None
+    assert editor.widgets.spot_at(Pointer(Phase.HOVER, *arm)).region == 1
+    visible = editor.widgets.selector._picker.visible()
+    assert not visible[~SCENE.regions.membership[1]].any()
+    assert not bench.session.history.redo_label
+    bench.hand.press(far)  # beside what is shown
+    assert not editor.widgets.puller.is_grabbing
+    bench.hand.release()
+    press(editor, "view.isolate")
+    assert surface.polydata.GetNumberOfPolys() == SCENE.mesh.n_faces
+    assert other() is not None
+    bench.hand.types("slash", arm)
+    assert surface.polydata.GetNumberOfPolys() == own.sum()
+    bench.hand.types("slash", (3, 3))
+    assert surface.only is None
+    bench.hand.types("slash", (3, 3))
+    assert "Point at the part" in editor.status
+    bench.hand.failures.clear()  # that refusal

@@ -7,10 +7,13 @@ import functools
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, picture, plain_view
+from numpy.testing import assert_allclose
 
 from vtk_segdeform import Session
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.models.implicit import Limb, implicit_surface
+from vtk_segdeform.session.pulls import middle_vertex
 from vtk_segdeform.widgets.editor.editor import DeformEditor
 from vtk_segdeform.widgets.panel.panel import press
 from vtk_segdeform.widgets.scene.view import View
@@ -144,10 +147,34 @@ def test_a_pull_moves_the_limb_and_the_chosen_one_by_keys_or_by_the_panel(bench)
     assert bench.puller.limb is None
     bench.hand.types("bracketleft", bench.at(HAND))
     assert "Limb: 1 of 2" in bench.editor.status
+    bench.hand.wheel(1, bench.at(HAND), shift=True, control=True)
+    assert bench.puller.limb == 1
+    assert "Limb: whole body" in bench.editor.status
+    bench.hand.wheel(-1, bench.at(HAND), shift=True, control=True)
+    assert bench.puller.limb == 0
     bench.hand.types("bracketleft", bench.at(BODY))
     assert "No limb here" in bench.editor.status
     bench.hand.types("bracketleft", (3, 3))
     assert "Point at the surface" in bench.editor.status
+
+
+def test_a_hinge_by_the_key_or_by_the_panel_keeps_the_arm_straight(bench):
+    arm = bench.rest[:, 0] > 0.8
+    way = [bench.at(HAND) + [0, k] for k in range(0, 100, 20)]
+    changes = []
+    for _ in range(2):
+        bench.hover(HAND)
+        bench.hand.drag(way)
+        turn, shift = rigid_fit(bench.rest[arm], bench.session.vertices[arm])
+        away = bench.rest[arm] @ turn.T + shift - bench.session.vertices[arm]
+        changes.append(np.linalg.norm(away, axis=1).max())
+        bench.session.undo()
+        bench.hand.types("b", bench.at(HAND))
+        assert "Hinge: 50 %" in bench.editor.status or changes[1:]
+    assert changes[1] < 0.5 * changes[0]
+    assert bench.puller.hinge == 1.0
+    press(bench.editor, "pull.hinge", 20.0)
+    assert bench.editor.widgets.dragger.pulls_with()["hinge"] == pytest.approx(0.2)
 
 
 def test_r_turns_the_limb_about_its_axis_then_in_the_view_then_moves(bench):
@@ -184,3 +211,43 @@ def test_r_turns_the_limb_about_its_axis_then_in_the_view_then_moves(bench):
     assert "Turning about the axis" in bench.editor.status
     bench.hand.key("Escape")
     bench.hand.release()
+
+
+def test_r_turns_the_limb_of_a_handle_then_in_the_view_then_moves_and_adds_up(bench):
+    session, hand = bench.session, bench.hand
+    name = session.handles.add(np.linalg.norm(bench.rest - [1.6, 0.0, 0.0], axis=1) < 0.2)
+    bench.editor.run("deform")
+    start, place = session.targets[name], bench.at(HAND)
+    hand.press(place)
+    hand.key("r")
+    assert "Turning the limb about its axis" in bench.editor.status
+    hand.key("9")
+    hand.key("0")
+    hand.move(place + [0, 5])
+    turned = session.targets[name]
+    vertex = middle_vertex(session.mesh, session.handles[name])
+    joint, axis = session.deformer.limbs(vertex)[0].axis(session.mesh, bench.rest)
+    assert_allclose((turned - joint) @ axis, (start - joint) @ axis, atol=1e-9)
+    across = np.cross(axis, start - joint)
+    assert_allclose(turned - joint - np.outer((start - joint) @ axis, axis), across, atol=1e-9)
+    hand.key("r")
+    hand.key("x")
+    assert "Turning about the axis" in bench.editor.status
+    hand.key("r")
+    assert "R: turn" in bench.editor.status
+    hand.move(place + [0, 45])
+    away = session.targets[name] - turned
+    assert away[0][2] > 0.1
+    assert_allclose(away, np.broadcast_to(away[0], away.shape), atol=1e-9)
+    hand.release()
+    assert session.history.undo_label == f"drag {name}"
+    assert bench.editor.widgets.dragger.turning == ""
+    session.undo()
+    assert_allclose(session.targets[name], start)
+    body = session.handles.add(np.linalg.norm(bench.rest - [0.0, 0.0, 0.5], axis=1) < 0.2)
+    bench.editor.widgets.dragger.handle = body
+    hand.press(bench.at([0.0, -0.1, 0.5]))
+    hand.key("r")  # the ball has no limb there
+    assert "Turning about the line of sight" in bench.editor.status
+    hand.key("Escape")
+    hand.release()

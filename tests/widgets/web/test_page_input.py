@@ -33,7 +33,7 @@ _BROWSER = {
     "escape": "Escape", "return": "Enter", "tab": "Tab", "delete": "Delete", "home": "Home",
     "backspace": "Backspace", "bracketleft": "[", "bracketright": "]", "plus": "+",
     "minus": "-", "equal": "=", "period": ".", "comma": ",", "backslash": "\\", "grave": "`",
-    "question": "?", "f1": "F1",
+    "question": "?", "f1": "F1", "slash": "/",
 }  # fmt: skip
 
 

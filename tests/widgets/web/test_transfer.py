@@ -219,7 +219,7 @@ def test_a_download_is_read_again_and_its_loss_is_told(served, tmp_path, suffix,
 def test_a_download_that_cannot_be_read_again_is_refused_with_the_reason(
     served, monkeypatch, suffix
 ):
-    def damaged(session, path):
+    def damaged(session, path, **_):
         written = write_posed(session, path)
         path.write_bytes(path.read_bytes()[:500])
         return written

@@ -134,7 +134,8 @@ const Table = {
             @keydown.self.space.stop.prevent="select(row, $event)"
             @keydown.self.f2.stop="rename(row)" @keydown.tab.stop
             @click="select(row, $event)" @dblclick="rename(row)">
-          <span class="sd-name" role="gridcell"><i class="sd-colour" :style="{ background: colour(row) }"></i>
+          <span class="sd-name" role="gridcell"><img v-if="row.picture" class="sd-picture" :src="row.picture" alt="">
+            <i v-else class="sd-colour" :style="{ background: colour(row) }"></i>
             <input v-if="renamed === row.key" ref="name" type="text" :value="row.label"
               @click.stop @keydown.enter="$event.target.blur()"
               @keydown.esc="renamed = null" @blur="named(row, $event)">
