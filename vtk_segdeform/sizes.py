@@ -76,8 +76,13 @@ It is bound in 0.1 s."""
 DRAFT = LARGE
 """Vertices beyond which a moving mesh may be drawn decimated, if drawing it is slow.
 
-In software a picture takes 15 ms of processor time instead of 310 at 250,000 vertices, and instead
-of 1,200 at a million.  Drawing 50,000 vertices takes 45 ms instead of 75, in two threads."""
+In software a picture takes 110 ms of processor time instead of 380 at 250,000 vertices, and 170
+instead of 1,550 at a million, on a busy machine.  At 50,000 it takes half."""
+
+DRAFT_POINTS = 24_000
+"""Vertices drawn of such a mesh, at most: closed cells of equal size, some 18,000 of them.
+
+With half as many, plates and folds of a body that fills half the window fade in a drag."""
 
 FINISHED = 100_000
 """Vertices up to which `deform` and `pull` finish a pose on the mesh by themselves.

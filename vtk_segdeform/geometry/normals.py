@@ -67,14 +67,8 @@ class VertexNormals:
         A normal is zero where the faces around the vertex have no area.
         """
         out = np.empty((self._n, 3), dtype=np.float32) if out is None else out
-        if kernels := compiled_kernels(len(self._faces)):
-            arguments = inputs(x, *self._rings)
-            size = max(1 << 12, -(-self._n // 16))
-
-            def work(first: int, last: int) -> None:
-                kernels.ring_normals(out, *arguments, self._scale, first, last)
-
-            in_parallel(work, self._n, size)
+        if compiled_kernels(len(self._faces)):
+            self._around_rings(x, self._every, out)
             vertices, faces, around = self._open
             if len(vertices):
                 out[vertices] = self._summed(x, faces, around)
@@ -82,10 +76,35 @@ class VertexNormals:
         out[:] = self._summed(x, self._faces, self._around)
         return out
 
-    def subset(self, vertices: IntArray) -> Callable[[FloatArray], FloatArray]:
+    def subset(self, vertices: IntArray) -> Callable[[FloatArray], NDArray[np.float32]]:
         """Return a function of a pose (n, 3) for the normals (k, 3) of these *vertices* (k,)."""
-        if self._n < 15 * len(vertices) and compiled_kernels(len(self._faces)):  # all are as fast
-            return lambda x: np.asarray(self.of(x)[vertices], dtype=float)
+        is_open = np.ones(len(vertices), dtype=bool)
+        if compiled_kernels(len(self._faces)):
+            is_open = np.isin(vertices, self._open[0])
+        summed = self._sums_at(vertices[is_open])
+
+        def normals(x: FloatArray) -> NDArray[np.float32]:
+            out = np.empty((len(vertices), 3), dtype=np.float32)
+            if not is_open.all():
+                self._around_rings(x, vertices, out)
+            out[is_open] = summed(x)
+            return out
+
+        return normals
+
+    def _around_rings(self, x: FloatArray, vertices: IntArray, out: NDArray[np.float32]) -> None:
+        """Put the normals of *vertices* (k,) into *out* (k, 3), by their closed rings."""
+        kernels = compiled_kernels()
+        arguments = inputs(vertices, x, *self._rings)
+        size = max(1 << 12, -(-len(vertices) // 16))
+
+        def work(first: int, last: int) -> None:
+            kernels.ring_normals(out, *arguments, self._scale, first, last)
+
+        in_parallel(work, len(vertices), size)
+
+    def _sums_at(self, vertices: IntArray) -> Callable[[FloatArray], FloatArray]:
+        """Return `subset` by sums over the faces at *vertices*."""
         row = np.full(self._n, -1)
         row[vertices] = np.arange(len(vertices))
         faces = np.flatnonzero((row[self._faces] >= 0).any(axis=1))
@@ -103,6 +122,10 @@ class VertexNormals:
         normals = around @ np.cross(b - a, c - a)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.where(length > 0.0, normals / np.where(length > 0.0, length, 1.0), 0.0)
+
+    @cached_property
+    def _every(self) -> IntArray:
+        return np.arange(self._n)
 
     @cached_property
     def _open(self) -> tuple[IntArray, IntArray, sparse.csr_array]:

@@ -99,7 +99,7 @@ class _Target(QtWidgets.QLabel):
     def highlight(self, on: bool) -> None:
         """Highlight the area, or end that."""
         self.is_highlighted = on
-        colour = "palette(highlight)" if on else "palette(mid)"
+        colour = "palette(highlight)" if on else "palette(placeholder-text)"
         fill = "palette(base)" if on else "rgba(128, 128, 128, 8%)"
         self.setStyleSheet(
             f"QLabel {{ border: 2px dashed {colour}; border-radius: 10px; background: {fill}; }}"

@@ -39,7 +39,7 @@ from .session_history import SessionHistory
 from .widget_set import Mode, Spot, WidgetSet
 
 _FIRST_RUN = "First run: compiling in the background, once"
-_CLICK = 0.3  # seconds; a longer press holds a button
+_CLICK = 0.3  # seconds, beside those of a picture; a longer press holds a button
 _REST = 1.0  # seconds without a gesture before kernels are loaded: a press would wait for it
 T = TypeVar("T")
 
@@ -271,7 +271,7 @@ class Controller:
         if held:
             self._held_at = -math.inf if self.shows_rest else time.monotonic()
             self.show_instead(self.session.mesh.vertices, "The mesh at rest, while held")
-        elif time.monotonic() - self._held_at > _CLICK:
+        elif time.monotonic() - self._held_at > _CLICK + Draft.of(self.view).seconds:
             self.show_instead(None)
         else:
             text = "The mesh at rest. Press on it, or Before/After again, to see the pose"

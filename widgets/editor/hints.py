@@ -58,7 +58,7 @@ def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     now = "Drag a cage vertex" if mode is Mode.CAGES else _painting_hint(widgets, keys)
     resets = mode is Mode.REGIONS and widgets.selector.paints is Paint.REGION
     if resets and widgets.session.state.pose is not None:
-        now += ". A stroke resets the pose"
+        now += ". Painting resets the pose"
     next_step = _next_step(widgets, mode, keys)
     return f"{now} · {next_step}" if next_step else now
 
@@ -97,7 +97,7 @@ def _pull_hint(widgets: WidgetSet, keys: Keys) -> str:
         return f"Drag the surface. Shift-click pins. {part or keys.cap('undo') + ': undo'}"
     radius = 100.0 * widgets.puller.radius / session.mesh.diagonal
     share = f"{radius:.1f}".removesuffix(".0")  # as in the panel
-    limb = f"{keys.cap('smaller_limb')} {keys.cap('larger_limb')}: limb"
+    limb = f"{keys.cap('smaller_limb')} or {keys.cap('larger_limb')}: limb"
     return f"Drag the surface. Shift-click pins. {limb}. Shift+wheel: radius ({share} %)"
 
 

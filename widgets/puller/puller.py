@@ -181,11 +181,11 @@ class Puller(Widget):
             return "No limb here" if self.session.is_bound else _PREPARING_LIMBS
         now, depths = self._limb_of_pull(point), [limb.depth for limb in limbs]
         number = (depths.index(now.depth) if now is not None else -1) + steps
-        self.limb = min(max(number, 0), len(limbs) - 1)
+        self.limb = number = min(max(number, 0), len(limbs) - 1)  # a listener may change it
         self._tint.show(point)
-        if limbs[self.limb].is_whole:
+        if limbs[number].is_whole:
             return "Limb: whole body"
-        return f"Limb: {self.limb + 1} of {len(limbs)}"
+        return f"Limb: {number + 1} of {len(limbs)}"
 
     @property
     def turning(self) -> str:

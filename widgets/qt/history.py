@@ -91,6 +91,11 @@ class HistoryPart(QtWidgets.QWidget):
             self._shown = ()
             self.refresh()
 
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802
+        """Keep the current row in sight."""
+        super().resizeEvent(event)
+        self.list.scrollToItem(self.list.item(self._position))
+
     @property
     def _row_height(self) -> int:
         return int(1.4 * self.fontMetrics().height())

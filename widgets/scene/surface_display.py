@@ -9,7 +9,7 @@ opposite normals.  The vertices there are drawn twice: the second ones, with opp
 the corners that `VertexNormals.turned` lists.
 
 While something moves, a mesh that takes longer to draw than smooth motion allows is drawn
-decimated; its positions still follow, its normals are computed when it has come to rest.
+decimated, by vertices that still follow; all normals are computed when it has come to rest.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.pictures import BODY, COLOURS, INK, rgb
 from vtk_segdeform.session import Change, Session
 
-from .decimated_surface import DecimatedSurface, decimated_soon
+from .decimated_surface import DecimatedSurface, cells_soon
 from .draft import SLOW, Draft, observe_drafts
 from .view import View
 
@@ -298,14 +298,15 @@ class SurfaceDisplay:
             return
         is_plain = self._style is SurfaceStyle.SHADED and bool(self.actor.GetVisibility())
         is_plain &= self._only is None
+        is_plain &= not len(self._twice)  # its cells have one normal each, those at a seam two
         is_slow = self._drafts.seconds > SLOW
         if self.session.mesh.n_vertices <= sizes.DRAFT or not (is_slow and is_plain):
             return
         if self._decimated is None:
             mesh = self.session.mesh
-            if (found := decimated_soon(mesh)) is None:
+            if (cells := cells_soon(mesh)) is None:
                 return
-            self._decimated = DecimatedSurface(mesh, found, self.actor.GetProperty())
+            self._decimated = DecimatedSurface(mesh, cells, self.actor.GetProperty())
             self.view.renderer.AddActor(self._decimated.actor)
             self._decimated.set_colours(self.colours)
         self._is_draft = True

@@ -480,7 +480,7 @@ SAID = [
     ("v", "Visible surface only"), ("x", "Split region 1"), ("ctrl+z", "Undo: split region 1"),
     ("ctrl+y", "Redo: split region 1"), ("4", "No cages yet. Press F"),
     ("l", "Axes: local"), ("l", "Axes: global"), ("Home", "Pose reset"),
-    ("0", "Drag the surface. Shift-click pins. [ ]: limb. Shift+wheel: radius (5 %)"),
+    ("0", "Drag the surface. Shift-click pins. [ or ]: limb. Shift+wheel: radius (5 %)"),
 ]  # fmt: skip
 
 
@@ -677,7 +677,7 @@ def test_the_hint_says_that_a_stroke_resets_the_pose_and_which_handle_cannot_be_
     bench.session.move_handle(name, np.eye(4) + 0.01 * np.eye(4, k=3))
     bench.session.commit()
     bench.editor.controller.refresh()
-    assert "A stroke resets the pose" in bench.editor.status
+    assert "Painting resets the pose" in bench.editor.status
 
 
 # Jobs.

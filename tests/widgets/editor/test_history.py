@@ -195,3 +195,14 @@ def test_a_preview_neither_binds_cages_nor_ends_refinement(editor):
     preview(controller, 0)
     assert surface.instead is None
     assert editor.widgets.dragger.is_refining
+
+
+def test_a_row_of_a_state_that_was_dropped_does_nothing(editor):
+    """A list is redrawn a moment after an edit has dropped what was undone."""
+    hand, state = Hand(editor.view), editor.session.state
+    dropped = len(states_of(editor.controller))
+    assert editor.do(jumping_to(dropped)) is None
+    preview(editor.controller, dropped)
+    assert hand.failures == []
+    assert editor.widgets.surface.instead is None
+    assert editor.session.state is state

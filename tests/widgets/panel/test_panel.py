@@ -24,6 +24,7 @@ from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
 from vtk_segdeform.widgets.panel.status import history, status, words_of
 from vtk_segdeform.widgets.panel.toolbar import toolbar, view_entries
+from vtk_segdeform.widgets.scene import Draft
 
 # What some of the controls can have, among `BAD`.
 SOMETIMES_GOOD = {"None", "True", "False", "numpy True", "0", "3", "2.5", "1e-320", "empty list"}
@@ -225,6 +226,13 @@ def test_the_toolbar_and_the_menu_do_what_they_say(monkeypatch):
         press(editor, "compare", True)
         monkeypatch.setattr(controller, "_CLICK", -1.0)
         press(editor, "compare", False)  # after a longer press
+        assert not editor.controller.shows_rest
+        monkeypatch.setattr(Draft.of(editor.view), "seconds", 60.0)  # to draw the mesh at rest
+        press(editor, "compare", True)
+        press(editor, "compare", False)
+        assert editor.controller.shows_rest
+        press(editor, "compare", True)
+        press(editor, "compare", False)
         assert not editor.controller.shows_rest
         press(editor, "help")
         assert editor.controller.help.is_shown

@@ -251,3 +251,13 @@ def test_r_turns_the_limb_of_a_handle_then_in_the_view_then_moves_and_adds_up(be
     assert "Turning about the line of sight" in bench.editor.status
     hand.key("Escape")
     hand.release()
+
+
+def test_a_field_that_is_left_in_the_meantime_takes_no_part_in_a_key():
+    """The panel enters what is typed in a field when another value comes for it."""
+    bench = Bench()
+    bench.hover(HAND)
+    bench.puller.AddObserver("ModifiedEvent", lambda *_: setattr(bench.puller, "_limb", 28))
+    bench.hand.types("bracketright", bench.at(HAND))
+    assert bench.hand.failures == []
+    assert "Limb: whole body" in bench.editor.status

@@ -475,6 +475,12 @@ def test_the_history_previews_under_the_pointer_and_jumps_at_a_click_or_enter(se
     keys(Qt.Key_Up)
     seen.widget.plotter.setFocus()
     assert looks(2, 2) == 2
+    height = seen.widget.height()
+    seen.widget.resize(seen.widget.width(), 300)  # the list has two rows
+    seen.settle()
+    assert rows.visualItemRect(rows.item(start + 2)).bottom() < rows.viewport().height()
+    seen.widget.resize(seen.widget.width(), height)
+    seen.settle()
     QtTest.QTest.mousePress(rows.viewport(), Qt.LeftButton, Qt.NoModifier, place(start + 2))
     rows.itemEntered.emit(rows.item(start))  # with a button down it is no hover
     assert looks(2, 2) == 2

@@ -42,10 +42,11 @@ def rings(ring, faces, starts):
             ring[t] = j
 
 
-@_compile("f4[:,:], const f8[:,:], const i4[:], const i8[:], f8, i8, i8")
-def ring_normals(out, x, ring, starts, scale, first, last):
-    """Put the unit normals of vertices first..last into *out* (n, 3); *x* is scaled by *scale*."""
-    for i in range(first, last):
+@_compile("f4[:,:], const i8[:], const f8[:,:], const i4[:], const i8[:], f8, i8, i8")
+def ring_normals(out, vertices, x, ring, starts, scale, first, last):
+    """Put the unit normals of vertices[first:last] into *out*; *x* is scaled by *scale*."""
+    for k in range(first, last):
+        i = vertices[k]
         end = starts[i + 1] - 1
         ox, oy, oz = x[i, 0], x[i, 1], x[i, 2]
         j = ring[end]
@@ -61,4 +62,4 @@ def ring_normals(out, x, ring, starts, scale, first, last):
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
         if not length > 0.0:
             nx, ny, nz, length = 0.0, 0.0, 0.0, 1.0
-        out[i, 0], out[i, 1], out[i, 2] = nx / length, ny / length, nz / length
+        out[k, 0], out[k, 1], out[k, 2] = nx / length, ny / length, nz / length
