@@ -2,10 +2,10 @@
 
 The files, in reading order:
 
-    fit      `fit_landmarks`: what bends and what grows
-    sliding  landmarks that slide along curves and surfaces
-    spline   thin-plate splines
-    files    landmarks in files, by name
+    fit            `fit_landmarks`: what bends and what grows
+    semilandmarks  those that slide along curves and surfaces
+    spline         thin-plate splines
+    files          landmarks in files, by name
 """
 
 from .files import (

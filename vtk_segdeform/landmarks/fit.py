@@ -36,7 +36,7 @@ from ..geometry import rigid_fit
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, part, tell
-from .sliding import checked_slides, slid
+from .semilandmarks import checked_slides, slid
 from .spline import CENTRES, Compact, Spline, smoothing_of
 
 STIFFNESS = (1e-3, 1e-2, 0.1, 1.0, 10.0)

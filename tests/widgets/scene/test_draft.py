@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from hands import look_along_y, picture, plain_view
+from hands import look_from, picture, plain_view
 from open_meshes import moebius_strip
 from scipy import ndimage
 from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -82,7 +82,7 @@ def test_in_motion_a_body_has_the_light_and_the_outline_of_rest(shown, body, blu
     vertices, is_light = body(sphere.vertices)
     dense = SurfaceDisplay(view, Session(Mesh(vertices, sphere.faces)))
     dense.set_colours("sides", np.where(is_light[:, None], [[190] * 3], [[150] * 3]).astype("u1"))
-    look_along_y(view)
+    look_from(view, 0.0, -4.0, 0.0)
     sizes.DRAFT_POINTS = 2_000  # `shown` sets it back
     at_rest = picture(view).astype(float)
     Draft(view).begin()

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from vtk_segdeform import models
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.landmarks import fit_landmarks
-from vtk_segdeform.landmarks.sliding import Curve, checked_slides, slid
+from vtk_segdeform.landmarks.semilandmarks import Curve, checked_slides, slid
 
 BALL = models.sphere(1500)
 X = BALL.vertices
