@@ -24,15 +24,14 @@ from ..mesh import Mesh
 from ..solver import connected_sets
 from .symmetry import Mirror
 
-_LEAST = 1e-2  # of s, in medians
-MOST = 1e2  # rigid parts have the largest; with more, the solver takes up to 3 times as many steps
+_LEAST, _MOST = 1e-2, 1e2  # of s, in medians
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffness:
     """The stiffness of a mesh; made by `Stiffness.of`."""
 
-    factors: FloatArray  # (n,) float, finite
+    factors: FloatArray  # (n,) float, finite; 1 in rigid parts
     rigid: tuple[IntArray, ...]  # (k,) int each: connected parts
 
     @classmethod
@@ -63,7 +62,8 @@ class Stiffness:
         is_rigid = np.isinf(values)
         rigid = np.flatnonzero(is_rigid)
         soft = values[~is_rigid & (values > 0.0)]
-        values = np.clip(values / (np.median(soft) if len(soft) else 1.0), _LEAST, MOST)
+        usual = np.median(soft) if len(soft) else 1.0
+        values = np.clip(np.where(is_rigid, usual, values) / usual, _LEAST, _MOST)
         if not len(rigid) and (values == values[0]).all():
             return None
         return cls(values, tuple(rigid[own] for own in connected_sets(mesh, rigid)))

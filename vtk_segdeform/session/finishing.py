@@ -64,7 +64,7 @@ class Finish:
     deformer: Deformer
     before: Pose
     pose: Pose
-    """The same, with the stiffness of now."""
+    """The same with the present stiffness, which is finished."""
     targets: FloatArray
     """(k, 3) float, of all handles."""
     shifts: FloatArray | None

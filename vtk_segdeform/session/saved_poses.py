@@ -135,7 +135,7 @@ class SavedPoses(Mapping[str, State]):
         Returns
         -------
         names : tuple of str
-            Under which they are saved here: those that they have there, or "pose 1".
+            The names of the copies; by default those in the other session, or "pose 1".
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Parts of the surface that move affinely with the cages, as those that are to be rigid.
+"""Parts of the surface that move affinely with the cages: those that are to be rigid.
 
 Cages are coarse: what is stiff between two of their vertices, they bend nevertheless.  But the
 affine map A that fits the motion W~ p of a part best is linear in p as well,
