@@ -208,11 +208,14 @@ def test_a_killed_process_changes_no_byte(count, plan, reference, tmp_path):
 
 PROGRAM = """
 import sys
+import time
 import vtk_segdeform as sd
 from vtk_segdeform.models import random_limbs
 
 def tell(fraction, text):
     print(f"{fraction:.3f}", flush=True)
+    if fraction > 0.1:
+        time.sleep(1.0)  # so that it has not ended when the signal comes
 
 if __name__ == "__main__":
     random = {"random": 4, "seed": 7, "degrees": 40.0}

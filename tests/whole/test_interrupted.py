@@ -24,15 +24,18 @@ from vtk_segdeform.kernels import threads
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 
-# Interrupts itself every 50 ms, until a call is completed.
+# Interrupts itself after 50 ms, and so on, until a call is completed.  The pauses become longer: a
+# slow machine would never complete a step that takes longer than they do.
 FIRST_CALL = """
 import os, signal, sys, threading, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import vtk_segdeform as sd
 
 def interrupt():
+    pause = 0.05
     while not is_over:
-        time.sleep(0.05)
+        time.sleep(pause)
+        pause *= 1.03
         os.kill(os.getpid(), signal.SIGINT)
 
 is_over, count = False, 0
