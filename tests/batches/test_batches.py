@@ -207,6 +207,7 @@ def test_a_killed_process_changes_no_byte(count, plan, reference, tmp_path):
 
 
 PROGRAM = """
+import signal
 import sys
 import time
 import vtk_segdeform as sd
@@ -218,6 +219,7 @@ def tell(fraction, text):
         time.sleep(1.0)  # so that it has not ended when the signal comes
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background
     random = {"random": 4, "seed": 7, "degrees": 40.0}
     bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
     meshes = [random_limbs(600, 1), random_limbs(700, 2)]
