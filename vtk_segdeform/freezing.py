@@ -38,7 +38,7 @@ class _WithoutZeros(NamedTuple):
     shape: tuple[int, ...]
     order: Literal["C", "F"]  # of its memory: products depend on it, bit for bit
     places: NDArray[np.uint8]  # one bit for each number
-    numbers: NDArray[np.float64] | None  # those that are not 0; None of a matrix of bools
+    numbers: NDArray[np.float64] | None  # nonzero entries; None if all of them are True
 
 
 def without_zeros(value: Any) -> Any:

@@ -62,9 +62,7 @@ class Finish:
     """A pose to finish, and its own deformer; another thread may call ``finish(progress)``."""
 
     deformer: Deformer
-    before: Pose
     pose: Pose
-    """The same with the present stiffness, which is finished."""
     targets: FloatArray
     """(k, 3) float, of all handles."""
     shifts: FloatArray | None
@@ -84,7 +82,7 @@ class Finish:
         for array in (vertices, held, shifts, offset):
             frozen(array)
         finished = Finished(vertices, held, shifts, pose.cage_vertices, offset)
-        return FinishedPose(self.before, replace(pose, finished=finished), solution)
+        return FinishedPose(pose, replace(pose, finished=finished), solution)
 
 
 def finish(poses: Poses, state: State) -> Finish:
@@ -97,11 +95,8 @@ def finish(poses: Poses, state: State) -> Finish:
     """
     if reason := reason_not_to_finish(state):
         raise SessionError(reason)
-    before, locality = state.pose, state.locality
-    assert before is not None
-    pose = before.on(state.stiffness)
-    state = replace(state, pose=pose)
-    shift = poses.shift(state)
+    pose, locality, shift = state.pose, state.locality, poses.shift(state)
+    assert pose is not None
     is_shifted = shift is not None and bool(shift[state.fixed].any())
     deformer = poses.held(state, state.fixed_at) if is_shifted else poses.constrained(state)
     is_further = pose.is_finished and locality is None
@@ -131,7 +126,7 @@ def finish(poses: Poses, state: State) -> Finish:
         folded=partial(turned_over, rest=rest, faces=faces),
         unfinished=of_cages if is_further else None,
     )
-    return Finish(deformer.copy(), before, pose, aims, shift, start)
+    return Finish(deformer.copy(), pose, aims, shift, start)
 
 
 def reason_not_to_finish(state: State) -> str:
