@@ -163,7 +163,7 @@ def _deviation(
 def _blended(volume: VolumeConstraint, keys: Sequence[FloatArray]) -> Iterator[float]:
     """Yield the largest relative change of *volume* on each straight line between *keys*."""
     for one, other in itertools.pairwise(keys) if volume.has_volume else ():
-        c = volume_along_path(volume.extended(np.hstack([one, other - one])), volume.faces)
+        c = volume_along_path(volume.extended(np.hstack([one, other - one])), volume.parts)
         turns = np.roots([3.0 * c[3], 2.0 * c[2], c[1]])
         inner = turns.real[(np.abs(turns.imag) < 1e-9) & (turns.real > 0.0) & (turns.real < 1.0)]
         values = np.polyval(c[::-1], np.array([0.0, 1.0, *inner]))

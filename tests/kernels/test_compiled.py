@@ -46,11 +46,18 @@ from vtk_segdeform.io.polygons import (
     triangles_of,
 )
 from vtk_segdeform.kernels import dispatch, threads
-from vtk_segdeform.mesh import find_faults, intersections_of, mesh_of, self_intersections
+from vtk_segdeform.mesh import (
+    find_faults,
+    intersections_of,
+    mesh_of,
+    nearest_on_triangles,
+    self_intersections,
+)
 from vtk_segdeform.regions.regions import Regions
-from vtk_segdeform.solver.exact_volume import moved_along, values_along
-from vtk_segdeform.solver.other_measures import CentroidConstraint, area_of
-from vtk_segdeform.solver.volume_constraints import region_volumes, violations
+from vtk_segdeform.solver.exact_volume import moved_along
+from vtk_segdeform.solver.other_measures import CentroidConstraint, area_of, centroid_of
+from vtk_segdeform.solver.volume_constraints import region_volumes
+from vtk_segdeform.solver.volumes import values_along, violations
 from vtk_segdeform.subspace.subspace import Subspace, _add_product
 
 RNG = np.random.default_rng(2)
@@ -288,7 +295,8 @@ def test_motions_along_directions_of_several_volumes_agree(twin, monkeypatch, rn
     paths = np.hstack([mesh.vertices, rng.normal(size=(mesh.n_vertices, 9))])
     x = mesh.vertices + 0.01 * rng.normal(size=mesh.vertices.shape)
     area = area_of(mesh.vertices, mesh.faces)
-    for some in (constraints, (area, *constraints), (area,)):
+    centroid = centroid_of(constraints[0], mesh.vertices, 1, diagonal=mesh.diagonal)
+    for some in (constraints, (area, centroid, *constraints), (area,)):
         for call in (
             lambda some=some: values_along(some, np.hstack([x, paths[:, 3:]]))[0],
             lambda some=some: values_along(some, np.hstack([x, paths[:, 3:]]))[1],
@@ -551,3 +559,19 @@ def test_collapses_to_needles_are_refused_alike(twin, monkeypatch):
     quick, slow = twin(lambda: _valid(surface, to))
     assert_array_equal(quick, slow)
     assert 0 < quick.sum() < len(quick)
+
+
+def test_nearest_points_of_triangles_agree_and_none_is_nearer(twin, rng, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.COMPILED", 0)
+    corners, points = rng.normal(size=(300, 3, 3)), 2.0 * rng.normal(size=(300, 3))
+    corners[:20, 2] = 0.5 * (corners[:20, 0] + corners[:20, 1])  # a line
+    corners[20:25] = corners[20:25, :1]  # a point
+    points[30:60] = corners[30:60].mean(axis=1)
+    (quick, away), (plain, expected) = twin(lambda: nearest_on_triangles(corners, points))
+    assert_allclose(away, expected, atol=1e-12)
+    assert_allclose(quick.sum(axis=1), 1.0)
+    at, other = (np.einsum("kc,kcj->kj", shares, corners) for shares in (quick, plain))
+    assert_allclose(at, other, atol=1e-9)
+    assert_allclose(np.linalg.norm(at - points, axis=1), away, atol=1e-9)
+    others = np.einsum("skc,kcj->skj", rng.dirichlet(np.ones(3), (400, 300)), corners)
+    assert (np.linalg.norm(others - points, axis=2).min(axis=0) >= away - 1e-12).all()

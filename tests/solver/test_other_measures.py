@@ -91,7 +91,8 @@ def test_flat_triangles_have_no_slope():
 
 
 @pytest.mark.parametrize("mesh", [BODY, open_box()], ids=["closed", "under a lid"])
-def test_the_hessian_is_the_derivative_of_the_gradient(mesh, rng):
+def test_the_hessian_is_the_derivative_of_the_gradient(mesh, rng, monkeypatch):
+    monkeypatch.setattr("vtk_segdeform.sizes.VOLUME_HESSIAN_POINTS", mesh.n_vertices)
     n, m = mesh.n_vertices, 6
     block = rng.dirichlet(np.ones(m), n)
     surface = Subspace(n, (np.arange(n),), (block,))

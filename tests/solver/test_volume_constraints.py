@@ -18,11 +18,10 @@ from vtk_segdeform.solver.exact_volume import steps_to_volume
 from vtk_segdeform.solver.volume_constraints import (
     VolumeConstraint,
     _labels_of_faces,
-    gradients,
     region_volumes,
     total_volume,
-    violations,
 )
+from vtk_segdeform.solver.volumes import gradients, violations
 
 SCENE = sausage(3)
 MESH = SCENE.mesh
@@ -183,7 +182,7 @@ def test_derivatives_under_lids_are_exact(name):
         )
         assert_allclose(far / near, 4.0, rtol=0.1)
         # The volume is a cubic along d, and a step along it is exact.
-        cubic = volume_along_path(each.extended(np.hstack([x, d])), each.faces)
+        cubic = volume_along_path(each.extended(np.hstack([x, d])), each.parts)
         for t in (-1.5, 0.7, 2.0):
             value = each.violation(x + t * d) + each.target
             assert_allclose(np.polyval(cubic[::-1], t), value, atol=1e-12 * size)

@@ -247,9 +247,10 @@ class Constraints:
         """Return the volumes of *x* (n, 3) that have goals."""
         x = self.problem.frame.about_origin(x)
         volumes = self.preserved.constraints
-        now = {each.name: each.target + each.violation(x) for each in volumes if each.name}
-        changes = {each.name: each.change(x) for each in volumes if each.name}
-        return HeldVolumes(now, changes, max((each.missed(x) for each in volumes), default=0.0))
+        off = list(zip(volumes, volumes.relative(x).tolist(), strict=True))
+        now = {each.name: each.target + by * each.size for each, by in off if each.name}
+        changes = {each.name: each.change(by) for each, by in off if each.name}
+        return HeldVolumes(now, changes, max((each.missed(by) for each, by in off), default=0.0))
 
     @cached_property
     def unmoved(self) -> IntArray:

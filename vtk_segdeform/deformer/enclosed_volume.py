@@ -20,6 +20,7 @@ from ..mesh import Mesh
 from ..solver import (
     Bodies,
     ScaledSurface,
+    Together,
     VolumeConstraint,
     Volumes,
     area_of,
@@ -43,7 +44,7 @@ _NO_PARTS: Mapping[str, BoolArray] = MappingProxyType({})
 class Preserved(NamedTuple):
     """The volumes to preserve; the same for all handles on the same bodies."""
 
-    constraints: tuple[VolumeConstraint, ...]
+    constraints: Together
     """On the mesh."""
     volumes: Volumes
     """On the surface of the steps."""
@@ -116,7 +117,7 @@ class EnclosedVolume:
         cages = problem.rest_cages
         if goals and (grown := grown_cages(problem, volumes)) is not cages:
             problem, cages = problem.grown(grown), grown
-        found = Preserved(preserved, volumes, scaled, problem, cages)
+        found = Preserved(Together(preserved), volumes, scaled, problem, cages)
         for old in [old for old in self._known if goals and old[1]]:
             del self._known[old]  # one set of goals is enough
         self._known[key] = found

@@ -84,13 +84,13 @@ def finish_of(
         if is_carried.any() and found.vertices is not start:
             followed = _followed(constraints.carrying, volumes, pose, found.vertices)
             found = replace(found, vertices=followed)
-        off = [each.missed(found.vertices) for each in preserved]
-        missed = {k for k, by in enumerate(off) if by > VOLUME_MET} - active
+        off = preserved.missed(found.vertices)
+        missed = set(np.flatnonzero(off > VOLUME_MET).tolist()) - active
         if not missed:
             break
         active |= missed
     # Without enough free vertices exact handles and exact volumes exclude each other.
-    return replace(found, vertices=start) if max(off, default=0.0) > VOLUME_MET else found
+    return replace(found, vertices=start) if (off > VOLUME_MET).any() else found
 
 
 def _mean_with_image(path: Path, mirror: Mirror, x: FloatArray) -> FloatArray:

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import FloatArray
-from ..solver import Anchors, GaussNewton, Volumes, position_term
+from ..solver import Anchors, GaussNewton, Together, Volumes, position_term
 from .problem import Problem
 
 VOLUME_LEG = 0.05
@@ -48,6 +48,6 @@ def grown_cages(problem: Problem, volumes: Volumes) -> FloatArray:
             replace(each, target=each.target / share * (1.0 + leg / legs * (share - 1.0)))
             for each, share in zip(volumes.constraints, shares, strict=True)
         )
-        solver.preserve(replace(volumes, constraints=tuple(now)))
+        solver.preserve(replace(volumes, constraints=Together(now)))
         p = solver.landed(p)
     return p

@@ -17,6 +17,7 @@ from ..solver import (
     SolverOptions,
     SolverResult,
     Status,
+    Together,
     VolumeConstraint,
     are_met,
     moved_along,
@@ -71,8 +72,8 @@ class Path:
                 path._continue_from(p)
             return path
         path.active = tuple(k for k, each in enumerate(preserved) if not each.bound)
-        off = () if is_rest and not constraints.has_goals else path._missed()
-        path.is_on_volumes = not any(off)
+        if not is_rest or constraints.has_goals:
+            path.is_on_volumes = not (preserved.missed(path._problem.map(p)) > _MISSED).any()
         if len(path.active) < len(preserved) or not path.is_on_volumes:
             path._continue_from(p)
         return path
@@ -145,14 +146,11 @@ class Path:
         return self.active if scaled is None else tuple(range(len(preserved)))
 
     @property
-    def _preserved(self) -> list[VolumeConstraint]:
+    def _preserved(self) -> Together:
         """The volumes that hold."""
-        return [self.constraints.preserved.constraints[k] for k in self.active_volumes]
-
-    def _missed(self) -> list[bool]:
-        """Return which volumes the pose misses."""
-        x = self._problem.map(self.p)
-        return [each.missed(x) > _MISSED for each in self.constraints.preserved.constraints]
+        every = self.constraints.preserved.constraints
+        active = self.active_volumes
+        return every if len(active) == len(every) else Together(every[k] for k in active)
 
     def change_volumes(self, options: SolverOptions) -> int:
         """Change the volumes to their targets, in legs; return the number of steps."""
@@ -160,10 +158,10 @@ class Path:
             return 0
         preserved, volumes, *_ = self.constraints.preserved
         x = self._problem.map(self.p)
-        missed = {k for k, each in enumerate(preserved) if each.missed(x) > _MISSED}
+        missed = np.flatnonzero(preserved.missed(x) > _MISSED).tolist()
         self.active = tuple(sorted({*self.active, *missed}))
         begin = volumes.among(self.active).preserved_at(self.p)
-        off = [preserved[k].relative(x) for k in self.active]
+        off = preserved.relative(x)[list(self.active)].tolist()
         farthest = max(abs(math.log1p(each)) if each > -1.0 else 1.0 for each in off)
         legs, steps = math.ceil(farthest / VOLUME_LEG), 0
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
@@ -182,7 +180,7 @@ class Path:
     def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> None:
         """Let the active volumes have the targets of *constraints*, and move the cages there."""
         volumes = self.constraints.preserved.volumes.among(self.active)
-        self.solver.preserve(replace(volumes, constraints=tuple(constraints)))
+        self.solver.preserve(replace(volumes, constraints=Together(constraints)))
         self.p = self.end = self.solver.landed(self.end)
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
@@ -193,11 +191,8 @@ class Path:
         if not self.constraints.n_bounds:
             return False
         preserved = self.constraints.preserved.constraints
-        missed = {
-            k
-            for k, each in enumerate(preserved)
-            if k not in self.active and each.missed(x) > _MISSED
-        }
+        off = preserved.relative(x).tolist()
+        missed = set(np.flatnonzero(preserved.missed(x) > _MISSED).tolist()) - set(self.active)
         multipliers = self.solver.multipliers(self.end, self.constraints.places(goal))
         slack = {
             k
@@ -211,7 +206,7 @@ class Path:
         self.active = tuple(sorted({*self.active, *missed} - slack))
         now = self.constraints.preserved.volumes.among(self.active).preserved_at(self.end)
         self._set_volumes(
-            last.get(k, replace(each, target=each.nearer(preserved[k].relative(x))))
+            last.get(k, replace(each, target=each.nearer(off[k])))
             for k, each in zip(self.active, now.constraints, strict=True)
         )
         return True

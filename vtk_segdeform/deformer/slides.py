@@ -167,8 +167,9 @@ class SurfaceTrack:
         faces, point = self._faces_at[self._starts[near][each] + k], each // _NEIGHBOURS
         corners = self._corners[faces]
         shares, away = nearest_on_triangles(corners, x[point])
-        order = np.lexsort((away, point))
-        best = order[np.diff(point[order], prepend=-1) != 0]
+        least = np.minimum.reduceat(away, np.flatnonzero(np.diff(point, prepend=-1)))
+        best = np.flatnonzero(away == least[point])
+        best = best[np.diff(point[best], prepend=-1) != 0]
         nearest = np.einsum("kc,kcj->kj", shares[best], corners[best])
         normals = np.einsum("kc,kcj->kj", shares[best], self._normals[faces[best]])
         normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]

@@ -114,7 +114,7 @@ class SpringBody:
         for k in stiffness:
             pulls = np.full(len(which), k * problem.energy.scale / len(which))
             term = PositionTerm(rows, own, pulls, anchors=loose)
-            solver = GaussNewton(problem.energy, term, Volumes(problem.subspace, ()))
+            solver = GaussNewton(problem.energy, term, Volumes(problem.subspace))
             p = solver.minimise(p, targets, _STEPS).p
             yield SpringPose(problem, p)
 

@@ -64,6 +64,7 @@ from .ties import principal_axes, tie_breakers
 from .turned_over import turned_over
 from .up_axis import guess_up_axis
 from .volume import (
+    Parts,
     area,
     area_gradient,
     area_slopes_along,
@@ -76,7 +77,6 @@ from .volume import (
     volume_along,
     volume_along_path,
     volume_gradient,
-    volume_gradients,
     volume_slopes_along,
 )
 
@@ -90,6 +90,7 @@ __all__ = [
     "Lids",
     "LocalVolume",
     "NormalTransport",
+    "Parts",
     "VertexNormals",
     "area",
     "area_gradient",
@@ -139,7 +140,6 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
-    "volume_gradients",
     "volume_slopes_along",
     "volume_summary",
     "voronoi_cells",

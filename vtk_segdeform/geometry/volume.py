@@ -22,31 +22,76 @@ its corners would lose three digits.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..freezing import Frozen
 from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs
 from ..mesh import cross_rows
 
 _FACES_PER_SUM = 4096  # partial sums are fixed, so that results do not depend on threads
 
 
+@dataclass(frozen=True, eq=False)
+class Parts(Frozen):
+    """Faces of c parts of a surface, part after part; sums over them are made together.
+
+    The faces are in blocks, each in one part, whose partial sums do not depend on threads.
+    """
+
+    faces: IntArray  # (m, 3)
+    begins: IntArray  # (b + 1,), of the blocks among the faces, and the end
+    firsts: IntArray  # (c,), the first block of each part
+
+    @classmethod
+    def of(cls, parts: Sequence[IntArray]) -> Parts:
+        """Return the *parts*, (m_k, 3) each."""
+        counts = [max(-(-len(faces) // _FACES_PER_SUM), 1) for faces in parts]
+        ends = np.cumsum([len(faces) for faces in parts])
+        starts = [
+            end - len(faces) + _FACES_PER_SUM * np.arange(count)
+            for faces, end, count in zip(parts, ends, counts, strict=True)
+        ]
+        faces = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return cls(faces, np.append(np.concatenate(starts), len(faces)), _starts(counts))
+
+    def sums(self, kernel: Any, x: FloatArray, out: FloatArray) -> FloatArray:
+        """Return the sums (c, ...) of a *kernel* over points *x*; *out* (b, ...) has a block's."""
+        arguments = inputs(x, self.faces, self.begins)
+        in_parallel(
+            lambda first, last: kernel(*arguments, out, first, last),
+            len(out),
+            ROWS_AT_ONCE // _FACES_PER_SUM,
+        )
+        if len(self.firsts) == 1:  # numpy adds them pairwise
+            return np.asarray(out.sum(axis=0, keepdims=True))
+        return np.asarray(np.add.reduceat(out, self.firsts))
+
+    def __iter__(self) -> Iterator[IntArray]:
+        """Yield the faces of each part, (m_k, 3)."""
+        ends = self.begins[np.append(self.firsts[1:], len(self.begins) - 1)]
+        for start, end in zip(self.begins[self.firsts], ends, strict=True):
+            yield self.faces[start:end]
+
+
+def _starts(counts: Sequence[int]) -> IntArray:
+    return np.cumsum([0, *counts[:-1]])
+
+
 def signed_volume(vertices: FloatArray, faces: IntArray) -> float:
     """Return the enclosed volume (8) of *vertices* (n, 3), *faces* (m, 3); positive if outward."""
-    return float(signed_volumes(vertices, [faces])[0])
+    return float(signed_volumes(vertices, Parts.of([faces]))[0])
 
 
-def signed_volumes(vertices: FloatArray, parts: Sequence[IntArray]) -> FloatArray:
-    """Return the volume of each of *parts*, (c,): faces (m, 3) of the same *vertices* (n, 3)."""
-    if kernels := compiled_kernels(sum(map(len, parts))):
-        sums = (
-            _by_blocks(kernels.volume_sums, inputs(vertices, faces), np.empty(_blocks(faces)))
-            for faces in parts
-        )
-        return np.array([each.sum() / 6.0 for each in sums])
+def signed_volumes(vertices: FloatArray, parts: Parts) -> FloatArray:
+    """Return the volume of each of *parts*, (c,), over the same *vertices* (n, 3)."""
+    if kernels := compiled_kernels(len(parts.faces)):
+        out = np.empty(len(parts.begins) - 1)
+        return parts.sums(kernels.volume_sums, vertices, out) / 6.0
     points = vertices - vertices[0]
     corners = (corner_and_edges(points, faces) for faces in parts)
     return np.array([np.einsum("ij,ij", a, cross_rows(e, f)) / 6.0 for a, e, f in corners])
@@ -54,39 +99,29 @@ def signed_volumes(vertices: FloatArray, parts: Sequence[IntArray]) -> FloatArra
 
 def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return dV/dx, (n, 3): the entries of J_g in eq. (12), one row per vertex."""
-    return volume_gradients(vertices, [faces])[0]
-
-
-def volume_gradients(vertices: FloatArray, parts: Sequence[IntArray]) -> list[FloatArray]:
-    """Return dV/dx, (n, 3), for the volume of each of *parts*."""
-    found = []
-    kernels = compiled_kernels(sum(map(len, parts)))
-    for faces in parts:
-        gradient = np.zeros(vertices.shape)
-        if kernels:
-            kernels.volume_gradient(*inputs(vertices, faces), gradient)
-        else:
-            _, e, f = corner_and_edges(vertices, faces)
-            normals = cross_rows(e, f) / 6.0  # on a closed mesh, in sum b x c, c x a, a x b
-            for axis in range(3):
-                column = np.repeat(normals[:, axis], 3)
-                gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
-        found.append(gradient)
-    return found
+    gradient = np.zeros(vertices.shape)
+    if kernels := compiled_kernels(len(faces)):
+        kernels.volume_gradient(*inputs(vertices, faces), gradient)
+        return gradient
+    _, e, f = corner_and_edges(vertices, faces)
+    normals = cross_rows(e, f) / 6.0  # on a closed mesh, in sum b x c, c x a, a x b
+    for axis in range(3):
+        column = np.repeat(normals[:, axis], 3)
+        gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
+    return gradient
 
 
 def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -> FloatArray:
     """Return (c0, c1, c2, c3) with V(vertices + t direction) = c0 + c1 t + c2 t^2 + c3 t^3."""
-    return volume_along_path(np.hstack([vertices, direction]), faces)
+    return volume_along_path(np.hstack([vertices, direction]), Parts.of([faces]))
 
 
-def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
-    """Return `volume_along` of *path* (n, 6), vertices and direction side by side."""
+def volume_along_path(path: FloatArray, parts: Parts) -> FloatArray:
+    """Return `volume_along` of *path* (n, 6), vertices and direction side by side, for one part."""
+    faces = parts.faces
     if kernels := compiled_kernels(len(faces)):
-        sums = _by_blocks(
-            kernels.volume_along_sums, inputs(path, faces), np.empty((_blocks(faces), 4))
-        )
-        return np.asarray(sums.sum(axis=0) / 6.0)
+        sums = parts.sums(kernels.volume_along_sums, path, np.empty((len(parts.begins) - 1, 4)))
+        return np.asarray(sums[0] / 6.0)
     vertices, direction = path[:, :3], path[:, 3:]
     a, e, f = corner_and_edges(vertices - vertices[0], faces)
     u, v, w = corner_and_edges(direction - direction[0], faces)
@@ -99,15 +134,16 @@ def volume_along_path(path: FloatArray, faces: IntArray) -> FloatArray:
     return np.array([c0, c1, c2, c3]) / 6.0
 
 
-def volume_slopes_along(paths: FloatArray, faces: IntArray) -> FloatArray:
-    """Return V, and its derivative along each direction of *paths*, (1 + d,).
+def volume_slopes_along(paths: FloatArray, parts: Parts) -> FloatArray:
+    """Return V of each of *parts*, and its derivative along each direction of *paths*, (c, 1 + d).
 
     *paths* (n, 3 + 3 d) has the vertices and their d directions side by side.
     """
-    if kernels := compiled_kernels(len(faces) + paths.size // 3):
-        return _slopes(kernels.volume_slopes, paths, faces) / 6.0
+    if kernels := compiled_kernels(len(parts.faces) + paths.size // 3):
+        return _slopes(kernels.volume_slopes, paths, parts) / 6.0
     x = paths[:, :3]
-    return np.array([signed_volume(x, faces), *slopes_of(volume_gradient(x, faces), paths)])
+    slopes = [slopes_of(volume_gradient(x, faces), paths) for faces in parts]
+    return np.column_stack([signed_volumes(x, parts), slopes])
 
 
 def area(x: FloatArray, faces: IntArray) -> float:
@@ -135,7 +171,7 @@ def area_gradient(x: FloatArray, faces: IntArray) -> FloatArray:
 def area_slopes_along(paths: FloatArray, faces: IntArray) -> FloatArray:
     """Return the area, and its derivatives as `volume_slopes_along`, (1 + d,)."""
     if kernels := compiled_kernels(len(faces) + paths.size // 3):
-        return _slopes(kernels.area_slopes, paths, faces) / 2.0
+        return np.asarray(_slopes(kernels.area_slopes, paths, Parts.of([faces]))[0] / 2.0)
     _, e, f = corner_and_edges(paths[:, :3], faces)
     total = 0.5 * np.linalg.norm(cross_rows(e, f), axis=1).sum()
     return np.array([total, *slopes_of(area_gradient(paths[:, :3], faces), paths)])
@@ -147,10 +183,9 @@ def slopes_of(gradient: FloatArray, paths: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ia,ida->d", gradient, directions))
 
 
-def _slopes(kernel: Any, paths: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the sums of a *kernel* over all faces."""
-    out = np.empty((_blocks(faces), paths.shape[1] // 3))
-    return np.asarray(_by_blocks(kernel, inputs(paths, faces), out).sum(axis=0))
+def _slopes(kernel: Any, paths: FloatArray, parts: Parts) -> FloatArray:
+    """Return the sums of a *kernel* over the faces of each part, (c, 1 + d)."""
+    return parts.sums(kernel, paths, np.empty((len(parts.begins) - 1, paths.shape[1] // 3)))
 
 
 def outer_components(x: FloatArray, component: IntArray, volumes: FloatArray) -> IntArray:
@@ -227,17 +262,3 @@ def corner_and_edges(
     """Return the first corner a of each face, b - a and c - a, (m, 3) each."""
     a, b, c = (np.take(points, corner, axis=0) for corner in faces.T)
     return a, b - a, c - a
-
-
-def _blocks(faces: IntArray) -> int:
-    return -(-len(faces) // _FACES_PER_SUM)
-
-
-def _by_blocks(kernel: Any, arguments: tuple[FloatArray | IntArray, ...], out: FloatArray) -> Any:
-    """Return *out* with one partial sum per block of faces; numpy adds them pairwise."""
-    in_parallel(
-        lambda first, last: kernel(*arguments, out, _FACES_PER_SUM, first, last),
-        len(out),
-        ROWS_AT_ONCE // _FACES_PER_SUM,
-    )
-    return out

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray
+from ..kernels import compiled_kernels, inputs
 from .mesh import Mesh
 
 _ROUNDING = 1e-9  # smaller shares are rounding: the point is on an edge, or a vertex
@@ -82,7 +83,12 @@ def nearest_on_triangles(corners: FloatArray, points: FloatArray) -> tuple[Float
     From *points* (k, 3), or one (3,).  The nearest point is on one of the three edges, unless the
     point is above the triangle.
     """
-    a = corners - np.reshape(points, (-1, 1, 3))
+    points = np.broadcast_to(points, (len(corners), 3))
+    if kernels := compiled_kernels(len(corners)):
+        shares, away = np.zeros((len(corners), 3)), np.empty(len(corners))
+        kernels.nearest_on_triangles(*inputs(corners, points), shares, away)
+        return shares, away
+    a = corners - points[:, None]
     along = np.roll(a, -1, axis=1) - a  # from each corner to the next one
     squares = np.einsum("kcj,kcj->kc", along, along)
     t = -np.einsum("kcj,kcj->kc", a, along) / np.where(squares > 0.0, squares, 1.0)

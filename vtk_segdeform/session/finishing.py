@@ -37,7 +37,7 @@ from ..errors import SessionError
 from ..geometry import turned_over
 from ..mesh import Mesh, new_crossings
 from ..progress import Progress
-from ..solver import Solution, Status, errors_at
+from ..solver import Solution, Status, Together, errors_at
 from .handles import stacked
 from .poses import VOLUME_TOLERANCE, Poses
 from .pulls import localised
@@ -198,13 +198,18 @@ def moved_on(poses: Poses, state: State, after: Cages) -> Finished:
         changed = shifts + np.where(shifted[:, None], change[known], 0.0)
         if np.abs(changed - shifts).max() > _TURNED * np.ptp(x, axis=0).max():
             shifts = changed  # else the targets of the cages stay, so that they converge
-    preserved = poses.constrained(state).preserved_volumes
-    constraints = tuple(v for v in preserved if not v.bound or v.missed(moved) > VOLUME_TOLERANCE)
+    preserved = Together(poses.constrained(state).preserved_volumes)
+    off = preserved.missed(moved)
+    constraints = Together(
+        each
+        for each, by in zip(preserved, off, strict=True)
+        if not each.bound or by > VOLUME_TOLERANCE
+    )
     if constraints:
         tried, exact = [], []
         for stays in (held, fixed, held[:0]):
             tried.append(on_volumes(moved, constraints, stays))
-            if max(each.missed(tried[-1]) for each in constraints) <= VOLUME_TOLERANCE:
+            if constraints.missed(tried[-1]).max() <= VOLUME_TOLERANCE:
                 exact.append(tried[-1])
                 if np.abs(exact[-1] - moved).max() <= _GIVES * np.ptp(moved, axis=0).max():
                     exact = exact[-1:]

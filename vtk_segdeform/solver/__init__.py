@@ -5,6 +5,7 @@ The files, in reading order:
     newton                  the iteration of both levels, eqs. (11) to (14) and (21)
     gauss_newton            its objective over the cages: E, d, G and H
     volume_constraints      volume of the mesh or of each region, eqs. (8) and (9)
+    volumes                 constraints together, and as functions of the cages
     other_measures          areas and centroids
     bodies                  the volume of each body
     position_constraints    fixed vertices and handles, eqs. (6) and (7)
@@ -49,14 +50,12 @@ from .stationary import Curvature, StationaryPoint, half_gradient, off_volumes, 
 from .terms import Term
 from .volume_constraints import (
     VolumeConstraint,
-    Volumes,
-    gradients,
     region_volumes,
     total_volume,
-    violations,
     volumes_by_label,
     with_same_points,
 )
+from .volumes import Together, Volumes, gradients, violations
 from .waypoints import LONGEST_MOVE, waypoints
 
 __all__ = [
@@ -83,6 +82,7 @@ __all__ = [
     "Status",
     "Step",
     "Term",
+    "Together",
     "Track",
     "VolumeConstraint",
     "Volumes",

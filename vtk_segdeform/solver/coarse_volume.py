@@ -29,7 +29,8 @@ from ..mesh import Mesh
 from ..progress import Progress
 from ..subspace import Subspace
 from .other_measures import AreaConstraint, CentroidConstraint
-from .volume_constraints import VolumeConstraint, Volumes
+from .volume_constraints import VolumeConstraint
+from .volumes import Together, Volumes
 
 _SIDES = 0.1  # of the mesh's size: distance added between surfaces that face opposite ways
 
@@ -97,7 +98,7 @@ class CoarseVolume:
         if self.cells is not None and self.shares is not None:
             constraints = _over_cells(constraints, self.cells)
             points = _matrix(self.cells, self.shares) @ rest
-        preserved = tuple(each.at_points(points, unit) for each in constraints)
+        preserved = Together(each.at_points(points, unit) for each in constraints)
         of_few = _VolumeHessian(self.surface, preserved, points)
         return Volumes(self.surface, preserved, of_few if of_few.curved else None)
 
@@ -145,14 +146,16 @@ class _VolumeHessian(Frozen):
 
         Also the constraint of each of these faces.
         Neighbours that face the same way are merged, so that thin parts keep both their sides.  Of
-        several volumes all points are used: a mean over two bodies, with multipliers that differ by
+        several bodies all points are used: a mean over two bodies, with multipliers that differ by
         many orders of magnitude, made H indefinite, and a frame took 3 to 8 steps instead of 1.
         """
         n = len(self.points)
         cells, shares = np.arange(n), np.ones(n)
         volumes = [self.constraints[k] for k in self.curved]
-        if n > sizes.VOLUME_HESSIAN_POINTS and len(volumes) == 1 and volumes[0].is_cubic:
-            outward = volumes[0].gradient(self.points)
+        body = VolumeConstraint(volumes[0].faces, 0.0, volumes[0].extension)
+        is_one = all(np.array_equal(each.faces, body.faces) for each in volumes)
+        if n > sizes.VOLUME_HESSIAN_POINTS and is_one:
+            outward = body.gradient(self.points)
             areas = np.linalg.norm(outward, axis=1) + np.finfo(float).tiny
             places = np.hstack([self.points, _SIDES * outward / areas[:, None]])
             cells = cluster_positions(places, sizes.VOLUME_HESSIAN_POINTS, rounds=3, seeded=False)

@@ -20,7 +20,8 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..subspace import GPUError, GPUSurface, Subspace, gpu_arrays
-from .volume_constraints import VolumeConstraint, violations, with_points
+from .volume_constraints import VolumeConstraint
+from .volumes import together, values_along, violations
 
 _log = logging.getLogger(__name__)
 _NEWTON_STEPS = 8
@@ -41,8 +42,7 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
     """
     if len(constraints) == 1 and constraints[0].is_cubic:
         return np.array([constraints[0].exact_step(paths)])
-    all_cubic = all(each.is_cubic for each in constraints)
-    t = np.zeros(len(constraints))
+    constraints, t = together(constraints), np.zeros(len(constraints))
     units = _units(constraints)
     here, before, inverse = paths[:, :3], np.inf, None
     best, least = t.copy(), np.inf  # areas and centroids that cannot be met lead far away
@@ -67,10 +67,11 @@ def steps_to_volume(constraints: Sequence[VolumeConstraint], paths: FloatArray) 
             both = scale[:, None] * scale
             inverse = np.linalg.pinv(jacobian / both, rcond=1e-12) / both
         t -= inverse @ g
-        if all_cubic and before < np.inf and _RISE * error * error <= _EXACT * before:
-            break  # the next error is less than that
+        if before < np.inf and _RISE * error * error <= _EXACT * before:
+            best = t  # the next error is less than that
+            break
         here, before = moved_along(paths, t), error
-    return t if all_cubic else best
+    return best
 
 
 def are_met(constraints: Sequence[VolumeConstraint], x: FloatArray) -> bool:
@@ -103,17 +104,6 @@ def moved_along(paths: FloatArray, t: FloatArray) -> FloatArray:
     return x
 
 
-def values_along(
-    constraints: Sequence[VolumeConstraint], paths: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return g (c,) at *paths* (n, 3 + 3 d), and its derivative along each direction, (c, d)."""
-    found = np.empty((len(constraints), paths.shape[1] // 3))
-    for some, points in with_points(constraints, paths):
-        for k in some:
-            found[k] = constraints[k].along(points)
-    return found[:, 0] - [each.target for each in constraints], found[:, 1:]
-
-
 def scale_to_volume(constraint: VolumeConstraint, x: FloatArray, centre: FloatArray) -> float:
     """Scale *x* (n, 3) in place about *centre* (3,) onto the volume; return the factor.
 
@@ -141,8 +131,7 @@ def scale_bodies(
     constraints: Sequence[VolumeConstraint], x: FloatArray, body: IntArray, centres: FloatArray
 ) -> FloatArray:
     """Do the same for each *body* (n,) of *x* about its own of *centres* (c, 3); return (c,)."""
-    targets = np.array([constraint.target for constraint in constraints])
-    ratios = violations(constraints, x) / np.where(targets != 0.0, targets, np.inf)
+    ratios = together(constraints).relative(x)
     scales = np.cbrt(1.0 / (1.0 + np.where(ratios > -1.0, ratios, 0.0)))
     shifts = (1.0 - scales)[:, None] * centres
 

@@ -75,7 +75,7 @@ from .newton import Step, constrained_step, minimise
 from .position_constraints import PositionTerm, TargetTerm
 from .solution import Status
 from .terms import NO_SURFACE, Term, hessian_of, share_of_step, with_terms
-from .volume_constraints import Volumes, gradients, violations
+from .volumes import Volumes, violations
 
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
@@ -315,11 +315,10 @@ class GaussNewton:
 
     def evaluate(self, p: FloatArray, x: FloatArray) -> _Iterate:
         """Fit the local rotations; return E, d and G at *p*, where the volumes' surface is *x*."""
-        rows = [self.volumes.surface.adjoint(g) for g in gradients(self.volumes.constraints, x)]
         energy, slope = self.energy.value_and_slope(p)
         value, slope = with_terms(self.terms, p, x, value=energy, slope=slope)
         is_active = value != energy or any(term.is_always_active for term in self.terms)
-        here = _Iterate(p, x, value, slope, tuple(rows), value, slope, is_active)
+        here = _Iterate(p, x, value, slope, self.volumes.rows(x), value, slope, is_active)
         return here.toward(self._term)
 
     def compliance(self, rows: FloatArray) -> FloatArray:
@@ -339,10 +338,7 @@ class GaussNewton:
         """Return cages *p* (m, 3) moved onto the volumes along Z, with the H of (21)."""
         if not self.volumes.constraints:
             return p
-        slopes = gradients(self.volumes.constraints, self._surface(p))
-        at, _ = self._on_volumes(
-            p, self.directions([self.volumes.surface.adjoint(g) for g in slopes])
-        )
+        at, _ = self._on_volumes(p, self.directions(self.volumes.rows(self._surface(p))))
         return at if np.isfinite(at).all() else p
 
     def multipliers(self, p: FloatArray, targets: FloatArray) -> FloatArray:

@@ -202,9 +202,9 @@ def constrained_step(
     h, *z = solve([-slope, *rows])  # -H^-1 d, and Z
     if not rows:
         return h, np.zeros(0), []
-    gh = np.array([np.vdot(row, h) for row in rows])  # -G H^-1 d
-    gz = np.array([[np.vdot(row, direction) for direction in z] for row in rows])
-    multipliers = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
-    for multiplier, direction in zip(multipliers, z, strict=True):
-        h -= multiplier * direction
+    across, along = np.reshape(rows, (len(rows), -1)), np.reshape(z, (len(z), -1))
+    gh, gz = across @ h.ravel(), across @ along.T  # -G H^-1 d, and G Z
+    found = np.linalg.lstsq(gz, g + gh, rcond=1e-12)[0]  # (G Z)^-1 (g - G H^-1 d)
+    multipliers = np.asarray(found, dtype=np.float64)
+    h -= (multipliers @ along).reshape(h.shape)
     return h, multipliers, z

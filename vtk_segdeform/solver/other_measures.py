@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -74,20 +75,18 @@ class CentroidConstraint(VolumeConstraint):
     def value(self, points: FloatArray) -> float:
         """Return C_a."""
         if kernels := compiled_kernels(len(self.faces)):
-            sums = np.empty(2)
-            kernels.moment_sums(*inputs(points, self.faces, np.array(self.axis)), sums)
-            return float(sums[1] / sums[0]) / 4.0 + self.origin
+            return float(self._moments(kernels, points)[0])
         volumes, means, _ = self._tetrahedra(points)
         return float(volumes @ means) / float(volumes.sum()) + self.origin
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Return dC_a/dx, (n, 3)."""
         if kernels := compiled_kernels(len(self.faces)):
-            given, sums = inputs(points, self.faces, np.array(self.axis)), np.empty(2)
-            kernels.moment_sums(*given, sums)
-            found = np.zeros(points.shape)
-            kernels.moment_gradient(*given, sums[1] / sums[0] / 4.0, found)
-            return np.asarray(found * (6.0 / sums[0]))
+            given, sums = inputs(points, self.faces, np.array(self.axis)), np.empty((2, 1))
+            kernels.moment_slopes(*given, sums)
+            (total, moment), found = sums[:, 0], np.zeros(points.shape)
+            kernels.moment_gradient(*given, moment / total / 4.0, found)
+            return np.asarray(found * (6.0 / total))
         volumes, means, corners = self._tetrahedra(points)
         total, a = float(volumes.sum()), np.array(self.axis)
         away = (means - float(volumes @ means) / total) / total
@@ -100,9 +99,19 @@ class CentroidConstraint(VolumeConstraint):
 
     def along(self, paths: FloatArray) -> FloatArray:
         """Return C_a, and its derivative along each direction, (1 + d,)."""
-        points = np.ascontiguousarray(paths[:, :3])
+        if kernels := compiled_kernels(len(self.faces)):
+            return self._moments(kernels, paths)
+        points = paths[:, :3]
         slopes = slopes_of(self.slope(points), paths)
         return np.array([self.value(points), *slopes])
+
+    def _moments(self, kernels: Any, paths: FloatArray) -> FloatArray:
+        """Return `along` by *kernels*."""
+        sums = np.empty((2, paths.shape[1] // 3))
+        kernels.moment_slopes(*inputs(paths, self.faces, np.array(self.axis)), sums)
+        (total, *of_total), (moment, *of_moment) = sums
+        slopes = np.array(of_moment) - moment / total * np.array(of_total)
+        return np.array([moment / total / 4.0 + self.origin, *(slopes / (4.0 * total))])
 
     def second_derivatives(
         self, points: FloatArray, rows: FloatArray
@@ -138,12 +147,12 @@ class CentroidConstraint(VolumeConstraint):
                 found[j, i] += a[other] * block.T
         return (means - centre) / total, found
 
-    def change(self, x: FloatArray) -> float:
-        """Return by how much it differs from that at rest, in diagonals."""
-        return self.shift + self.relative(x)
+    def change(self, off: float) -> float:
+        """Return by how much one that is *off* differs from that at rest, in diagonals."""
+        return self.shift + off
 
     def nearer(self, off: float) -> float:
-        """Return the target with which one that is *off*, relative to its size, would be met."""
+        """Return the target with which one that is *off* would be met."""
         return self.target - off * self.size
 
     def at_points(self, points: FloatArray, unit: float, /) -> CentroidConstraint:

@@ -26,7 +26,7 @@ from ..subspace import Subspace
 from .gauss_newton import GaussNewton
 from .other_measures import AreaConstraint, CentroidConstraint
 from .terms import hessian_of, with_terms
-from .volume_constraints import Volumes, gradients, violations
+from .volumes import Volumes, violations
 
 _AXES = ((0, 1, 2), (1, 2, 0), (2, 0, 1))  # a, b, c with eps_abc = 1
 
@@ -94,11 +94,9 @@ def half_gradient(solver: GaussNewton, p: FloatArray, places: FloatArray) -> Flo
     return slope + solver.positions.value_and_slope(p, places)[1]
 
 
-def rows_of(volumes: Volumes, p: FloatArray) -> list[FloatArray]:
+def rows_of(volumes: Volumes, p: FloatArray) -> tuple[FloatArray, ...]:
     """Return the rows of G at cages *p* (m, 3), (m, 3) each."""
-    return [
-        volumes.surface.adjoint(g) for g in gradients(volumes.constraints, _surface(volumes, p))
-    ]
+    return volumes.rows(_surface(volumes, p))
 
 
 def off_volumes(volumes: Volumes, p: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ run over the lids too.  Parts of the mesh that enclose nothing, such as sheets, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,17 +25,15 @@ from scipy.sparse import csgraph
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..geometry import (
     Lids,
+    Parts,
     lids_of,
     signed_volumes,
     step_to_volume,
     volume_along_path,
-    volume_gradients,
+    volume_gradient,
     volume_slopes_along,
 )
 from ..mesh import Mesh, edge_keys
-from ..subspace import Subspace
-
-Hessian = tuple[FloatArray, FloatArray | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +70,31 @@ class VolumeConstraint:
 
     def value(self, points: FloatArray) -> float:
         """Return V over all points, those of `extended`."""
-        return float(signed_volumes(points, [self.faces])[0])
+        return float(signed_volumes(points, self.parts)[0])
 
     def slope(self, points: FloatArray) -> FloatArray:
         """Return dV/dx of all points, (n, 3)."""
-        return volume_gradients(points, [self.faces])[0]
+        return volume_gradient(points, self.faces)
 
     def along(self, paths: FloatArray) -> FloatArray:
         """Return V, and its derivative along each direction of *paths* (n, 3 + 3 d), (1 + d,).
 
         *paths* has all points, those of `extended`, and the d directions beside them.
         """
-        return volume_slopes_along(paths, self.faces)
+        found: FloatArray = volume_slopes_along(paths, self.parts)[0]
+        return found
 
-    def change(self, x: FloatArray) -> float:
-        """Return by how much it differs from that at rest, as a share of it."""
-        return self.share * (1.0 + self.relative(x)) - 1.0
+    @cached_property
+    def parts(self) -> Parts:
+        """The faces, as they are summed over."""
+        return Parts.of([self.faces])
+
+    def change(self, off: float) -> float:
+        """Return by how much one that is *off* differs from that at rest, as a share of it."""
+        return self.share * (1.0 + off) - 1.0
 
     def nearer(self, off: float) -> float:
-        """Return the target with which one that is *off*, relative to its size, would be met."""
+        """Return the target with which one that is *off* would be met."""
         return self.target / (1.0 + off) if off > -1.0 else self.target
 
     def at_points(self, points: FloatArray, _: float, /) -> VolumeConstraint:
@@ -100,15 +104,14 @@ class VolumeConstraint:
 
     def violation(self, x: FloatArray) -> float:
         """Return g(x), in units of volume."""
-        return float(violations((self,), x)[0])
+        return self.value(self.extended(x)) - self.target
 
     def relative(self, x: FloatArray) -> float:
-        """Return g(x) / size; 0 if nothing is enclosed."""
+        """Return by how much x is off: g(x) / size; 0 if nothing is enclosed."""
         return self.violation(x) / self.size if self.size else 0.0
 
-    def missed(self, x: FloatArray) -> float:
-        """Return by how much x is off, as a share of *target*; 0 within the bound."""
-        off = self.relative(x)
+    def missed(self, off: float) -> float:
+        """Return how far it is from its bound if it is *off*; 0 within."""
         return 0.0 if off * self.bound > 0.0 else abs(off)
 
     @property
@@ -118,7 +121,8 @@ class VolumeConstraint:
 
     def gradient(self, x: FloatArray) -> FloatArray:
         """Return J_g, (n, 3): the derivative of g by each vertex."""
-        return gradients((self,), x)[0]
+        slope = self.slope(self.extended(x))
+        return slope if self.extension is None else np.asarray(self.extension.T @ slope)
 
     def hessian_halves(self, x: FloatArray, weights: FloatArray | None = None) -> sparse.csr_array:
         """Return U_c for each axis c, (3n, n) one below the other, at *x* (n, 3).
@@ -151,7 +155,7 @@ class VolumeConstraint:
 
     def exact_step(self, path: FloatArray) -> float:
         """Return the smallest t with g(x + t d) = 0, to rounding; x and d side by side (n, 6)."""
-        return step_to_volume(volume_along_path(self.extended(path), self.faces), self.target)
+        return step_to_volume(volume_along_path(self.extended(path), self.parts), self.target)
 
     def extended(self, x: FloatArray) -> FloatArray:
         """Return all points, relative to a vertex if points were added, to limit cancellation."""
@@ -190,77 +194,6 @@ def with_same_points(constraints: Sequence[VolumeConstraint]) -> tuple[VolumeCon
         faces = np.where(each.faces >= n, each.faces + shift, each.faces)
         found.append(replace(each, faces=faces, extension=extension))
     return tuple(found)
-
-
-def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatArray:
-    """Return g(x) of all *constraints*, (c,), in units of volume."""
-    found = np.empty(len(constraints))
-    for some, points in with_points(constraints, x):
-        cubic = [k for k in some if constraints[k].is_cubic]
-        found[cubic] = signed_volumes(points, [constraints[k].faces for k in cubic])
-        for k in set(some) - set(cubic):
-            found[k] = constraints[k].value(points)
-    return found - [each.target for each in constraints]
-
-
-def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
-    """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
-    found = [x] * len(constraints)
-    for some, points in with_points(constraints, x):
-        cubic = [k for k in some if constraints[k].is_cubic]
-        slopes = volume_gradients(points, [constraints[k].faces for k in cubic])
-        slopes += [constraints[k].slope(points) for k in some if k not in cubic]
-        extension = constraints[some[0]].extension
-        for k, slope in zip(sorted(some, key=lambda k: k not in cubic), slopes, strict=True):
-            found[k] = slope if extension is None else extension.T @ slope
-    return found
-
-
-def with_points(
-    constraints: Sequence[VolumeConstraint], x: FloatArray
-) -> Iterator[tuple[list[int], FloatArray]]:
-    """Yield the numbers of the constraints that share their points, and these, `extended`."""
-    others = list(range(len(constraints)))
-    while others:
-        first = constraints[others[0]]
-        some = [k for k in others if constraints[k].shares_points(first)]
-        others = [k for k in others if k not in some]
-        yield some, first.extended(x)
-
-
-@dataclass(frozen=True, eq=False)
-class Volumes:
-    """Constraints as functions of the cage vertices p, on the surface ``surface.map(p)``.
-
-    *hessian*, if given, is a function of p and the multipliers lambda.  It returns G (3, m, m) with
-    sum_k lambda_k d^2 g_k / dp_ia dp_jb = sum_c eps_abc G_cij for volumes, and for centroids the
-    rest (3m, 3m), axis by axis, or None.
-    """
-
-    surface: Subspace
-    constraints: tuple[VolumeConstraint, ...]
-    hessian: Callable[[FloatArray, FloatArray], Hessian] | None = None
-
-    def among(self, which: Sequence[int]) -> Volumes:
-        """Return those constraints only whose numbers are *which*, in ascending order."""
-        if len(which) == len(self.constraints):
-            return self
-        chosen = tuple(self.constraints[k] for k in which)
-        whole, count = self.hessian, len(self.constraints)
-
-        def hessian(p: FloatArray, multipliers: FloatArray) -> Hessian:
-            assert whole is not None
-            every = np.zeros(count)
-            every[list(which)] = multipliers
-            return whole(p, every)
-
-        return Volumes(self.surface, chosen, hessian if chosen and whole else None)
-
-    def preserved_at(self, p: FloatArray) -> Volumes:
-        """Return the constraints with the volumes at cage vertices *p* (m, 3) as their targets."""
-        x = self.surface.map(p)
-        now = (replace(each, target=each.target + each.violation(x)) for each in self.constraints)
-        return replace(self, constraints=tuple(now))
 
 
 def total_volume(mesh: Mesh, lids: Lids | None = None) -> VolumeConstraint:

@@ -1,6 +1,6 @@
 """Inner loops compiled by numba; each agrees with its equivalent in numpy up to rounding.
 
-    volumes         `volume.signed_volumes`, `volume.volume_along_path`, `volume.volume_gradients`,
+    volumes         `volume.signed_volumes`, `volume.volume_along_path`, `volume.volume_gradient`,
                     `volume.volume_slopes_along`, `exact_volume.moved_along`, `other_measures`
     products        `subspace.Subspace`
     interpolated    `interpolated.InterpolatedBlock`
@@ -14,6 +14,7 @@
     half_edges      `topology.HalfEdges`, `grouping.connected`, `grouping.first_equal_row`
     pairs           `contact.Contact`
     crossings       `near_faces.near_faces`
+    triangles       `surface_point.nearest_on_triangles`
     shells          `shells.shell_volumes`, `shells.shell_depths`
 
 They release the GIL and start no threads; `threads.in_parallel` runs several at a time.  Arguments
@@ -40,12 +41,13 @@ from .pairs import facing_pairs, opposite_pairs
 from .products import add_adjoint, add_product
 from .rotations import rotations
 from .shells import shell_extremes, shell_sums, shells_around
+from .triangles import nearest_on_triangles
 from .volumes import (
     area_gradient,
     area_slopes,
     determinants,
     moment_gradient,
-    moment_sums,
+    moment_slopes,
     move_along,
     volume_along_sums,
     volume_gradient,
@@ -77,8 +79,9 @@ __all__ = [
     "link",
     "may_meet",
     "moment_gradient",
-    "moment_sums",
+    "moment_slopes",
     "move_along",
+    "nearest_on_triangles",
     "number_trees",
     "one_fan_each",
     "opposite_pairs",

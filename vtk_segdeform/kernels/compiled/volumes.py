@@ -12,15 +12,18 @@ _compile_sums = kernel(fastmath={"reassoc"})
 
 
 @_compile_sums(
-    "const f8[:,:], const i8[:,:], f8[:], i8, i8, i8",
-    "const f8[:,:], const i4[:,:], f8[:], i8, i8, i8",
+    "const f8[:,:], const i8[:,:], const i8[:], f8[:], i8, i8",
+    "const f8[:,:], const i4[:,:], const i8[:], f8[:], i8, i8",
 )
-def volume_sums(x, faces, out, size, first, last):
-    """Put six times the volume of each block of *size* faces into *out*, blocks first..last."""
+def volume_sums(x, faces, begins, out, first, last):
+    """Put six times the volume of each block into *out*, blocks first..last.
+
+    The faces of a block are those from *begins*[block] on, up to the next one's.
+    """
     ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
     for block in range(first, last):
         total = 0.0
-        for f in range(block * size, min((block + 1) * size, len(faces))):
+        for f in range(begins[block], begins[block + 1]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
             ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -30,16 +33,16 @@ def volume_sums(x, faces, out, size, first, last):
 
 
 @_compile_sums(
-    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
-    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i4[:,:], const i8[:], f8[:,:], i8, i8",
+    "const f8[:,:], const i8[:,:], const i8[:], f8[:,:], i8, i8",
 )
-def volume_along_sums(x, faces, out, size, first, last):
+def volume_along_sums(x, faces, begins, out, first, last):
     """Put six times the four coefficients of each block into *out* (blocks, 4); *x* is (n, 6)."""
     ox, oy, oz = x[0, 0], x[0, 1], x[0, 2]
     px, py, pz = x[0, 3], x[0, 4], x[0, 5]
     for block in range(first, last):
         c0 = c1 = c2 = c3 = 0.0
-        for f in range(block * size, min((block + 1) * size, len(faces))):
+        for f in range(begins[block], begins[block + 1]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
             ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -85,24 +88,40 @@ def volume_gradient(x, faces, out):
 
 
 @_compile_sums(
-    "const f8[:,:], const i8[:,:], const f8[:], f8[:]",
-    "const f8[:,:], const i4[:,:], const f8[:], f8[:]",
+    "const f8[:,:], const i8[:,:], const f8[:], f8[:,:]",
+    "const f8[:,:], const i4[:,:], const f8[:], f8[:,:]",
 )
-def moment_sums(x, faces, a, out):
-    """Put the sums of det and of det a . (x_i + x_j + x_k) over all faces into *out* (2,)."""
-    total = moment = 0.0
+def moment_slopes(x, faces, a, out):
+    """Put the sums of det, and of det a . (x_i + x_j + x_k), over all faces into *out* (2, 1 + d).
+
+    And their slopes along the d directions that *x* (n, 3 + 3 d) has behind its first columns.
+    """
+    out[:, :] = 0.0
     for f in range(len(faces)):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-        gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
-        det = x[i, 0] * (ey * gz - ez * gy)
-        det += x[i, 1] * (ez * gx - ex * gz) + x[i, 2] * (ex * gy - ey * gx)
+        u, v, w = x[faces[f, 0]], x[faces[f, 1]], x[faces[f, 2]]
+        ex, ey, ez = v[0] - u[0], v[1] - u[1], v[2] - u[2]
+        gx, gy, gz = w[0] - u[0], w[1] - u[1], w[2] - u[2]
+        det = u[0] * (ey * gz - ez * gy) + u[1] * (ez * gx - ex * gz) + u[2] * (ex * gy - ey * gx)
         along = 0.0
         for c in range(3):
-            along += a[c] * (x[i, c] + x[j, c] + x[k, c])
-        total += det
-        moment += det * along
-    out[0], out[1] = total, moment
+            along += a[c] * (u[c] + v[c] + w[c])
+        out[0, 0] += det
+        out[1, 0] += det * along
+        if out.shape[1] == 1:
+            continue
+        lx, ly, lz = v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]
+        mx, my, mz = w[1] * u[2] - w[2] * u[1], w[2] * u[0] - w[0] * u[2], w[0] * u[1] - w[1] * u[0]
+        nx, ny, nz = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+        for k in range(1, out.shape[1]):
+            c = 3 * k
+            slope = u[c] * lx + u[c + 1] * ly + u[c + 2] * lz
+            slope += v[c] * mx + v[c + 1] * my + v[c + 2] * mz
+            slope += w[c] * nx + w[c + 1] * ny + w[c + 2] * nz
+            moved = 0.0
+            for j in range(3):
+                moved += a[j] * (u[c + j] + v[c + j] + w[c + j])
+            out[0, k] += slope
+            out[1, k] += slope * along + det * moved
 
 
 @_compile(
@@ -133,10 +152,10 @@ def moment_gradient(x, faces, a, centre, out):
 
 
 @_compile_sums(
-    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
-    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i8[:,:], const i8[:], f8[:,:], i8, i8",
+    "const f8[:,:], const i4[:,:], const i8[:], f8[:,:], i8, i8",
 )
-def volume_slopes(x, faces, out, size, first, last):
+def volume_slopes(x, faces, begins, out, first, last):
     """Put six times the volume of each block, and its slopes along directions, into *out*.
 
     These are the columns of *x* (n, 3 + 3 d) behind the first three; *out* is (blocks, 1 + d).
@@ -146,7 +165,7 @@ def volume_slopes(x, faces, out, size, first, last):
         for c in range(directions + 1):
             out[block, c] = 0.0
         total = 0.0
-        for f in range(block * size, min((block + 1) * size, len(faces))):
+        for f in range(begins[block], begins[block + 1]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             ax, ay, az = x[i, 0] - ox, x[i, 1] - oy, x[i, 2] - oz
             ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
@@ -165,17 +184,17 @@ def volume_slopes(x, faces, out, size, first, last):
 
 
 @_compile_sums(
-    "const f8[:,:], const i8[:,:], f8[:,:], i8, i8, i8",
-    "const f8[:,:], const i4[:,:], f8[:,:], i8, i8, i8",
+    "const f8[:,:], const i8[:,:], const i8[:], f8[:,:], i8, i8",
+    "const f8[:,:], const i4[:,:], const i8[:], f8[:,:], i8, i8",
 )
-def area_slopes(x, faces, out, size, first, last):
+def area_slopes(x, faces, begins, out, first, last):
     """Put twice the area of each block, and its slopes, as `volume_slopes`."""
     directions = out.shape[1] - 1
     for block in range(first, last):
         for c in range(directions + 1):
             out[block, c] = 0.0
         total = 0.0
-        for f in range(block * size, min((block + 1) * size, len(faces))):
+        for f in range(begins[block], begins[block + 1]):
             i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
             ex, ey, ez = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
             gx, gy, gz = x[k, 0] - x[i, 0], x[k, 1] - x[i, 1], x[k, 2] - x[i, 2]
