@@ -7,18 +7,21 @@ the pose of the cages and in the finished one.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import Scene, ball, bent, off_carrier, revolved, rod, tube, with_cast
 from numpy.testing import assert_allclose, assert_array_equal
 
-from vtk_segdeform.deformer import deform
+from vtk_segdeform import models
+from vtk_segdeform.deformer import deform, on_volumes
 from vtk_segdeform.errors import ArgumentError
-from vtk_segdeform.geometry import signed_volume
-from vtk_segdeform.mesh import Mesh
+from vtk_segdeform.geometry import Carrying, signed_volume
+from vtk_segdeform.mesh import Mesh, new_crossings
 from vtk_segdeform.models import random_limbs
 from vtk_segdeform.regions import segment
-from vtk_segdeform.solver import Solution
+from vtk_segdeform.solver import Solution, total_volume
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 
@@ -133,3 +136,24 @@ def test_attachments_are_checked(attach, says):
     scene = bent(rod(0.5, 0.0, 4.0, n=8, step=0.5), rod(0.1, 5.0, 6.0, n=8, step=0.5))
     with pytest.raises(ArgumentError, match=says):
         segment(scene.mesh, attach=attach)
+
+
+def test_needles_at_a_sharp_rim_do_not_cross_when_a_follower_regains_its_volume():
+    """Vertices of a side are next to a rim, where normals turn by 45 degrees."""
+    box = models.bar((1.0, 1.0, 1.0), divisions=(6, 6, 6))
+    x = box.vertices - box.vertices.mean(axis=0)
+    on_top, middle = x[:, 2] > 0.49, np.abs(x[:, 1]) < 0.4
+    rim = np.flatnonzero(on_top & middle & (x[:, 0] > 0.49))
+    beside = np.flatnonzero(on_top & middle & (np.abs(x[:, 0] - 1.0 / 3.0) < 0.01))
+    x[beside] = x[rim] - [2e-4, 0.0, 0.0]
+    carrier = models.sphere(40)
+    n = carrier.n_vertices
+    both = Mesh(
+        np.concatenate([0.01 * carrier.vertices + [2.0, 0.0, 0.0], x]),
+        np.concatenate([carrier.faces, box.faces + n]),
+    )
+    whole, carrying = total_volume(both), Carrying(both, np.array([0, 0]))
+    smaller = replace(whole, target=0.97 * whole.target)
+    moved = on_volumes(both.vertices, [smaller], np.arange(n), carrying.evened)
+    assert smaller.relative(moved) == pytest.approx(0.0, abs=1e-13)
+    assert not len(new_crossings(moved, both.vertices, both.faces))

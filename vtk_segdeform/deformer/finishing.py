@@ -6,7 +6,7 @@ the finish has moved their carriers, and along their normals onto their own volu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -142,14 +142,20 @@ def _followed(
     """Return the finished mesh *x* (n, 3) with the followers moved along from the *pose*."""
     moved, stays = pose + carrying.carried(x - pose), ~carrying.is_carried
     own = [each for each in volumes if not stays[each.faces[each.faces < len(x)]].all()]
-    landed = on_volumes(moved, own, np.flatnonzero(stays)) if own else moved
+    landed = on_volumes(moved, own, np.flatnonzero(stays), carrying.evened) if own else moved
     return np.where(stays[:, None], x, landed)
 
 
 def on_volumes(
-    x: FloatArray, constraints: Sequence[VolumeConstraint], stays: IntArray
+    x: FloatArray,
+    constraints: Sequence[VolumeConstraint],
+    stays: IntArray,
+    evened: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FloatArray:
-    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*."""
+    """Return *x* (n, 3) moved along its normals onto the volumes, but for the vertices *stays*.
+
+    If *evened* is given, the normals are those that it returns for them.
+    """
     centre = x.mean(axis=0)
     moved, directions = x - centre, []
     for constraint in constraints:
@@ -157,7 +163,7 @@ def on_volumes(
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         normals /= np.where(lengths > 0.0, lengths, 1.0)
         normals[stays] = 0.0
-        directions.append(normals)
+        directions.append(evened(normals) if evened else normals)
     paths = np.hstack([moved, *directions])
     return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 

@@ -56,7 +56,7 @@ _COMPARED = 32  # components of which all pairs are compared; the others only wi
 _SAMPLES = 2_000  # points on a component, at least
 _FEW = 64  # the same on a component that is not
 _SHORTEST = 1e-9  # diagonals: length of edges that are shorter
-_EXACT = 1e-10  # relative residual
+_LEAST_AREA = 1e-12  # of a vertex, relative to the largest: of faces without area there is none
 _NEAREST = 8  # samples around a point whose faces may contain the nearest point
 _R2 = np.array([0.7548776662466927, 0.5698402909980532])  # of Roberts' sequence of even points
 
@@ -282,6 +282,7 @@ class Carrying:
 
     def __init__(self, mesh: Mesh, carrier: IntArray) -> None:
         self.is_carried: BoolArray = (carrier != np.arange(len(carrier)))[mesh.components]
+        self._mesh = mesh
         self._steps: list[_Step] = []
         if not self.is_carried.any():
             return
@@ -292,8 +293,9 @@ class Carrying:
             one, other = (_Samples(mesh, np.flatnonzero(own == k)) for own in (of_face, follows))
             nearest = one.nearest(mesh.vertices[ids])
             gaps = other.nearest(one.at(nearest)).gaps
-            smoothing = _smoothing(mesh, ids, gaps)
-            self._steps.append(_Step(ids, nearest, mesh.vertex_areas[ids], smoothing))
+            areas = mesh.vertex_areas[ids]
+            areas = np.maximum(areas, _LEAST_AREA * areas.max())
+            self._steps.append(_Step(ids, nearest, areas, _smoothing(mesh, ids, areas, gaps)))
 
     def carried(self, values: FloatArray) -> FloatArray:
         """Return *values* (n, k) with those of the followers replaced."""
@@ -303,6 +305,20 @@ class Carrying:
             if smoothing is not None:
                 own = _solved(smoothing, areas, own)
             values[ids] = own
+        return values
+
+    def evened(self, values: FloatArray) -> FloatArray:
+        """Return *values* (n, k), at followers nearly the same at vertices that nearly coincide.
+
+        Moved by values with jumps, the needles along a sharp rim would cross each other.
+        """
+        values = values.copy()
+        for ids, _, areas, _ in self._steps:
+            among = self._mesh.adjacency[ids][:, ids]
+            usual = float(among.data.mean()) if among.nnz else 0.0
+            even = _smoothing(self._mesh, ids, areas, np.full(len(ids), usual))
+            if even is not None:
+                values[ids] = _solved(even, areas, values[ids])
         return values
 
 
@@ -317,14 +333,15 @@ def _from_roots(carrier: IntArray) -> list[int]:
     return [int(k) for k in ordered if np.count_nonzero(carrier == k) > (carrier[k] == k)]
 
 
-def _smoothing(mesh: Mesh, ids: IntArray, gaps: FloatArray) -> sparse.csr_array | None:
-    """Return A + D C D of the vertices *ids* (k,), of which *gaps* (k,) are D."""
+def _smoothing(
+    mesh: Mesh, ids: IntArray, areas: FloatArray, gaps: FloatArray
+) -> sparse.csr_array | None:
+    """Return A + D C D of the vertices *ids* (k,), of which *areas* (k,) are A, *gaps* (k,) D."""
     edges = mesh.adjacency[ids][:, ids].tocoo()
     i, j, length = edges.row, edges.col, edges.data
     wide = np.minimum(gaps[i], gaps[j]) > length
     if not wide.any():
         return None
-    areas = mesh.vertex_areas[ids]
     i, j, length = i[wide], j[wide], np.maximum(length[wide], _SHORTEST * mesh.diagonal)
     weights = gaps[i] * gaps[j] * (areas[i] + areas[j]) / (3.0 * length**2)
     total = np.bincount(i, weights, len(ids))
@@ -334,7 +351,12 @@ def _smoothing(mesh: Mesh, ids: IntArray, gaps: FloatArray) -> sparse.csr_array 
 
 def _solved(smoothing: sparse.csr_array, areas: FloatArray, values: FloatArray) -> FloatArray:
     """Return y of *values* x, (k, j)."""
-    scale = sparse.diags_array(1.0 / smoothing.diagonal())
-    return np.stack(
-        [linalg.cg(smoothing, areas * x, x0=x, rtol=_EXACT, M=scale)[0] for x in values.T], axis=1
+    if not np.ptp(values, axis=0).any():
+        return values
+    factor = linalg.splu(
+        smoothing.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
     )
+    return np.asarray(factor.solve(areas[:, None] * values))
