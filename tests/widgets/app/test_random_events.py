@@ -168,6 +168,7 @@ def test_random_events_in_the_window_leave_no_memory_and_every_state_returns(
     for k in range(1, COUNTS[-1] + 1):
         anywhere.act()
         raised += [e for e in anywhere.view.failures if not isinstance(e, SegDeformError)]
+        anywhere.view.failures.clear()  # their tracebacks keep closed editors
         assert not raised, f"event {k}: " + "".join(traceback.format_exception(raised[0]))
         if k in COUNTS:
             gc.collect()
