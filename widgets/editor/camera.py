@@ -37,7 +37,7 @@ class Camera:
     widgets : WidgetSet
         The widgets over the session; replaced by `follow`.
     help_card : HelpCard
-        While it is shown, the cube is not.
+        While it is shown, the cube is not, nor where the gizmo reaches it.
 
     Attributes
     ----------
@@ -64,7 +64,11 @@ class Camera:
             lambda: self._widgets.session.state,
             lambda pointer: self._widgets.dragger.reset_pivot_at(pointer),
         )
-        self.cube = OrientationCube(view, self.navigation, lambda: help_card.is_shown)
+        self.cube = OrientationCube(
+            view,
+            self.navigation,
+            lambda place: help_card.is_shown or self._widgets.dragger.gizmo.reaches(place),
+        )
 
     def begin(self, *, is_aimed: bool) -> None:
         """Guess the up axis and show the model, or follow the camera if the host has aimed it."""

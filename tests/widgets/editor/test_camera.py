@@ -229,6 +229,13 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.history.undo_label is None
     assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
+    cube, gizmo = bench.editor.controller.camera.cube, bench.editor.widgets.dragger.gizmo
+    at, step = bench.mesh.vertices.mean(axis=0), cube.rectangle[0] - np.array(bench.middle)[0]
+    for share, is_covered in ((-0.5, False), (0.9, True)):
+        aside = share * step * bench.view.pixel_at(at) * bench.camera[2]
+        gizmo.place(at + aside + np.cross(bench.view.view_direction, aside))
+        assert (cube.rectangle[2] == 0.0) is is_covered
+    gizmo.place(None)
     with_cube = picture(bench.view)
     bench.editor.show_cube = False
     assert not bench.editor.show_cube
