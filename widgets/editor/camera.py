@@ -47,10 +47,12 @@ class Camera:
         The camera by mouse.
     cube : OrientationCube
         The cube in the corner; hidden at first.
+    is_up_unsure : bool
+        Whether the up axis is a guess that may well be wrong.
     """
 
     def __init__(self, view: View, widgets: WidgetSet, help_card: HelpCard) -> None:
-        self._widgets = widgets
+        self._widgets, self.is_up_unsure = widgets, False
         self.viewpoint = Viewpoint(
             view,
             lambda: self._widgets.session.vertices,
@@ -84,8 +86,9 @@ class Camera:
     def show_model(self, path: Path | None = None) -> None:
         """Guess the up axis, of a file *path* if it is known, and show the model from there."""
         is_y_up = path is not None and has_y_up(path)
-        axis = 1 if is_y_up else guess_up_axis(self._widgets.session.mesh.vertices)
-        self.viewpoint.up = np.eye(3)[axis]
+        guess = guess_up_axis(self._widgets.session.mesh.vertices)
+        self.viewpoint.up = np.eye(3)[1 if is_y_up else guess.axis]
+        self.is_up_unsure = not (is_y_up or guess.is_sure)
         self.viewpoint.home()
 
     def frame_selection(self, mode: Mode) -> None:
@@ -117,6 +120,7 @@ class Camera:
     def restore(self, settings: Mapping[str, Any]) -> Mode | None:
         """Restore all of `settings` but the mode; return that, or None if it is damaged."""
         self.viewpoint.restore(settings)
+        self.is_up_unsure &= not settings
         dragger, handles = self._widgets.dragger, self._widgets.session.handles
         for key, change in (("hidden", dragger.set_hidden), ("locked", dragger.set_locked)):
             names: Any = settings.get(key)

@@ -83,14 +83,19 @@ class Gizmo:
         return self._radius_in_pixels * self.view.pixel_at(self._centre)
 
     @property
+    def _usual_radius(self) -> float:
+        """The radius in pixels away from the borders of the view."""
+        scale = np.sqrt(min(self.view.renderer.GetSize()) / _DESIGN_SIZE)
+        return float(self.size * np.clip(scale, 0.8, 1.6))
+
+    @property
     def _radius_in_pixels(self) -> float:
-        size = np.array(self.view.renderer.GetSize())
-        radius = self.size * np.clip(np.sqrt(size.min() / _DESIGN_SIZE), 0.8, 1.6)
         if self._centre is None:
-            return float(radius)
+            return self._usual_radius
+        size = np.array(self.view.renderer.GetSize())
         place = self.view.to_display(self._centre[None])[0, :2] - self.view.renderer.GetOrigin()
         room = min(place.min(), (size - place).min()) / _REACH  # not a number behind the camera
-        return float(np.fmin(radius, np.fmax(room, _SMALLEST)))
+        return float(np.fmin(self._usual_radius, np.fmax(room, _SMALLEST)))
 
     def place(self, centre: FloatArray | None, axes: FloatArray | None = None) -> None:
         """Set the *centre* (3,), None to hide, and the *axes* (3, 3), by default the world's."""
@@ -240,6 +245,7 @@ class Gizmo:
                 letter.hide()
         if self._caption_text and self._centre is not None:
             x, y, _ = self.view.to_display(self._centre[None])[0]
+            size = 0.18 * self._usual_radius  # legible near a border, too
             self._caption.show(self._caption_text, size, x, y - 1.3 * self._radius_in_pixels)
         else:
             self._caption.hide()

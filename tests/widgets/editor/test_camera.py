@@ -308,6 +308,23 @@ def test_the_next_axis_is_up_by_a_key():
         assert bench.view.camera.GetViewUp()[axis] > 0.8
 
 
+def test_a_guessed_up_axis_is_told_with_the_key_that_changes_it():
+    bench = Bench(shift=np.array([0.0, 0.0, -0.5]))  # not on the ground
+    controller = bench.editor.controller
+    controller.camera.show_model()
+    controller.refresh()
+    up = "XYZ"[int(controller.camera.viewpoint.up.argmax())]
+    assert f"{up} is up by a guess. Shift+U: next axis" in bench.editor.status
+    state = bench.editor.session.state
+    bench.editor.session.set_fixed([0])
+    assert "guess" not in bench.editor.status
+    bench.editor.session.undo()
+    assert "guess" in bench.editor.status
+    bench.hand.types("shift+u")
+    assert "guess" not in bench.editor.status
+    assert bench.editor.session.state is state
+
+
 @pytest.mark.parametrize("axis", [1, 2])
 def test_each_face_of_the_cube_is_named_upright_in_its_view(axis):
     bench = Bench()
