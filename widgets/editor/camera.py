@@ -37,7 +37,7 @@ class Camera:
     widgets : WidgetSet
         The widgets over the session; replaced by `follow`.
     help_card : HelpCard
-        While it is shown, the cube is not, nor where the gizmo reaches it.
+        While it is shown, the cube is not, nor where a gizmo or marker is.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Camera:
         self.cube = OrientationCube(
             view,
             self.navigation,
-            lambda place: help_card.is_shown or self._widgets.dragger.gizmo.reaches(place),
+            lambda place: help_card.is_shown or self._widgets.reach(place),
         )
 
     def begin(self, *, is_aimed: bool) -> None:

@@ -236,6 +236,17 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
         gizmo.place(at + aside + np.cross(bench.view.view_direction, aside))
         assert (cube.rectangle[2] == 0.0) is is_covered
     gizmo.place(None)
+    low, high = np.array(cube.rectangle[:2]), np.array(cube.rectangle[2:])
+    bench.editor.session.handles.pin(0)
+    at = bench.mesh.vertices[0]
+    for place, is_covered in ((low - 30.0, False), (0.5 * (low + high), True)):
+        right = np.cross(bench.view.view_direction, bench.camera[2])
+        x, y = (np.array(bench.hand.at(at)) - place) * bench.view.pixel_at(at)
+        position, focus, _ = bench.camera
+        bench.view.camera.SetPosition(*(position + x * right + y * bench.camera[2]))
+        bench.view.camera.SetFocalPoint(*(focus + x * right + y * bench.camera[2]))
+        assert (cube.rectangle[2] == 0.0) is is_covered
+    bench.editor.session.undo()
     with_cube = picture(bench.view)
     bench.editor.show_cube = False
     assert not bench.editor.show_cube
