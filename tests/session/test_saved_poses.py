@@ -11,8 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
 
-from vtk_segdeform import load_session, save_session
+from vtk_segdeform import Session, load_session, save_session
 from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.regions import Regions
 from vtk_segdeform.session import Change
 from vtk_segdeform.session.saved_poses import between
 
@@ -106,6 +107,29 @@ def test_they_are_in_files_which_without_them_are_as_before(posed, tmp_path):
     assert "saved_poses" not in header
     assert header["version"] == 1
     assert not load_session(path).saved_poses
+
+
+@pytest.mark.parametrize("has_cages", [False, True], ids=["no cages", "other cages"])
+def test_those_of_other_cages_are_in_files_as_they_were_saved(posed, has_cages, tmp_path):
+    session, poses = posed
+    before = session.state
+    session.set_regions(Regions.single(session.mesh))
+    if has_cages:
+        session.change_options(n_cage_vertices=40)
+        session.fit_cages()
+    path = tmp_path / "s.segdeform"
+    save_session(path, session)
+    loaded = load_session(path)
+    assert list(loaded.saved_poses) == ["up", "turned"]
+    assert_array_equal(loaded.state.regions.membership, session.regions.membership)
+    for name, saved in loaded.saved_poses.items():
+        assert_array_equal(saved.regions.membership, before.regions.membership)
+        again = Session(session.mesh, state=saved)
+        assert_array_equal(again.vertices, poses[name])
+    if has_cages:
+        loaded.saved_poses.apply("up")
+        session.saved_poses.apply("up")
+        assert_array_equal(loaded.vertices, session.vertices)
 
 
 def test_with_other_cages_they_are_as_near_as_these_can_be(posed):

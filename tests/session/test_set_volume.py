@@ -14,7 +14,7 @@ from vtk_segdeform.errors import ConstraintError, SessionError
 from vtk_segdeform.mesh import SurfacePoint
 from vtk_segdeform.session import Session, load_session, save_session
 from vtk_segdeform.session.state import Options
-from vtk_segdeform.session.store import _FIRST
+from vtk_segdeform.session.state_store import FIRST_OPTIONS
 
 EXACT = 1e-12
 SCENE = sausage(2, is_coarse=True)
@@ -176,7 +176,7 @@ def test_a_file_of_an_earlier_version_has_no_goals(tmp_path):
     with zipfile.ZipFile(path) as archive:
         name = next(each for each in archive.namelist() if each.endswith("header.json"))
         header = json.loads(archive.read(name))
-    assert header["options"].keys() == _FIRST
+    assert header["options"].keys() == FIRST_OPTIONS
     assert header["version"] == 1
     assert load_session(path).options.volumes == ()
 

@@ -201,7 +201,7 @@ def rewritten(content: bytes, *, compress: bool = False, **changes) -> bytes:
 
 HUGE = 1 << 61
 WRONG = [
-    ({"header": {"version": 5}}, "version 5 is newer than 4; update vtk_segdeform"),
+    ({"header": {"version": 6}}, "version 6 is newer than 5; update vtk_segdeform"),
     ({"header": {"version": 0}}, "version must be at least 1; got 0"),
     ({"header": {"format": "something else"}}, "does not contain the format"),
     ({"header": {"n_vertices": 10**30}}, "mesh_vertices must be float64 of shape"),

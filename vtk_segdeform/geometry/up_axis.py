@@ -15,6 +15,8 @@ Of 248 views of 62 bodies that were made for it and read from files, none of the
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
@@ -22,11 +24,21 @@ from ..arrays import FloatArray, bounds_of
 
 _FOOTPRINT_HEIGHT = 0.03  # of the height: the vertices that belong to a footprint
 _ON_GROUND = 1e-3  # of the height: the distance from the plane through the origin
+_ALIKE = 1e-3  # of the middle extent: bodies at less than this distance are the same
 _MOST_FOOTPRINT, _MOST_MIRROR, _MIRRORED = 100_000, 20_000, 1500  # points
 
 
-def guess_up_axis(vertices: FloatArray) -> int:
-    """Return 1 or 2: the axis, y or z, that points up.
+class UpAxis(NamedTuple):
+    """A guess of the axis that points up."""
+
+    axis: int
+    """1 or 2: y or z."""
+    is_sure: bool
+    """Whether the ground or a mirror image told them apart, not only footprint and length."""
+
+
+def guess_up_axis(vertices: FloatArray) -> UpAxis:
+    """Return the axis, y or z, that points up.
 
     Parameters
     ----------
@@ -37,18 +49,19 @@ def guess_up_axis(vertices: FloatArray) -> int:
     extent = high - low
     on_ground = np.abs(low) <= _ON_GROUND * extent
     if on_ground[1] != on_ground[2]:
-        return 1 if on_ground[1] else 2
+        return UpAxis(1 if on_ground[1] else 2, True)
     unit = float(np.sort(extent)[1])
+    longer = UpAxis(1 if extent[1] > extent[2] else 2, False)
     if not unit > 0.0:  # points on a line
-        return 1 if extent[1] > extent[2] else 2
+        return longer
     points = (_some(vertices, _MOST_FOOTPRINT) - low) / unit
     y, z = _mirror_distances(_some(points, _MOST_MIRROR))
-    if min(y, z) < 0.5 * max(y, z):
-        return 1 if y > z else 2
+    if min(y, z) < 0.5 * max(y, z) and max(y, z) > _ALIKE:
+        return UpAxis(1 if y > z else 2, True)
     y, z = (_footprint(points, axis, extent[axis] / unit) for axis in (1, 2))
     if abs(y - z) > 0.01:  # squares of the middle extent; less is chance
-        return 1 if y > z else 2
-    return 1 if extent[1] > extent[2] else 2
+        return UpAxis(1 if y > z else 2, False)
+    return longer
 
 
 def _some(points: FloatArray, most: int) -> FloatArray:

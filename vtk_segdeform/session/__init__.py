@@ -21,8 +21,8 @@ The files, in reading order:
     stand_in       a coarse stand-in until a session is bound
     listeners      notification of changes
     naming         names of regions and handles
-    store pose_store
-                   saving and loading sessions, and the poses in them
+    store          saving and loading sessions
+    state_store    the states in their files
     surface_store  the given surface in a file
     archive        the file format
 """

@@ -10,6 +10,7 @@ A value of the header is read by a check of what it must be, `field`(header, nam
 
 from __future__ import annotations
 
+import copy
 import json
 import os
 import tokenize
@@ -189,8 +190,14 @@ class Archive:
     def __init__(self, file: IO[bytes]) -> None:
         size = os.fstat(file.fileno()).st_size  # not by name: another file may have replaced it
         _require_short_directory(file, size)
-        self._archive = zipfile.ZipFile(file)
-        self._unread = size  # bytes; overlapping members could otherwise exceed the file
+        self._archive, self._prefix = zipfile.ZipFile(file), ""
+        self._unread = [size]  # bytes; overlapping members could otherwise exceed the file
+
+    def within(self, prefix: str) -> Archive:
+        """Return the same archive, for arrays whose names begin with *prefix*."""
+        part = copy.copy(self)
+        part._prefix = self._prefix + prefix
+        return part
 
     def header(self) -> dict[str, Any]:
         """Return the content of ``header.json``, whose values are unchecked; see `field`."""
@@ -211,6 +218,7 @@ class Archive:
         size = dtype.itemsize
         for count in shape:  # Python integers do not overflow
             size *= count
+        name = self._prefix + name
         with self._open(f"{name}.npy", size + _LONGEST_NPY_HEADER) as content:
             if npy.read_magic(content) != (1, 0):
                 raise ValueError(f"{name} has an unsupported version of the npy format")
@@ -239,9 +247,9 @@ class Archive:
         if info.compress_type != zipfile.ZIP_STORED:
             raise ValueError(f"{name} is compressed, which is not supported")
         size = max(info.file_size, info.compress_size)
-        if size > min(limit, self._unread):
+        if size > min(limit, self._unread[0]):
             raise ValueError(f"{name} is too large: {size} bytes")
-        self._unread -= size
+        self._unread[0] -= size
         return self._archive.open(info)
 
 

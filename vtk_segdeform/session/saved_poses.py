@@ -118,7 +118,7 @@ class SavedPoses(Mapping[str, State]):
         """Return whether a pose was saved with the current cages, so that `applied` is quick."""
         self._require(name)
         saved = self._own[name]
-        return saved.pose is None or _has_cages(self._history.state, saved)
+        return saved.pose is None or has_cages(self._history.state, saved)
 
     def copy(self, other: Posed, *names: str) -> tuple[str, ...]:
         """Save poses of another session, of a mesh with the same faces, in one undo step.
@@ -187,7 +187,7 @@ class SavedPoses(Mapping[str, State]):
         if pose.finished is not None:
             return np.asarray(pose.finished.vertices[vertices])
         state = self._history.state
-        if not (_has_cages(state, saved) and self._poses.is_bound(state)):
+        if not (has_cages(state, saved) and self._poses.is_bound(state)):
             return None
         rows = self._poses.bind(state).subspace.at(vertices)
         return np.asarray(rows @ np.concatenate(pose.cage_vertices))
@@ -255,7 +255,7 @@ def in_pose(poses: Poses, state: State, saved: State) -> State:
     x = poses.vertices(replace(saved, options=state.options))
     options = replace(state.options, volumes=saved.options.volumes)
     after = replace(state.at_rest(), options=options)
-    if _has_cages(state, saved):
+    if has_cages(state, saved):
         pose = saved.pose
     else:
         pose = solving.free_form(poses, after, solving.carried(poses, after, x))
@@ -283,7 +283,8 @@ def between(a: FloatArray, b: FloatArray, share: float) -> FloatArray:
     return frozen((1.0 - share) * from_ + share * to + shape @ turned.T)
 
 
-def _has_cages(state: State, saved: State) -> bool:
+def has_cages(state: State, saved: State) -> bool:
+    """Return whether *saved* has the regions and cages of *state*."""
     return state.cages == saved.cages and state.regions is saved.regions
 
 

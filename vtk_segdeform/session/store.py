@@ -15,7 +15,8 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     pose_stiffness.npy    (n,) float       of its solve, if something was rigid
     finished_held.npy, finished_shifts.npy, finished_cages.npy, finished_offset.npy
                                            as in `state.Finished`
-    saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any
+    saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any;
+                          all of the above of a pose that was saved with other cages
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -34,54 +35,45 @@ handles and pose are checked like arguments of a caller.
 from __future__ import annotations
 
 import json
-import math
 import os
 import struct
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ..cages import Cage
-from ..checks import as_flag, as_path, require, shown
-from ..deformer import Slide
+from ..checks import as_flag, as_path, require
 from ..errors import SessionError
 from ..files import open_regular, replacing
 from ..importing import imported
-from ..mesh import Mesh, SurfacePoint
-from ..regions import Regions
+from ..mesh import Mesh
 from .archive import (
     Archive,
     anything,
     field,
-    flag,
     list_of,
     map_of,
-    number,
-    optional,
-    row_of,
     text,
     whole,
     write_archive,
 )
-from .pose_store import pose_parts, read_places, read_pose
-from .saved_poses import in_pose
+from .saved_poses import has_cages, in_pose
 from .session import Session
-from .state import Locality, Options, State, split_rows
+from .state import State
+from .state_store import (
+    FIRST_OPTIONS,
+    pose_parts,
+    read_places,
+    read_pose,
+    read_state,
+    state_parts,
+)
 
 if TYPE_CHECKING:
     from ..io import Surface
 
 FORMAT = "vtk_segdeform session"
-VERSION = 4
-
-# The options of version 1; a file has others only if they are not at their defaults.
-_FIRST = {
-    "n_cage_vertices", "offset", "preserve_volume", "preserve_region_volumes", "stretch",
-    "rotation_groups",
-}  # fmt: skip
+VERSION = 5
 
 # Errors of zipfile, numpy and json on invalid content, and ours, which are ValueErrors.
 _ERRORS = (zipfile.BadZipFile, ValueError, EOFError, RuntimeError, struct.error, OSError)
@@ -175,87 +167,38 @@ def _write(
     file: Any, session: Session, given: Surface | None, view: Mapping[str, Any] | None
 ) -> None:
     mesh, state = session.mesh, session.state
-    regions = state.regions
-    options = {name: _plain(value) for name, value in asdict(state.options).items()}
-    defaults = asdict(Options())
-    options = {k: v for k, v in options.items() if k in _FIRST or v != defaults[k]}
-    is_simple = given is None and mesh.is_closed and options.keys() <= _FIRST
+    more, arrays = state_parts(state)
+    options = more["options"]
+    is_simple = given is None and mesh.is_closed and options.keys() <= FIRST_OPTIONS
     is_new = state.stiffness is not None or bool(state.slides)
-    is_new |= regions is not None and regions.leader is not None
+    is_new |= state.regions is not None and state.regions.leader is not None
     is_new |= bool(state.parts) or (state.locality is not None and not state.locality.reach)
     header: dict[str, Any] = {
         "format": FORMAT,
         "version": 3 if is_new else 1 if is_simple else 2,
         "n_vertices": mesh.n_vertices,
         "n_faces": mesh.n_faces,
-        "n_regions": 0 if regions is None else regions.n_regions,
-        "smoothness": 1.0 if regions is None else float(regions.smoothness),
-        "cages": [[cage.n_vertices, cage.n_faces] for cage in state.cages],
-        "n_fixed": len(state.fixed),
-        "handles": [[name, len(ids)] for name, ids in state.handles.items()],
-        "options": options,
+        **more,
     }
-    if state.region_names:  # optional: earlier versions ignore it
-        header["region_names"] = list(state.region_names)
     if view is not None:
         header["view"] = dict(view)
-    arrays: dict[str, Any] = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces}
-    arrays |= {"fixed": state.fixed, "handle": state.handle}
-    if regions is not None:
-        arrays["membership"] = regions.membership
-        if regions.carrier is not None:  # optional: earlier versions have the same membership
-            header["n_components"] = len(regions.carrier)
-            arrays["carrier"] = regions.carrier
-        if regions.leader is not None:
-            header["n_components"], header["has_leaders"] = len(regions.leader), True
-            arrays["leader"] = regions.leader
-    if state.cages:
-        arrays["cage_vertices"] = np.concatenate([cage.vertices for cage in state.cages])
-        arrays["cage_faces"] = np.concatenate([cage.faces for cage in state.cages])
-    if state.pulls:  # optional, like what follows
-        header["pulls"] = list(state.pulls)
-    if state.locality is not None:
-        last = state.locality
-        point, reach = last.point, None if last.reach == math.inf else last.reach
-        header["locality"] = [point.vertex, reach, last.spread, last.follows]
-        if last.depth:
-            header["pulled_limb"] = last.depth
-        if last.hinge:
-            header["hinge"] = last.hinge
-        if not point.is_vertex:
-            header["pulled_point"] = [point.corners, point.shares]
-        arrays["locality"] = np.concatenate(state.locality.cage_vertices)
-    more, posed = pose_parts(state)
-    header |= more
-    arrays |= posed
-    saved = []
-    for k, (name, each) in enumerate(state.saved):  # with the handles and cages of the session
-        more, posed = pose_parts(in_pose(session.poses, replace(state, saved=()), each))
-        saved.append({"name": name, "volumes": dict(each.options.volumes), **more})
+    arrays = {"mesh_vertices": mesh.vertices, "mesh_faces": mesh.faces, **arrays}
+    saved = list[dict[str, Any]]()
+    for k, (name, each) in enumerate(state.saved):
+        if each.pose is None or has_cages(state, each):  # with the handles of the session
+            more, posed = pose_parts(in_pose(session.poses, replace(state, saved=()), each))
+            more["volumes"] = dict(each.options.volumes)
+        else:
+            own, posed = state_parts(each)
+            more = {"state": own}
+        saved.append({"name": name, **more})
         arrays |= {f"saved_{k}_{key}": array for key, array in posed.items()}
     if saved:
         header["saved_poses"] = saved
     if any("rigid_in_pose" in each for each in (header, *saved)):
         header["version"] = 4
-    if state.pivots:
-        header["pivots"] = {name: point.tolist() for name, point in state.pivots.items()}
-    if state.stiffness is not None:
-        header["has_stiffness"] = True
-        arrays["stiffness"] = state.stiffness
-    if state.slides:
-        sliding = [np.asarray(each.vertices) for each in state.slides]
-        header["slides"] = [
-            [
-                len(ids),
-                each.along,
-                None if each.direction is None else np.asarray(each.direction).tolist(),
-            ]
-            for ids, each in zip(sliding, state.slides, strict=True)
-        ]
-        arrays["sliding"] = np.concatenate(sliding)
-    if state.parts:
-        header["parts"] = [[name, len(ids)] for name, ids in state.parts]
-        arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
+    if any("state" in each for each in saved):
+        header["version"] = 5
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -267,92 +210,30 @@ def _write(
 
 def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
     header = _checked_header(archive.header())
-    n, r = field(header, "n_vertices", whole), field(header, "n_regions", whole)
+    n = field(header, "n_vertices", whole)
     mesh = Mesh(
         archive.array("mesh_vertices", "f", (n, 3)),
         archive.array("mesh_faces", "i", (field(header, "n_faces", whole), 3)),
     )
-    regions = None
-    if r:
-        membership = archive.array("membership", "b", (r, n))
-        carrier = leader = None
-        if "n_components" in header:
-            count = field(header, "n_components", whole)
-            carrier = archive.array("carrier", "i", (count,))
-            if "has_leaders" in header:
-                leader = archive.array("leader", "i", (count,))
-        regions = Regions(mesh, membership, field(header, "smoothness", number), carrier, leader)
-    counts = field(header, "cages", list_of(row_of(whole, whole)))
-    n_vertices, n_faces = [m for m, _ in counts], [k for _, k in counts]
-    total = sum(n_vertices)
-    cages: tuple[Cage, ...] = ()
-    if counts:
-        vertices = split_rows(archive.array("cage_vertices", "f", (total, 3)), n_vertices)
-        faces = split_rows(archive.array("cage_faces", "i", (sum(n_faces), 3)), n_faces)
-        cages = tuple(Cage(*pair) for pair in zip(vertices, faces, strict=True))
-
-    listed = field(header, "handles", list_of(row_of(text, whole)))
-    sizes = dict(listed)
-    if len(sizes) != len(listed):
-        raise SessionError("two handles have the same name")
-    lengths, n_handle = list(sizes.values()), sum(sizes.values())
-    ids = split_rows(archive.array("handle", "i", (n_handle,)), lengths)
-    pose = read_pose(archive, header, n_vertices, sizes, n_vertices=n)
-    fixed = archive.array("fixed", "i", (field(header, "n_fixed", whole),))
-    names, pulls = (
-        tuple(field(header, name, list_of(text))) if name in header else ()
-        for name in ("region_names", "pulls")
-    )
-    locality = None
-    if "locality" in header:
-        shape = row_of(whole, optional(number), number, number)
-        vertex, reach, spread, follows = field(header, "locality", shape)
-        kept = split_rows(archive.array("locality", "f", (total, 3)), n_vertices)
-        reach = math.inf if reach is None else reach
-        point = SurfacePoint.at_vertex(vertex)
-        if "pulled_point" in header:
-            shape = row_of(list_of(whole), list_of(number))
-            corners, shares = field(header, "pulled_point", shape)
-            point = SurfacePoint(tuple(corners), tuple(shares))
-        depth = field(header, "pulled_limb", number) if "pulled_limb" in header else 0.0
-        hinge = field(header, "hinge", number) if "hinge" in header else 0.0
-        locality = Locality(point, reach, spread, follows, tuple(kept), depth, hinge)
-    handles, more = dict(zip(sizes, ids, strict=True)), dict[str, Any]()
-    if "pivots" in header:
-        pivots = field(header, "pivots", map_of(row_of(number, number, number)))
-        more["pivots"] = {name: np.array(point) for name, point in pivots.items()}
-    more["fixed_at"] = read_places(archive, header, len(fixed))
-    if "has_stiffness" in header and field(header, "has_stiffness", flag):
-        more["stiffness"] = archive.array("stiffness", "f", (n,))
-    if "slides" in header:
-        kind = row_of(whole, text, optional(row_of(number, number, number)))
-        kinds = field(header, "slides", list_of(kind))
-        lengths = [count for count, *_ in kinds]
-        total = sum(lengths)
-        own = split_rows(archive.array("sliding", "i", (total,)), lengths)
-        more["slides"] = tuple(
-            Slide(ids, *kind) for ids, (_, *kind) in zip(own, kinds, strict=True)
-        )
-    if "parts" in header:
-        named = field(header, "parts", list_of(row_of(text, whole)))
-        lengths = [count for _, count in named]
-        own = split_rows(archive.array("parts", "i", (sum(lengths),)), lengths)
-        more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
-    options = _options(field(header, "options", map_of(anything)))
-    state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
-    saved = list[tuple[str, State]]()
-    if "saved_poses" in header:
-        for k, each in enumerate(field(header, "saved_poses", list_of(map_of(anything)))):
-            prefix, volumes = f"saved_{k}_", field(each, "volumes", map_of(anything))
+    state, saved = read_state(archive, header, mesh), list[tuple[str, State]]()
+    cages = [cage.n_vertices for cage in state.cages]
+    sizes = {name: len(ids) for name, ids in state.handles.items()}
+    listed = header.get("saved_poses", [])
+    for k, each in enumerate(list_of(map_of(anything))(listed, "saved_poses")):
+        within = archive.within(f"saved_{k}_")
+        if "state" in each:
+            posed = read_state(within, field(each, "state", map_of(anything)), mesh)
+        else:
+            volumes = field(each, "volumes", map_of(anything))
             posed = replace(
                 state,
-                pose=read_pose(archive, each, n_vertices, sizes, n_vertices=n, prefix=prefix),
-                fixed_at=read_places(archive, each, len(fixed), prefix=prefix),
-                options=replace(options, volumes=tuple(volumes.items())),
+                pose=read_pose(within, each, cages, sizes, n_vertices=n),
+                fixed_at=read_places(within, each, len(state.fixed)),
+                options=replace(state.options, volumes=tuple(volumes.items())),
                 locality=None,
             )
-            saved.append((field(each, "name", text), posed))
-        state = replace(state, saved=tuple(saved))
+        saved.append((field(each, "name", text), posed))
+    state = replace(state, saved=tuple(saved))
     if "surface" not in header:
         return mesh, state
     imported("vtk_segdeform.session.surface_store")  # imports pyvista
@@ -370,21 +251,3 @@ def _checked_header(header: dict[str, Any]) -> dict[str, Any]:
     if version < 1:
         raise SessionError(f"version must be at least 1; got {version}")
     return header
-
-
-def _options(values: Mapping[str, Any]) -> Options:
-    """Return options of these *values*, which `Options` checks.
-
-    Older files may also avoid folds, and have a rotation for each vertex.
-    """
-    values = {name: value for name, value in values.items() if name != "avoid_folds"}
-    if values.get("rotation_groups", 0) is None:
-        del values["rotation_groups"]
-    unknown = values.keys() - {each.name for each in fields(Options)}
-    if unknown:
-        raise SessionError(f"there is no option {shown(sorted(unknown))}")
-    return Options(**values)
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

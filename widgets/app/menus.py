@@ -70,7 +70,11 @@ class Menus:
         self._displacement.setCheckable(True)
         self._need_mesh.append(self._displacement)
         menu.aboutToShow.connect(self._update_displacement)
-        copy = self._add(menu, "&Copy poses of a session ...", window.copy_poses)
+        copy = self._add(
+            menu,
+            "&Copy poses of a session ...",
+            lambda: window.editor_widget.panel.toolbar.ask_and_copy_poses(),
+        )
         self._need_mesh.append(copy)
         menu.addSeparator()
         self._add(menu, "&Quit", window.close, _Keys.Quit).setMenuRole(_role("QuitRole"))

@@ -28,7 +28,6 @@ from ..editor import (
     Kind,
     Queue,
     Task,
-    copying_poses,
 )
 from ..qt import DeformWidget, menu_keys, stopper
 from ..scene import Stop
@@ -171,12 +170,6 @@ class Window(QtWidgets.QMainWindow):
     def open_sample(self) -> None:
         """Open the sample model."""
         self._open(Request("sample model", sample_model))
-
-    def copy_poses(self) -> None:
-        """Ask for a session of a mesh with the same faces, and copy its poses."""
-        path = ask_file(self, self.document.proposal.parent)
-        if path is not None:
-            self.editor.do(copying_poses(path))
 
     def repair(self) -> None:
         """Show what a repair would do; open the result as a new document if the user accepts."""

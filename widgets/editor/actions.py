@@ -526,6 +526,7 @@ def turning_up(axis: int) -> Action:
 
     def turn_up(controller: Controller) -> None:
         controller.camera.viewpoint.up = np.eye(3)[axis]
+        controller.camera.is_up_unsure = False
         controller.camera.viewpoint.look_from("home")
         controller.say(f"Up: {'XYZ'[axis]}. {controller.keys.cap('next_up_axis')}: next axis")
 

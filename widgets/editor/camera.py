@@ -37,7 +37,7 @@ class Camera:
     widgets : WidgetSet
         The widgets over the session; replaced by `follow`.
     help_card : HelpCard
-        While it is shown, the cube is not.
+        While it is shown, the cube is not, nor where a gizmo or marker is.
 
     Attributes
     ----------
@@ -47,10 +47,12 @@ class Camera:
         The camera by mouse.
     cube : OrientationCube
         The cube in the corner; hidden at first.
+    is_up_unsure : bool
+        Whether the up axis is a guess that may well be wrong.
     """
 
     def __init__(self, view: View, widgets: WidgetSet, help_card: HelpCard) -> None:
-        self._widgets = widgets
+        self._widgets, self.is_up_unsure = widgets, False
         self.viewpoint = Viewpoint(
             view,
             lambda: self._widgets.session.vertices,
@@ -64,7 +66,11 @@ class Camera:
             lambda: self._widgets.session.state,
             lambda pointer: self._widgets.dragger.reset_pivot_at(pointer),
         )
-        self.cube = OrientationCube(view, self.navigation, lambda: help_card.is_shown)
+        self.cube = OrientationCube(
+            view,
+            self.navigation,
+            lambda place: help_card.is_shown or self._widgets.reach(place),
+        )
 
     def begin(self, *, is_aimed: bool) -> None:
         """Guess the up axis and show the model, or follow the camera if the host has aimed it."""
@@ -80,8 +86,9 @@ class Camera:
     def show_model(self, path: Path | None = None) -> None:
         """Guess the up axis, of a file *path* if it is known, and show the model from there."""
         is_y_up = path is not None and has_y_up(path)
-        axis = 1 if is_y_up else guess_up_axis(self._widgets.session.mesh.vertices)
-        self.viewpoint.up = np.eye(3)[axis]
+        guess = guess_up_axis(self._widgets.session.mesh.vertices)
+        self.viewpoint.up = np.eye(3)[1 if is_y_up else guess.axis]
+        self.is_up_unsure = not (is_y_up or guess.is_sure)
         self.viewpoint.home()
 
     def frame_selection(self, mode: Mode) -> None:
@@ -113,6 +120,7 @@ class Camera:
     def restore(self, settings: Mapping[str, Any]) -> Mode | None:
         """Restore all of `settings` but the mode; return that, or None if it is damaged."""
         self.viewpoint.restore(settings)
+        self.is_up_unsure &= not settings
         dragger, handles = self._widgets.dragger, self._widgets.session.handles
         for key, change in (("hidden", dragger.set_hidden), ("locked", dragger.set_locked)):
             names: Any = settings.get(key)

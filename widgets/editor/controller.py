@@ -215,7 +215,12 @@ class Controller:
         """The next step, or what is shown."""
         if self.widgets.surface.instead is not None:
             return self._text_instead
-        return hint(self.widgets, self._mode, self.keys)
+        text, session = hint(self.widgets, self._mode, self.keys), self.session
+        is_first = self._mode is Mode.PULL and not session.history.can_undo
+        if not (self.camera.is_up_unsure and is_first) or session.is_dragging:
+            return text
+        up = "XYZ"[int(self.camera.viewpoint.up.argmax())]
+        return f"{up} is up by a guess. {self.keys.cap('next_up_axis')}: next axis · {text}"
 
     def say(self, text: str) -> None:
         """Show the result of an action, before the hint for the next step."""

@@ -215,6 +215,10 @@ class WidgetSet:
         self.remove()
         return after
 
+    def reach(self, rectangle: tuple[float, float, float, float]) -> bool:
+        """Return whether the gizmo or a marker is in a *rectangle*: left, bottom, right, top."""
+        return self.dragger.gizmo.reaches(rectangle) or self.puller.reaches(rectangle)
+
     def point_at(self, pointer: Pointer) -> FloatArray | None:
         """Return the point (3,) of the surface at *pointer*, or None beside it."""
         hit = self._picker.hit(pointer)

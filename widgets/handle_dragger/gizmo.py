@@ -1,6 +1,7 @@
 """A gizmo for moving and rotating: arrows, squares, rings and a ball.
 
-It has a constant size on the screen and is drawn over everything else.  Only the front half of each
+It has a constant size on the screen, smaller near a border of the view, and is drawn over
+everything else.  Only the front half of each
 ring is drawn.  Arrows along the line of sight and squares seen edge-on are hidden.  The part under
 the pointer is found with the same lines that are drawn.
 """
@@ -32,7 +33,9 @@ _HIGHLIGHT = COLOURS[4]  # yellow, with a dark outline
 _PICK_RADIUS = 6.0  # pixels
 _RING_PENALTY = 3.0  # pixels: other parts win over a ring that crosses them
 _END_ON = 0.2  # sine of the angle below which arrows and squares are hidden
-_DESIGN_HEIGHT = 600  # pixels; in a higher window the gizmo is slightly larger
+_DESIGN_SIZE = 600  # pixels; in a larger view the gizmo is slightly larger
+_REACH = 1.4  # radii from the centre to the letters
+_SMALLEST = 45.0  # pixels: the radius at a border of the view, at least
 
 
 class Gizmo:
@@ -41,7 +44,7 @@ class Gizmo:
     Attributes
     ----------
     size : float
-        Pixels from the centre to a ring, in a window 600 pixels high.
+        Pixels from the centre to a ring, in a view of 600 pixels.
     """
 
     def __init__(self, view: View) -> None:
@@ -80,9 +83,19 @@ class Gizmo:
         return self._radius_in_pixels * self.view.pixel_at(self._centre)
 
     @property
-    def _radius_in_pixels(self) -> float:
-        scale = np.sqrt(self.view.renderer.GetSize()[1] / _DESIGN_HEIGHT)
+    def _usual_radius(self) -> float:
+        """The radius in pixels away from the borders of the view."""
+        scale = np.sqrt(min(self.view.renderer.GetSize()) / _DESIGN_SIZE)
         return float(self.size * np.clip(scale, 0.8, 1.6))
+
+    @property
+    def _radius_in_pixels(self) -> float:
+        if self._centre is None:
+            return self._usual_radius
+        size = np.array(self.view.renderer.GetSize())
+        place = self.view.to_display(self._centre[None])[0, :2] - self.view.renderer.GetOrigin()
+        room = min(place.min(), (size - place).min()) / _REACH  # not a number behind the camera
+        return float(np.fmin(self._usual_radius, np.fmax(room, _SMALLEST)))
 
     def place(self, centre: FloatArray | None, axes: FloatArray | None = None) -> None:
         """Set the *centre* (3,), None to hide, and the *axes* (3, 3), by default the world's."""
@@ -133,6 +146,15 @@ class Gizmo:
             if distance < nearest:
                 nearest, found = distance, part
         return found
+
+    def reaches(self, rectangle: tuple[float, float, float, float]) -> bool:
+        """Return whether it is drawn in a *rectangle*: left, bottom, right, top in the window."""
+        if self._centre is None:
+            return False
+        place = self.view.to_display(self._centre[None])[0, :2]
+        low, high = np.reshape(rectangle, (2, 2))
+        away = np.maximum(low - place, place - high).max()
+        return bool(away < _REACH * self._radius_in_pixels)
 
     def remove(self) -> None:
         """Remove the gizmo from the view permanently."""
@@ -223,6 +245,7 @@ class Gizmo:
                 letter.hide()
         if self._caption_text and self._centre is not None:
             x, y, _ = self.view.to_display(self._centre[None])[0]
+            size = 0.18 * self._usual_radius  # legible near a border, too
             self._caption.show(self._caption_text, size, x, y - 1.3 * self._radius_in_pixels)
         else:
             self._caption.hide()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from vtk_segdeform.arrays import BoolArray
+from vtk_segdeform.errors import RegionError
 from vtk_segdeform.pictures import of_region
 from vtk_segdeform.session import Session
 
@@ -100,10 +102,11 @@ def regions_section(editor: DeformEditor) -> Section:
 
 def stiffness_of(session: Session, chosen: list[int]) -> str:
     """Return the choice that fits the stiffness of the *chosen* regions best."""
-    stiffness, regions = session.state.stiffness, session.regions
-    if stiffness is None or regions is None or not chosen:
+    stiffness = session.state.stiffness
+    if stiffness is None or not chosen:
         return "1"
-    median = float(np.median(stiffness[np.isin(regions.labels, chosen)]))
+    own = _own_vertices(session, chosen)
+    median = float(np.median(stiffness[own])) if own.any() else 1.0
     return min(
         (times for _, times in STIFFNESS),
         key=lambda times: 0.0 if float(times) == median else abs(float(times) - median),
@@ -115,14 +118,22 @@ def stiffening(chosen: list[int], times: str) -> Action:
 
     def stiffen(controller: Controller) -> None:
         session = controller.session
-        before, regions = session.state.stiffness, session.regions
-        assert regions is not None
+        before, own = session.state.stiffness, _own_vertices(session, chosen)
+        if not own.any():
+            name = session.painting.name(chosen[0])
+            raise RegionError(f"{name} is covered by other regions. Erase these there first")
         stiffness = np.ones(session.mesh.n_vertices) if before is None else before.copy()
-        stiffness[np.isin(regions.labels, chosen)] = float(times)
+        stiffness[own] = float(times)
         session.set_stiffness(None if (stiffness == 1.0).all() else stiffness)
         controller.say("Stiffness counts from the next move")
 
     return stiffen
+
+
+def _own_vertices(session: Session, chosen: list[int]) -> BoolArray:
+    """Return where one of the *chosen* regions has the largest weight, (n,); may be nowhere."""
+    assert session.regions is not None
+    return np.isin(session.regions.labels, chosen)
 
 
 def _renaming(key: str, name: str) -> Action:

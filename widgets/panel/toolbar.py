@@ -50,6 +50,7 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
                     value=controller.displacement is not None,
                     act=lambda on: actions.saving_displacement("displacement" if on else None),
                 ),
+                Field("poses.copy", "file", "Copy poses of a session ..."),
             ),
         ),
         _step("undo", controller.history.undo_label, is_free=is_free),

@@ -83,6 +83,13 @@ class Markers:
                 return names[int(k)]
         return None
 
+    def reaches(self, rectangle: tuple[float, float, float, float]) -> bool:
+        """Return whether a marker is in a *rectangle*: left, bottom, right, top in the window."""
+        places = self._view.to_display(self._surface.points[list(self._shown.values())])[:, :2]
+        low, high = np.reshape(rectangle, (2, 2))
+        away = np.maximum(low - places, places - high).max(axis=1)
+        return bool((away < _REACH * self._view.scale).any())
+
     def highlight(self, name: str | None) -> None:
         """Highlight one marker, or none."""
         if name != self._highlighted:

@@ -220,6 +220,10 @@ class Puller(Widget):
         """Return the pin or pulled point under the pointer, or None."""
         return self._markers.at(self.view.pointer(Phase.HOVER))
 
+    def reaches(self, rectangle: tuple[float, float, float, float]) -> bool:
+        """Return whether a marker is in a *rectangle*: left, bottom, right, top in the window."""
+        return self._markers.reaches(rectangle)
+
     def On(self) -> None:  # noqa: N802 - VTK's word
         """Start handling events, show the pins, and refine a pose that has not converged."""
         if not self.GetEnabled():

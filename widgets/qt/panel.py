@@ -109,6 +109,8 @@ class DeformPanel(QtWidgets.QWidget):
             each.setEnabled(editor.GetEnabled())
         if editor.keys is not self._keys:
             self._show_keys(editor.keys)
+        if busy:
+            self._return_focus()  # a disabled control would swallow keys
         self._inside.setEnabled(not busy)
         self.toolbar.refresh()
         self.status.refresh()
@@ -180,7 +182,8 @@ class DeformPanel(QtWidgets.QWidget):
         super().keyPressEvent(event)
 
     def _focus_changed(self, old: Any, new: Any) -> None:
-        if old is not None and self.isAncestorOf(new) and not self.isAncestorOf(old):
+        is_near = old is not None and old.window() == self.window()  # no menu and no popup
+        if is_near and self.isAncestorOf(new) and not self.isAncestorOf(old):
             self._focused = old
 
     def _return_focus(self, *_: object) -> None:

@@ -9,6 +9,7 @@ The cube has a renderer of its own above that of the view, which copies the came
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
@@ -26,6 +27,7 @@ from .projection import Projection
 from .view import Stop, View
 from .viewpoint import Viewpoint
 
+Rectangle: TypeAlias = tuple[float, float, float, float]
 _ABOVE_WIDGETS = 1.5  # priority: our widgets have 1
 _SIZE, _SMALLEST_VIEW = 84.0, 240  # pixels
 _SHARE = 0.22  # of a small view, at most
@@ -48,11 +50,14 @@ class OrientationCube:
     navigation : Navigation
         Moves the camera of the view.
     is_covered : callable, optional
-        Returns whether something else has its place at present.
+        Returns whether something else is in a rectangle at present: left, bottom, right, top.
     """
 
     def __init__(
-        self, view: View, navigation: Navigation, is_covered: Callable[[], bool] = lambda: False
+        self,
+        view: View,
+        navigation: Navigation,
+        is_covered: Callable[[Rectangle], bool] = lambda _: False,
     ) -> None:
         self.view, self._navigation, self._is_covered = view, navigation, is_covered
         self._renderer: vtkRenderer | None = None
@@ -101,19 +106,20 @@ class OrientationCube:
         self.view.request_render()
 
     @property
-    def rectangle(self) -> tuple[float, float, float, float]:
+    def rectangle(self) -> Rectangle:
         """Left, bottom, right and top in pixels of the window.
 
         All 0 in a view too small for it, and while it is covered.
         """
         x, y = self.view.renderer.GetOrigin()
         width, height = self.view.renderer.GetSize()
-        if min(width, height) < _SMALLEST_VIEW or self._is_covered():
-            return 0.0, 0.0, 0.0, 0.0
         size = float(np.clip(_SIZE * height / 600.0, _SIZE, 2.0 * _SIZE))
         size = min(size, _SHARE * min(width, height))
         right, top = x + width - _MARGIN, y + height - _MARGIN
-        return right - size, top - size, right, top
+        place = right - size, top - size, right, top
+        if min(width, height) < _SMALLEST_VIEW or self._is_covered(place):
+            return 0.0, 0.0, 0.0, 0.0
+        return place
 
     def direction_at(self, pointer: Pointer) -> FloatArray | None:
         """Return the direction (3,) of the face, edge or corner at *pointer*, or None beside it."""

@@ -1,6 +1,7 @@
 """Random events all over the window of the program: no exception, and no growing memory.
 
-Afterwards undo leads back through every state, and redo forward again, to the bit.
+The document is saved and opened again now and then.  Before that, undo leads back through every
+state, and redo forward again, to the bit.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import traceback
 
 import numpy as np
 import pytest
-from app_hands import AppHand, delete, digest, settings_in
+from app_hands import AppHand, Boxes, delete, digest, settings_in
 from monkey import KEYS, ODDS
 from qt_hands import Qt, QtCore, QtTest, QtWidgets, application, small
 from qtpy import QtGui
@@ -26,14 +27,23 @@ from vtk_segdeform.widgets.app.window import Window
 from vtk_segdeform.widgets.editor import Autosaves
 
 COUNTS = 1_000, 5_000, 10_000, 20_000
+KINDS = [0.15, 0.35, 0.15, 0.15, 0.05, 0.12, 0.018, 0.01, 0.002]
 HELD = Qt.NoModifier, Qt.NoModifier, Qt.NoModifier, Qt.ShiftModifier, Qt.ControlModifier
 
 
 class Anywhere:
-    """A hand that moves all over the window, and draws its actions at random."""
+    """A hand that moves all over the window, and draws its actions at random.
+
+    Attributes
+    ----------
+    n_states : int
+        States of all documents that undo and redo have led to.
+    """
 
     def __init__(self, hand: AppHand, seed: int) -> None:
         self.rng, self.hand, self.window = np.random.default_rng(seed), hand, hand.window
+        self.boxes, self.n_states = Boxes(), 0
+        self.path = self.window.editor.path
         self.view = hand.view_hand()
         self.place = self.around(self.view.widget)
 
@@ -45,7 +55,7 @@ class Anywhere:
         """Send one event."""
         view, held = self.view.widget, self.pick(HELD)
         button = Qt.LeftButton if self.rng.random() < 0.9 else Qt.RightButton
-        kind = self.rng.choice(7, p=[0.15, 0.35, 0.15, 0.15, 0.05, 0.12, 0.03])
+        kind = self.rng.choice(len(KINDS), p=KINDS)
         if kind == 0:
             x = self.pick(self.window.editor.widgets.surface.points)
             at = self.view.at(x)  # not a number if it is behind the eye
@@ -66,10 +76,16 @@ class Anywhere:
             self.wheel(self.pick([view, self.window.editor_widget.panel]))
         elif kind == 5:
             self.press_control()
-        else:
+        elif kind == 6:
             self.window.resize(*self.rng.integers([450, 330], [750, 560]).tolist())
+        elif kind == 7:
+            dark = QtGui.QPalette(QtGui.QColor("#2b2d31"))
+            application().setPalette(self.pick([dark, QtGui.QPalette()]))
+        else:
+            self.open_again()
         application().processEvents()
         self.close_what_asks()
+        assert not any("Could not" in each for each in self.boxes.seen), self.boxes.seen[-1]
 
     def pick(self, things):
         """Return one of *things*."""
@@ -100,6 +116,29 @@ class Anywhere:
             place = target.rect().center() if target is control else self.around(target)
             QtTest.QTest.mouseClick(target, Qt.LeftButton, Qt.NoModifier, place)
 
+    def open_again(self) -> None:
+        """Undo and redo everything; then open the last saved document, and discard this one."""
+        self.undo_and_redo()
+        self.boxes.answers = ["Discard"]
+        self.window.open(self.path)
+        self.hand.settle()
+        self.boxes.answers = []
+        self.view = self.hand.view_hand()
+
+    def undo_and_redo(self) -> None:
+        """Let undo lead back through every state, and redo forward again, to the bit."""
+        self.view.release((0.0, 0.0))
+        self.view.key("Escape")
+        self.hand.settle()
+        session = self.window.editor.session
+        digests = [digest(session)]
+        while session.undo() is not None:
+            digests.append(digest(session))
+        for expected in reversed(digests[:-1]):
+            assert session.redo() is not None
+            assert digest(session) == expected
+        self.n_states += len(digests)
+
     def close_what_asks(self) -> None:
         """Leave dialogs and menus by Escape."""
         while box := application().activeModalWidget() or application().activePopupWidget():
@@ -129,22 +168,15 @@ def test_random_events_in_the_window_leave_no_memory_and_every_state_returns(
     for k in range(1, COUNTS[-1] + 1):
         anywhere.act()
         raised += [e for e in anywhere.view.failures if not isinstance(e, SegDeformError)]
+        anywhere.view.failures.clear()  # their tracebacks keep closed editors
         assert not raised, f"event {k}: " + "".join(traceback.format_exception(raised[0]))
         if k in COUNTS:
             gc.collect()
             memory[k] = round(resident() / 1e6)
             print(f"\n{k} events: {memory[k]} MB", flush=True)
-    anywhere.view.release((0.0, 0.0))
-    anywhere.view.key("Escape")
-    hand.settle()
-    session = window.editor.session
-    digests = [digest(session)]
-    while session.undo() is not None:
-        digests.append(digest(session))
-    for expected in reversed(digests[:-1]):
-        assert session.redo() is not None
-        assert digest(session) == expected
-    print(f"{len(digests)} states, undone and redone to the bit; {memory} MB")
+    anywhere.undo_and_redo()
+    print(f"{anywhere.n_states} states, undone and redone to the bit; {memory} MB")
     assert memory[COUNTS[-1]] - memory[COUNTS[1]] < 40
     assert not [r for r in caplog.records if r.levelno >= logging.ERROR]
+    application().setPalette(QtGui.QPalette())
     delete(window)

@@ -229,6 +229,24 @@ def test_a_double_click_frames_and_a_click_on_the_cube_turns():
     bench.hand.click((0.5 * (left + right), top - 0.3 * (top - bottom)))
     assert bench.editor.session.history.undo_label is None
     assert bench.view.view_direction @ [0.0, 0.0, 1.0] < -0.7
+    cube, gizmo = bench.editor.controller.camera.cube, bench.editor.widgets.dragger.gizmo
+    at, step = bench.mesh.vertices.mean(axis=0), cube.rectangle[0] - np.array(bench.middle)[0]
+    for share, is_covered in ((-0.5, False), (0.9, True)):
+        aside = share * step * bench.view.pixel_at(at) * bench.camera[2]
+        gizmo.place(at + aside + np.cross(bench.view.view_direction, aside))
+        assert (cube.rectangle[2] == 0.0) is is_covered
+    gizmo.place(None)
+    low, high = np.array(cube.rectangle[:2]), np.array(cube.rectangle[2:])
+    bench.editor.session.handles.pin(0)
+    at = bench.mesh.vertices[0]
+    for place, is_covered in ((low - 30.0, False), (0.5 * (low + high), True)):
+        right = np.cross(bench.view.view_direction, bench.camera[2])
+        x, y = (np.array(bench.hand.at(at)) - place) * bench.view.pixel_at(at)
+        position, focus, _ = bench.camera
+        bench.view.camera.SetPosition(*(position + x * right + y * bench.camera[2]))
+        bench.view.camera.SetFocalPoint(*(focus + x * right + y * bench.camera[2]))
+        assert (cube.rectangle[2] == 0.0) is is_covered
+    bench.editor.session.undo()
     with_cube = picture(bench.view)
     bench.editor.show_cube = False
     assert not bench.editor.show_cube
@@ -299,6 +317,23 @@ def test_the_next_axis_is_up_by_a_key():
         assert f"Up: {'XYZ'[axis]}" in bench.editor.status
         bench.hand.tick(60)  # until the camera has moved there
         assert bench.view.camera.GetViewUp()[axis] > 0.8
+
+
+def test_a_guessed_up_axis_is_told_with_the_key_that_changes_it():
+    bench = Bench(shift=np.array([0.0, 0.0, -0.5]))  # not on the ground
+    controller = bench.editor.controller
+    controller.camera.show_model()
+    controller.refresh()
+    up = "XYZ"[int(controller.camera.viewpoint.up.argmax())]
+    assert f"{up} is up by a guess. Shift+U: next axis" in bench.editor.status
+    state = bench.editor.session.state
+    bench.editor.session.set_fixed([0])
+    assert "guess" not in bench.editor.status
+    bench.editor.session.undo()
+    assert "guess" in bench.editor.status
+    bench.hand.types("shift+u")
+    assert "guess" not in bench.editor.status
+    assert bench.editor.session.state is state
 
 
 @pytest.mark.parametrize("axis", [1, 2])

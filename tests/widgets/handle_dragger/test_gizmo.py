@@ -1,4 +1,4 @@
-"""The gizmo: constant size, never hidden, and hit where it is drawn."""
+"""The gizmo: constant size away from borders, never hidden, and hit where it is drawn."""
 
 from __future__ import annotations
 
@@ -124,6 +124,30 @@ def test_the_far_half_of_a_ring_is_neither_drawn_nor_hit(view):
     assert drawn(shown) > 0.7
     gizmo.show_only(ring)
     assert drawn(hidden) > 0.9
+
+
+def test_near_a_border_of_the_view_it_is_smaller_and_inside(view):
+    gizmo, size = Gizmo(view), np.array(view.renderer.GetSize())
+    usual, smaller = 0.0, 0
+    for height in np.linspace(0.0, 3.0, 31):
+        centre = CENTRE + [0.0, 0.0, height]
+        gizmo.place(centre)
+        place = view.to_display(centre[None])[0, :2]
+        radius = gizmo.radius / view.pixel_at(centre)
+        usual = usual or radius
+        assert radius == usual or radius < usual
+        if min(place.min(), (size - place).min()) > 65.0:
+            lines = np.vstack([gizmo.line(part)[:, :2] for part in PARTS])
+            assert np.nanmin(lines) > 0.0
+            assert (np.nanmax(lines, axis=0) < size).all()
+            smaller += radius < 0.9 * usual
+        assert radius > 44.0
+        corner = np.array([*place, *place]) + [1.3 * radius, 0.0, 1.5 * radius, 1.0]
+        assert gizmo.reaches(tuple(corner))
+        assert not gizmo.reaches(tuple(corner + [0.2 * radius, 0.0, 0.2 * radius, 0.0]))
+    assert smaller
+    gizmo.place(None)
+    assert not gizmo.reaches((0.0, 0.0, 1e4, 1e4))
 
 
 def test_where_a_ring_crosses_an_arrow_the_arrow_is_hit(view):

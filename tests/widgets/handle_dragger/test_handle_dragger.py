@@ -295,9 +295,9 @@ def test_the_front_of_a_ring_seen_edge_on_follows_the_pointer(axis):
     middle, place = np.array(bench.hand.at(bench.gizmo.centre)), bench.aim(ring)
     centre, start = bench.gizmo.centre, bench.targets()
     across = np.array([1.0, 0.0])  # the ring is level
+    radius = bench.gizmo.radius / bench.view.pixel_at(centre)
     bench.hand.press(place)
     bench.hand.move(place + 45.0 * across)
-    radius = bench.gizmo.radius / bench.view.pixel_at(centre)
     right = np.cross(np.eye(3)[axis], np.eye(3)[axis - 1])  # the viewer's right
     R = rotation(np.eye(3)[axis], 45.0 / radius)
     assert np.allclose(bench.targets(), centre + (start - centre) @ R.T, atol=1e-9)

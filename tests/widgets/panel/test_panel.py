@@ -300,6 +300,18 @@ def test_rows_are_selected_renamed_and_checked():
             press(editor, "regions.list.rename", ("2", "x"))
 
 
+def test_a_region_covered_by_others_has_no_stiffness_of_its_own():
+    with editing(Mode.REGIONS) as editor:
+        session = editor.session
+        press(editor, "regions.list.select", ["1"])
+        press(editor, "regions.stiffness", "3")
+        assert of(editor, "regions.stiffness").value == "3"
+        session.painting.paint(0, np.arange(session.mesh.n_vertices))
+        assert 1 not in session.regions.labels
+        assert of(editor, "regions.stiffness").value == "1"
+        assert "region 2 is covered by other" in str(press(editor, "regions.stiffness", "10"))
+
+
 def test_before_cages_are_fitted_their_suggested_number_of_vertices_is_shown():
     mesh = sausage(is_coarse=True).mesh
     session = Session(mesh)

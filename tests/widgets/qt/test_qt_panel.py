@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
+from bodies import ball, joined
 from qt_hands import Qt, QtTest, QtWidgets, application, small, until
 from qtpy import QtGui
 
@@ -253,6 +256,23 @@ def test_keys_act_on_the_view_again_after_renaming(widget):
     assert "arm" in widget.editor.session.handles
 
 
+def test_keys_act_on_the_view_while_a_job_disables_the_panel(widget):
+    table, box = (
+        entered(widget, Mode.PULL, "handles.list"),
+        widget.panel.controls["volumes.symmetry"],
+    )
+    QtTest.QTest.mouseClick(box, Qt.LeftButton)
+    until(box.view().isVisible, "the choices")
+    QtTest.QTest.keyClick(box.view(), Qt.Key.Key_Escape)
+    until(table.hasFocus, "the focus")
+    go_on = threading.Event()
+    widget.editor.do(lambda c: c.start("counting", lambda _: go_on.wait(30.0), lambda _: None))
+    until(lambda: not table.isEnabled(), "the job")
+    assert widget.plotter.hasFocus()
+    go_on.set()
+    settle(widget)
+
+
 @pytest.mark.parametrize("key", ["Key_G", "Key_W"])
 def test_letters_in_a_field_are_no_keys_of_the_editor(widget, key):
     field = entered(widget, Mode.PULL, "pull.radius")
@@ -275,3 +295,42 @@ def test_a_list_is_as_high_as_its_rows_up_to_a_largest_height():
     least, seven, twelve, most, still = heights
     assert least == seven < twelve < most == still
     assert view.minimumHeight() < seven  # where there is no room
+
+
+@pytest.fixture
+def two_bodies():
+    """Return a widget over two balls, of which the second follows the first."""
+    application()
+    session = Session(joined(ball(1.0, (0.0, 0.0, 0.0), 2), ball(0.4, (1.3, 0.0, 0.0), 1)))
+    session.change_options(n_cage_vertices=60)
+    session.segment(1)
+    session.fit_cages()
+    session.bind()
+    widget = DeformWidget(session)
+    widget.plotter.setUpdatesEnabled(False)
+    widget.resize(900, 900)
+    widget.show()
+    until(lambda: widget.windowHandle().isExposed(), "the window")
+    yield widget
+    widget.close()
+    widget.deleteLater()
+
+
+def test_what_a_body_follows_is_chosen_by_mouse_and_undone_by_a_key(two_bodies):
+    widget, session = two_bodies, two_bodies.session
+    table = entered(widget, Mode.PULL, "bodies.list")
+    place = table.visualItemRect(table.topLevelItem(1)).center()
+    QtTest.QTest.mouseClick(table.viewport(), Qt.LeftButton, Qt.NoModifier, place)
+    settle(widget)
+    assert [table.topLevelItem(k).text(3) for k in range(2)] == ["Nothing", "Body 1"]
+    box = widget.panel.controls["bodies.follows"]
+    QtTest.QTest.mouseClick(box, Qt.LeftButton)
+    until(box.view().isVisible, "the choices")
+    for key in (Qt.Key.Key_Down, Qt.Key.Key_Return):
+        QtTest.QTest.keyClick(box.view(), key)
+    settle(widget)
+    assert session.history.labels[-1] == "body 2 follows nothing"
+    assert table.topLevelItem(1).text(3) == box.currentText() == "Nothing"
+    QtTest.QTest.keyClick(widget.focusWidget(), Qt.Key.Key_Z, Qt.ControlModifier)
+    settle(widget)
+    assert session.regions.carrier.tolist() == [0, 0]
