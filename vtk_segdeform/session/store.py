@@ -16,6 +16,8 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
     finished_held.npy, finished_shifts.npy, finished_cages.npy, finished_offset.npy
                                            as in `state.Finished`
     saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any
+    landmark_source.npy, landmark_target.npy, landmark_uncertainty.npy
+                          as in `state.LandmarkSet`                                if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -69,7 +71,7 @@ from .archive import (
 from .pose_store import pose_parts, read_places, read_pose
 from .saved_poses import in_pose
 from .session import Session
-from .state import Locality, Options, State, split_rows
+from .state import LandmarkSet, Locality, Options, State, split_rows
 
 if TYPE_CHECKING:
     from ..io import Surface
@@ -256,6 +258,10 @@ def _write(
     if state.parts:
         header["parts"] = [[name, len(ids)] for name, ids in state.parts]
         arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
+    if state.landmarks.names:
+        header["landmarks"] = list(state.landmarks.names)
+        for name in ("source", "target", "uncertainty"):
+            arrays[f"landmark_{name}"] = getattr(state.landmarks, name)
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -338,6 +344,15 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         lengths = [count for _, count in named]
         own = split_rows(archive.array("parts", "i", (sum(lengths),)), lengths)
         more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
+    if "landmarks" in header:
+        labels = field(header, "landmarks", list_of(text))
+        shapes = {
+            "source": (len(labels), 3),
+            "target": (len(labels), 3),
+            "uncertainty": (len(labels),),
+        }
+        own = [archive.array(f"landmark_{name}", "f", shape) for name, shape in shapes.items()]
+        more["landmarks"] = LandmarkSet(tuple(labels), *own)
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     saved = list[tuple[str, State]]()
