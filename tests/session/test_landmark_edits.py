@@ -47,7 +47,7 @@ def test_landmarks_are_added_changed_renamed_removed_and_undone():
     assert list(session.landmarks) == ["nose"]
     assert_array_equal(session.landmarks["nose"], [X[9], X[9]])
     for k in range(1, 4):
-        session.landmarks.move_target("nose", X[9] + [0.0, 0.0, 0.1 * k])
+        session.landmarks.move("nose", X[9] + [0.0, 0.0, 0.1 * k])
     assert session.commit() == "drag target of nose"
     assert_allclose(session.landmarks.residuals, [0.3])
     steps = [session.undo() for _ in range(4)]

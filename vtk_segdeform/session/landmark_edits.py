@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,14 @@ from ..arrays import FloatArray, IntArray, frozen
 from ..checks import shown
 from ..deformer import SurfaceTrack, checked_place, checked_point
 from ..errors import ConstraintError
-from ..landmarks import LandmarkFit, Landmarks, fit_landmarks, read_landmarks, write_landmarks
+from ..landmarks import (
+    LANDMARK_SUFFIXES,
+    LandmarkFit,
+    Landmarks,
+    fit_landmarks,
+    read_landmarks,
+    write_landmarks,
+)
 from ..mesh import SurfacePoint
 from ..progress import Progress, part
 from . import preparing, solving
@@ -48,6 +55,9 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
     Each is a point of the mesh at rest and its target, (3,) float each, in the mesh's unit; NaN
     where it is not known yet.  Edits do not move the mesh.
     """
+
+    SUFFIXES: ClassVar[frozenset[str]] = LANDMARK_SUFFIXES
+    """Of files that hold landmarks only, which `read` takes beside those of surfaces."""
 
     def __init__(self, history: Timeline, poses: Poses) -> None:
         self._history, self._poses = history, poses
@@ -86,23 +96,24 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
         ConstraintError
             If the name is invalid, there is no such point, or the target is too far away.
         """
-        mesh = self._poses.mesh
-        if name is None:
-            numbers = range(1, len(self) + 2)
-            name = next(new for n in numbers if (new := f"landmark {n}") not in self)
-        place = checked_place(mesh, point, "point").at(mesh.vertices)
-        names = tuple(dict.fromkeys((*self, name)))
-        k, after = self._places.get(name, len(self)), self._enlarged(names)
-        after.source[k], after.target[k] = place, checked_point(target, "target")
-        self._step(f"set {name}", after)
+        name = self.new_name if name is None else name
+        self._step(f"set {name}", self._changed(name, target, point))
         return name
 
-    def move_target(self, name: str, target: ArrayLike) -> None:
-        """Move the target of a landmark, as part of a drag, to be ended by ``commit``."""
-        point, places = checked_point(target, "target"), self._own.target.copy()
-        require_near(self._poses.mesh, point, "coordinates of the target")
-        places[self._places[self._known(name)]] = point
-        after = replace(self._own, target=frozen(places))
+    @property
+    def new_name(self) -> str:
+        """The first unused name of "landmark 1", "landmark 2", ..."""
+        numbers = range(1, len(self) + 2)
+        return next(name for n in numbers if (name := f"landmark {n}") not in self)
+
+    def move(
+        self, name: str, target: ArrayLike, *, point: int | ArrayLike | SurfacePoint | None = None
+    ) -> None:
+        """Move the target of a landmark, as part of a drag, to be ended by ``commit``.
+
+        With a *point*, as of `add`, there need not be such a landmark yet.
+        """
+        after = self._changed(name if point is not None else self._known(name), target, point)
         self._history.move(replace(self._history.state, landmarks=after), f"target of {name}")
 
     def remove(self, *names: str) -> None:
@@ -157,7 +168,7 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
         after.uncertainty[np.array(rows)[given]] = found.uncertainty[given]
         what = "targets" if targets else "landmarks"
         self._step(f"load {what}", after)
-        lacking = np.isnan(after.source + after.target).any(axis=1).tolist()
+        lacking = np.isnan(after.source + after.target).any(axis=1)
         return tuple(name for name, lacks in zip(names, lacking, strict=True) if lacks)
 
     def write(self, path: str | Path, *, targets: bool = False) -> None:
@@ -255,6 +266,20 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
             progress=part(progress, _PREPARED, _FITTED),
         )
         return FittedState(_in_fit(poses, state, frozen(fit.vertices.copy())), fit)
+
+    def _changed(
+        self, name: str, target: ArrayLike, point: int | ArrayLike | SurfacePoint | None
+    ) -> LandmarkSet:
+        """Return the landmarks, one of them, or one more, with another target and point."""
+        mesh, place = self._poses.mesh, checked_point(target, "target")
+        require_near(mesh, place, "coordinates of the target")
+        after = self._enlarged(tuple(dict.fromkeys((*self, name))))
+        k = self._places.get(name, len(self))
+        after.target[k] = place
+        if point is None:  # the same array, to which what is known of the others belongs
+            return replace(after, source=self._own.source, target=frozen(after.target))
+        after.source[k] = checked_place(mesh, point, "point").at(mesh.vertices)
+        return owned_landmarks(mesh, after)
 
     def _enlarged(self, names: tuple[str, ...]) -> LandmarkSet:
         """Return the landmarks, and more of them up to *names*, with arrays of their own."""
