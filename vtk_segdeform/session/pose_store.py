@@ -1,4 +1,4 @@
-"""The pose of a state in a file: its part of the header, and its arrays."""
+"""The pose and the landmarks of a state in a file: parts of the header, and arrays."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..arrays import FloatArray
-from .archive import Archive, field, flag, whole
-from .state import Finished, Pose, State, split_rows
+from .archive import Archive, field, flag, list_of, text, whole
+from .state import Finished, LandmarkSet, Pose, State, split_rows
 
 
 def pose_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -78,3 +78,25 @@ def read_places(
     if "fixed_in_pose" not in header or not field(header, "fixed_in_pose", flag):
         return None
     return archive.array(f"{prefix}fixed_at", "f", (n_fixed, 3))  # type: ignore[no-any-return]
+
+
+def landmark_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the part of the header, and the arrays, for the landmarks of *state*."""
+    own = state.landmarks
+    if not own.names:
+        return {}, {}
+    arrays = {"source": own.source, "target": own.target, "uncertainty": own.uncertainty}
+    named = {f"landmark_{name}": array for name, array in arrays.items()}
+    return {"landmarks": list(own.names)}, named
+
+
+def read_landmarks(archive: Archive, header: dict[str, Any]) -> LandmarkSet:
+    """Return the landmarks in a file."""
+    if "landmarks" not in header:
+        return State().landmarks
+    names = tuple(field(header, "landmarks", list_of(text)))
+    source, target = (
+        archive.array(f"landmark_{name}", "f", (len(names), 3)) for name in ("source", "target")
+    )
+    sigma = archive.array("landmark_uncertainty", "f", (len(names),))
+    return LandmarkSet(names, source, target, sigma)

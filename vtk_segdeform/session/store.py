@@ -68,10 +68,10 @@ from .archive import (
     whole,
     write_archive,
 )
-from .pose_store import pose_parts, read_places, read_pose
+from .pose_store import landmark_parts, pose_parts, read_landmarks, read_places, read_pose
 from .saved_poses import in_pose
 from .session import Session
-from .state import LandmarkSet, Locality, Options, State, split_rows
+from .state import Locality, Options, State, split_rows
 
 if TYPE_CHECKING:
     from ..io import Surface
@@ -258,10 +258,9 @@ def _write(
     if state.parts:
         header["parts"] = [[name, len(ids)] for name, ids in state.parts]
         arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
-    if state.landmarks.names:
-        header["landmarks"] = list(state.landmarks.names)
-        for name in ("source", "target", "uncertainty"):
-            arrays[f"landmark_{name}"] = getattr(state.landmarks, name)
+    more, points = landmark_parts(state)
+    header |= more
+    arrays |= points
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -344,15 +343,7 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
         lengths = [count for _, count in named]
         own = split_rows(archive.array("parts", "i", (sum(lengths),)), lengths)
         more["parts"] = tuple((name, ids) for (name, _), ids in zip(named, own, strict=True))
-    if "landmarks" in header:
-        labels = field(header, "landmarks", list_of(text))
-        shapes = {
-            "source": (len(labels), 3),
-            "target": (len(labels), 3),
-            "uncertainty": (len(labels),),
-        }
-        own = [archive.array(f"landmark_{name}", "f", shape) for name, shape in shapes.items()]
-        more["landmarks"] = LandmarkSet(tuple(labels), *own)
+    more["landmarks"] = read_landmarks(archive, header)
     options = _options(field(header, "options", map_of(anything)))
     state = State(regions, cages, fixed, handles, pose, options, names, pulls, locality, **more)
     saved = list[tuple[str, State]]()
