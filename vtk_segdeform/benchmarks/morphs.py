@@ -52,7 +52,7 @@ def measured(size: int) -> list[tuple[Cell, ...]]:
     turns = Rotation.from_rotvec(
         np.linspace(0.0, np.radians(_DEGREES), _POSES + 1)[1:, None] * [0.0, 1.0, 0.0]
     )
-    poses = [deformer.solve(turn.apply(tip - pivot) + pivot) for turn in turns]
+    poses = [deformer.solve(turn.apply(tip - pivot) + pivot).vertices for turn in turns]
     rows: list[tuple[Cell, ...]] = []
     with TemporaryDirectory() as folder:
         path = Path(folder) / "bend.glb"

@@ -23,6 +23,7 @@ from ..deformer import SurfaceTrack, checked_place, checked_point
 from ..errors import ConstraintError
 from ..landmarks import (
     LANDMARK_SUFFIXES,
+    LEAST_PAIRS,
     LandmarkFit,
     Landmarks,
     fit_landmarks,
@@ -38,7 +39,6 @@ from .state import Finished, LandmarkSet, Pose, State, owned_landmarks
 from .timeline import Timeline
 
 _MOST = 10_000  # landmarks: a scan that was taken for a list of them has more points
-_LEAST = 3  # pairs of a fit
 _PREPARED, _FITTED = 0.3, 0.95  # of the progress of a fit
 
 
@@ -168,7 +168,7 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
         after.uncertainty[np.array(rows)[given]] = found.uncertainty[given]
         what = "targets" if targets else "landmarks"
         self._step(f"load {what}", after)
-        lacking = np.isnan(after.source + after.target).any(axis=1)
+        lacking = np.asarray(np.isnan(after.source + after.target).any(axis=1))
         return tuple(name for name, lacks in zip(names, lacking, strict=True) if lacks)
 
     def write(self, path: str | Path, *, targets: bool = False) -> None:
@@ -249,9 +249,9 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
         """
         state, poses, own = self._history.state, self._poses, self._own
         rows = np.flatnonzero(np.isfinite(own.source + own.target).all(axis=1))
-        if len(rows) < _LEAST:
+        if len(rows) < LEAST_PAIRS:
             raise ConstraintError(
-                f"a fit needs {_LEAST} landmarks with targets or more; there are {len(rows)}"
+                f"a fit needs {LEAST_PAIRS} landmarks with targets or more; there are {len(rows)}"
             )
         if not poses.is_bound(state):
             ready = preparing.preparation(poses, state, part(progress, 0.0, _PREPARED))
