@@ -19,7 +19,13 @@ import pytest
 import vtk_segdeform as sd
 from vtk_segdeform.batches.run import _AHEAD
 from vtk_segdeform.batches.store import Writer
-from vtk_segdeform.batches.tasks import deformer_of, packed, unpacked
+from vtk_segdeform.batches.tasks import (
+    _stiffened,
+    deformer_of,
+    packed,
+    rigid_deformer_of,
+    unpacked,
+)
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.errors import ArgumentError, ConstraintError, SegDeformError
 from vtk_segdeform.models import random_limbs
@@ -393,3 +399,69 @@ def test_a_bad_plan_file_names_itself(tmp_path):
         with pytest.raises(SegDeformError, match=r"plan\.json"):
             sd.batch(path, tmp_path / "out")
     assert not Path(tmp_path / "out").exists()
+
+
+def test_stiffness_slides_and_symmetry_of_a_pose_are_those_of_a_deformer(tmp_path):
+    mesh = sd.models.bar(divisions=(3, 3, 12))
+    x = mesh.vertices
+    z = (x[:, 2] - x[:, 2].min()) / np.ptp(x[:, 2])
+    foot, tip = np.flatnonzero(z < 0.1), np.flatnonzero(z > 0.9)
+    stiffness = np.where(z > 0.9, np.inf, np.where(z < 0.3, 5.0, 1.0))
+    bend = {"handles": [{"select": "z>90%", "translate": "0.2,0,0"}]}
+    poses = [
+        {**bend, "fixed": "z<10%", "stiffness": {"z<30%": 5, "z>90%": "inf"}, "symmetry": "y"},
+        {**bend, "slides": [{"select": "z<10%", "along": "plane", "direction": [0, 0, 1]}]},
+        {"vertex": int(tip[0]), "to": x[tip[0]] + [0.2, 0, 0], "stiffness": stiffness},
+        {**bend, "fixed": "z<10%"},
+    ]
+    plan = {"meshes": [mesh], "poses": poses, "n_regions": 2, "block": 1}
+    store = sd.batch(plan, tmp_path / "one", executor=Here())
+    regions = sd.segment(mesh, 2)
+    cages = sd.fit_cages(mesh, regions, suggested_size(regions))
+    targets = x[tip] + [0.2, 0.0, 0.0]
+    slides = [sd.Slide(foot, "plane", [0, 0, 1])]
+    first = sd.Deformer(
+        mesh, regions, cages, fixed=foot, handle=tip, stiffness=stiffness, symmetry="y"
+    ).solve(targets)
+    second = sd.Deformer(mesh, regions, cages, handle=tip, slides=slides).solve(targets)
+    third = sd.pull(mesh, int(tip[0]), x[tip[0]] + [0.2, 0, 0], stiffness=stiffness, n_regions=2,
+                    refine=False)  # fmt: skip
+    for k, expected in enumerate((first, second, third)):
+        np.testing.assert_allclose(store.vertices(k), expected.vertices, atol=1e-12)
+    assert len(np.concatenate(store.cage_vertices(0))) == len(np.concatenate(first.cage_vertices))
+    assert np.abs(store.vertices(0) - store.vertices(3)).max() > 1e-3
+    read = [store.vertices(k).tobytes() for k in range(4)]
+    for cached in (deformer_of, rigid_deformer_of, _stiffened):
+        cached.cache_clear()
+    with ThreadPoolExecutor(2) as executor:
+        other = sd.batch(plan, tmp_path / "two", executor=executor)
+    assert other.digest() == store.digest()
+    assert [other.vertices(k).tobytes() for k in reversed(range(4))] == read[::-1]
+    refined = sd.batch({**plan, "poses": poses[:1], "refine": True}, tmp_path, executor=Here())
+    assert len(refined.vertices(0)) == mesh.n_vertices
+
+
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        ({"stiffness": {"z<10%": "hard"}}, r"stiffness of .*\[0\].*'hard' for 'z<10%'"),
+        ({"stiffness": {"z<10%": -1}}, "-1 for 'z<10%'"),
+        ({"slides": [{"along": "plane"}]}, "a slide of .* must have 'select'"),
+        ({"slides": [{"select": "z<1", "on": 1}]}, "a slide of .* has 'on'"),
+    ],
+)
+def test_shapes_of_a_plan_that_are_none_are_refused(pose, message, meshes, tmp_path):
+    with pytest.raises(SegDeformError, match=message):
+        sd.batch({"meshes": meshes, "poses": [{**BEND, **pose}]}, tmp_path, executor=Here())
+
+
+def test_a_pose_that_asks_for_another_symmetry_or_shape_fails_by_itself(meshes, tmp_path):
+    slide = {"select": "z<10%", "along": "path"}
+    wrong = {"symmetry": "y"}, {"symmetry": "w"}, {"stiffness": [1.0, 2.0]}
+    wrong = *wrong, {"stiffness": {"z>200%": 2}}, {"slides": [slide]}
+    poses = [{**BEND, **each} for each in wrong]
+    store = sd.batch({"meshes": meshes[:1], "poses": poses}, tmp_path, executor=Here())
+    assert store.table()["status"] == ["failed"] * 5
+    words = ["not symmetric", "symmetry must be", "stiffness must be", "z>200%", "along a"]
+    for text, word in zip(store.table()["message"], words, strict=True):
+        assert word in text, text

@@ -104,8 +104,22 @@ def test_a_volume_uncertainty_and_a_picture_are_options(words, tmp_path, capsys)
         (["--carry", "own.csv=own.fcsv"], 2, "--carry writes landmarks to .csv; got own.fcsv"),
         (["--target", "missing.csv"], 1, "missing.csv: there is no such file"),
         (["--carry", "missing.vtu=a.vtu"], 1, "missing.vtu: there is no such file"),
+        (["--residuals", "/none/a.csv"], 1, "/none/a.csv: there is no folder /none"),
     ],
 )
 def test_mistakes_are_told_by_option_or_file(words, capsys, more, code, message):
     assert main(words + more) == code
     assert message in capsys.readouterr().err
+
+
+def test_sets_without_common_names_and_in_other_units_are_told(words, tmp_path, capsys):
+    other = Landmarks(tuple("abcd"), BAR.vertices[:4], UNKNOWN[:4])
+    write_landmarks(tmp_path / "other.csv", other)
+    assert main([*words, "--target", str(tmp_path / "other.csv")]) == 2
+    said = capsys.readouterr()
+    assert "must have 3 landmarks of the same names or more; they have 0" in said.err
+    assert "unpaired        in other.csv: a, b, c and 1 more" in said.out
+    write_landmarks(tmp_path / "own.csv", Landmarks(names(12), 10.0 * BAR.vertices[SOME], UNKNOWN))
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert "% of the diagonal from the mesh: are the landmarks in other coordinates" in text

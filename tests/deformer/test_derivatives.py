@@ -122,6 +122,30 @@ def test_stiffness_has_derivatives(rng):
     assert np.abs(first).max() > 1e-3
 
 
+@pytest.mark.parametrize("name", ["small", "goal"])
+def test_the_gradient_by_stiffness_is_the_adjoint_and_leaves_a_remainder_of_second_order(name, rng):
+    base, (_, _, options) = bound(*HELD[name][:2]), HELD[name]
+    ends = {"fixed": base.fixed, "handle": base.handle}
+    mesh, labels = base.mesh, base.regions.labels
+    stiffness = 1.0 + rng.uniform(size=mesh.n_vertices)
+    changes = [stiffness * (labels == r) for r in range(2)]
+    deformer = base.stiffened(stiffness).hold(**ends, **options)
+    targets, solution = bent(deformer)
+    cotangent = rng.normal(size=solution.vertices.shape)
+    gradient = deformer.vjp(solution, cotangent, stiffness=changes).stiffness
+    moved = [np.vdot(cotangent, deformer.jvp(solution, stiffness=each)) for each in changes]
+    assert_allclose(gradient, moved, rtol=1e-10)
+    if name != "small":
+        return
+    value, off = np.vdot(cotangent, solution.vertices), []
+    for step in (0.1, 0.05):
+        other = base.stiffened(stiffness + step * changes[1]).hold(**ends, **options)
+        change = np.vdot(cotangent, other.solve(targets).vertices) - value
+        off.append(abs(change - step * gradient[1]))
+    assert off[0] / off[1] == pytest.approx(4.0, rel=0.15)
+    assert off[0] < 0.2 * abs(0.1 * gradient[1])
+
+
 def test_a_mirrored_deformer_has_derivatives(rng):
     vertices, faces = icosphere(3)
     mesh = sd.Mesh(vertices * [2.0, 1.0, 0.7], faces)
@@ -181,6 +205,8 @@ def test_what_has_no_derivative_is_refused(rng):
         lambda: deformer.jvp(solution, targets[:-1]),
         lambda: deformer.jvp(solution, volumes={"whole": 1.0}),  # preserved, but no goal
         lambda: deformer.jvp(solution, stiffness=np.ones(3)),
+        lambda: deformer.vjp(solution, cotangent, stiffness=[np.ones(3)]),
+        lambda: deformer.vjp(solution, cotangent, stiffness=1.0),
         lambda: base.hold(**ends).vjp(solution, cotangent),
     ):
         with pytest.raises((ArgumentError, ValueError)):

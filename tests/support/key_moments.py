@@ -220,7 +220,7 @@ class Stand:
         controller.messages.clear()
         widgets.cages_wanted = widgets.overlay_wanted = False
         widgets.selector.tool, widgets.selector.through = Tool.BRUSH, False
-        widgets.puller.locality = None
+        widgets.puller.locality, widgets.landmarks.adds = None, False
         shutil.copy(self.folder / "start.segdeform", self.folder / "work.segdeform")
         self.editor.path = self.folder / "work.segdeform"
         self.editor.mode = mode

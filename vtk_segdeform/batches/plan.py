@@ -15,6 +15,7 @@ from __future__ import annotations
 import glob
 import hashlib
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -23,8 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import IntArray, as_ids, is_number, is_whole, plain
+from ..arrays import FloatArray, IntArray, as_ids, is_number, is_whole, plain
 from ..checks import as_flag, as_path, require_sequence, shown
+from ..deformer import Slide
 from ..errors import ArgumentError, ConstraintError
 from ..files import read_regular
 from ..geometry import moved_handles
@@ -32,13 +34,15 @@ from ..importing import imported
 from ..mesh import Mesh, Role, parse_selection
 from ..version import __version__
 
+_SHAPE = {"volumes", "stiffness", "slides", "symmetry"}
 _KEYS = {
     "random": {"random", "seed", "degrees"},
-    "vertex": {"vertex", "to", "radius", "pins", "locality", "limb", "hinge", "volumes"},
-    "handle": {"fixed", "handles", "handle", "targets", "volumes"},
+    "vertex": {"vertex", "to", "radius", "pins", "locality", "limb", "hinge"} | _SHAPE,
+    "handle": {"fixed", "handles", "handle", "targets"} | _SHAPE,
 }
 _MOST = 1_000_000  # random poses of an entry
 _HANDLE = {"select", "matrix", "rotate", "pivot", "translate"}
+_SLIDE = {"select", "along", "direction"}
 DEGREES = 60.0
 """Largest angle by which a random pose bends a limb, by default."""
 
@@ -145,7 +149,34 @@ class Given:
             found["handle"], found["targets"] = ids, [targets]
         if self._surface is not None and is_whole(pose.get("vertex"), 0):
             found["vertex"] = int(self._vertices([int(pose["vertex"])], "handle")[0])
+        if pose.get("stiffness") is not None:
+            found["stiffness"] = self._stiffness(pose["stiffness"])
+        if "slides" in pose:
+            found["slides"] = [self._slide(each) for each in pose["slides"]]
         return found
+
+    def _stiffness(self, given: Any) -> FloatArray:
+        """Return the stiffness (n,) of the vertices, given for points or by selections."""
+        if not isinstance(given, Mapping):
+            own = plain(given, "stiffness")
+            if self._surface is None:
+                return own
+            count = self._surface.given.n_points
+            if own.shape != (count,):
+                raise ConstraintError(f"stiffness must have shape ({count},); got {own.shape}")
+            return np.asarray(self._surface.at_vertices(own))
+        found = np.ones(self.mesh.n_vertices)
+        for selection, times in given.items():
+            found[self._vertices(selection, "handle")] = times
+        return found
+
+    def _slide(self, given: Any) -> tuple[IntArray, str, Any]:
+        """Return the vertices of a slide, and the other arguments of `Slide`."""
+        if isinstance(given, Slide):
+            return self._vertices(given.vertices, "handle"), given.along, given.direction
+        kind = {"select": given} if isinstance(given, str) else given
+        vertices = self._vertices(kind["select"], "handle")
+        return vertices, kind.get("along", "plane"), kind.get("direction")
 
     def _vertices(self, selection: Any, role: Role) -> IntArray:
         ids = self._ids(selection, role)
@@ -227,6 +258,7 @@ def _counted(pose: Any, number: int) -> Iterator[Mapping[str, Any]]:
         for k in range(int(count)):
             yield {"number": k, "seed": int(seed), "degrees": float(degrees)}
         return
+    pose = _with_checked_shape(pose, name)
     if kind == "handle":
         handles = pose.get("handles", [])
         require_sequence(handles, f"{name}['handles']")
@@ -237,6 +269,31 @@ def _counted(pose: Any, number: int) -> Iterator[Mapping[str, Any]]:
         if not (handles or "handle" in pose or _goals(pose)):
             raise ConstraintError(f"{name} must have handles, a vertex to pull, or volumes")
     yield pose
+
+
+def _with_checked_shape(pose: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return *pose* with its stiffness by selections as numbers, if that and slides are valid."""
+    stiffness, slides = pose.get("stiffness"), pose.get("slides", [])
+    require_sequence(slides, f"{name}['slides']")
+    for each in slides:
+        if isinstance(each, Mapping) and "select" in each:
+            _require_known(each, _SLIDE, f"a slide of {name}")
+        elif not isinstance(each, str | Slide):
+            raise ConstraintError(f"a slide of {name} must have 'select'; got {shown(each)}")
+    if not isinstance(stiffness, Mapping):
+        return pose
+    found = {}
+    for selection, times in stiffness.items():
+        try:
+            found[selection] = float(times)
+        except (TypeError, ValueError):
+            found[selection] = math.nan
+        if not (isinstance(selection, str) and found[selection] > 0.0):
+            raise ConstraintError(
+                f"the stiffness of {name} must be selections, each with how many times stiffer "
+                f'it is, or "inf"; got {shown(times)} for {shown(selection)}'
+            )
+    return {**pose, "stiffness": found}
 
 
 def _goals(pose: Mapping[str, Any]) -> Mapping[str, Any]:

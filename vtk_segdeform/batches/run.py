@@ -88,7 +88,9 @@ def batch(
         - ``random``, a number of poses, with ``seed`` and ``degrees``, as of `random_poses`
 
         Fixed vertices and pins are numbers, or selections such as "z<10%".  The first two kinds may
-        have ``volumes``, goals by name.
+        have ``volumes``, goals by name; ``stiffness``, as ``{"z>80%": 5, "z<10%": "inf"}``, or one
+        number for each vertex; ``slides``, each a selection or with ``select``, ``along`` and
+        ``direction``, as of `Slide`; and ``symmetry``, all as of `deform`.
 
         Of all poses: ``refine`` (False: cages are stored; True: finished vertices),
         ``avoid_contact`` (False), ``n_regions``, ``n_cage_vertices`` (automatic); ``block``, poses

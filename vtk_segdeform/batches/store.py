@@ -27,7 +27,7 @@ from ..errors import ArgumentError
 from ..files import replacing
 from ..importing import imported
 from ..mesh import Mesh
-from .tasks import FAILED, SET_ASIDE, TOO_LONG, Row, deformer_of, unpacked
+from .tasks import FAILED, SET_ASIDE, TOO_LONG, Row, deformer_of, rigid_deformer_of, unpacked
 
 NAME = "poses.segposes"
 _COLUMNS = (
@@ -93,11 +93,7 @@ class PoseStore(Described):
     def cage_vertices(self, number: int) -> tuple[FloatArray, ...]:
         """Return the cages (m_r, 3) of a pose, one for each region; of a refined one none."""
         refined, data, packed_mesh = self._found(number)
-        if refined:
-            return ()
-        points = np.frombuffer(data).reshape(-1, 3)
-        ends = np.cumsum([cage.n_vertices for cage in deformer_of(packed_mesh).cages])
-        return tuple(np.split(points, ends[:-1]))
+        return () if refined else _cages(data, packed_mesh)[0]
 
     def vertices(self, number: int) -> FloatArray:
         """Return the mesh (n, 3) in the pose with this *number*.
@@ -112,7 +108,9 @@ class PoseStore(Described):
         refined, data, packed_mesh = self._found(number)
         if refined:
             return np.frombuffer(data).reshape(-1, 3)
-        return deformer_of(packed_mesh).surface(self.cage_vertices(number))
+        cages, rigid = _cages(data, packed_mesh)
+        own = rigid_deformer_of(packed_mesh, rigid) if rigid else deformer_of(packed_mesh)
+        return own.surface(cages)
 
     def write_mesh(self, number: int, path: str | os.PathLike[str]) -> None:
         """Write the mesh in the pose with this *number* to a file of any format of `write_mesh`."""
@@ -169,6 +167,13 @@ class PoseStore(Described):
             reason = f"{status}: {message}" if status else "not computed yet"
             raise ArgumentError(f"number {number} is a pose without vertices: {reason}")
         return bool(refined), data, mesh
+
+
+def _cages(data: bytes, packed_mesh: bytes) -> tuple[tuple[FloatArray, ...], bytes]:
+    """Return the cages (m_r, 3) in the *data* of a pose, and the bits after them; see `Row`."""
+    ends = np.cumsum([cage.n_vertices for cage in deformer_of(packed_mesh).cages])
+    points = np.frombuffer(data, count=3 * int(ends[-1])).reshape(-1, 3)
+    return tuple(np.split(points, ends[:-1])), data[points.nbytes :]
 
 
 class Writer:

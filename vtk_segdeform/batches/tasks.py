@@ -25,6 +25,9 @@ from ..cages import Cage, fit_cages, suggested_size
 from ..deformer import (
     SPREAD,
     Deformer,
+    Mirror,
+    Slide,
+    Stiffness,
     automatic_locality,
     changing_components,
     checked_constraints,
@@ -65,7 +68,8 @@ class Row(NamedTuple):
     seconds: float = 0.0
     refined: bool = False
     data: bytes = b""
-    """float64: the cage vertices (m, 3), or of a refined pose its vertices (n, 3)."""
+    """float64: the cage vertices (m, 3), or of a refined pose its vertices (n, 3).  After those of
+    cages with rigid parts a bit for each vertex: whether it is rigid, which W~ depends on."""
 
 
 def packed(mesh: Mesh, regions: Regions | None = None, cages: Sequence[Cage] = ()) -> bytes:
@@ -106,6 +110,19 @@ def deformer_of(data: bytes) -> Deformer:
     mesh, regions, cages = unpacked(data)
     assert regions is not None
     return Deformer(mesh, regions, cages, cache=cache_folder())
+
+
+@functools.lru_cache(maxsize=2)
+def rigid_deformer_of(data: bytes, rigid: bytes) -> Deformer:
+    """Return `deformer_of` the same with the W~ of *rigid* parts, a bit for each vertex."""
+    deformer = deformer_of(data)
+    bits = np.unpackbits(np.frombuffer(rigid, np.uint8), count=deformer.mesh.n_vertices)
+    return deformer.stiffened(np.where(bits, np.inf, 1.0))
+
+
+@functools.lru_cache(maxsize=2)
+def _stiffened(deformer: Deformer, stiffness: bytes) -> Deformer:
+    return deformer.stiffened(np.frombuffer(stiffness))
 
 
 def compute(
@@ -188,6 +205,7 @@ def _row(deformer: Deformer, pose: Mapping[str, Any], settings: Settings) -> Row
         return Row(status, str(fault), seconds=time.perf_counter() - began)
     refined = solution.is_finished
     data = solution.vertices if refined else np.concatenate(solution.cage_vertices)
+    rigid = b"" if refined else _rigid(deformer.mesh, pose)
     return Row(
         solution.status.name.lower().replace("_", " "),
         volume_change=solution.volume_change,
@@ -197,27 +215,41 @@ def _row(deformer: Deformer, pose: Mapping[str, Any], settings: Settings) -> Row
         draws=draws,
         seconds=time.perf_counter() - began,
         refined=refined,
-        data=np.ascontiguousarray(data).tobytes(),
+        data=np.ascontiguousarray(data).tobytes() + rigid,
     )
+
+
+def _rigid(mesh: Mesh, pose: Mapping[str, Any]) -> bytes:
+    """Return a bit for each vertex of *mesh* that is rigid in a pose; nothing if none is."""
+    stiffness = Stiffness.of(mesh, pose.get("stiffness"), Mirror.of(mesh, pose.get("symmetry")))
+    if stiffness is None or not stiffness.rigid:
+        return b""
+    bits = np.zeros(mesh.n_vertices, dtype=bool)
+    bits[np.concatenate(stiffness.rigid)] = True
+    return np.packbits(bits).tobytes()
 
 
 def _solved(
     deformer: Deformer, pose: Mapping[str, Any], settings: Settings, progress: Progress
 ) -> tuple[Solution, int | None]:
     """Return a pose; and how often it was drawn, if it is random."""
-    if settings.avoid_contact:
-        deformer = deformer.hold(avoid_contact=True)
+    held: dict[str, Any] = {"avoid_contact": settings.avoid_contact}
     if "number" in pose:
         return drawn(
-            deformer, _skeleton(deformer), pose["seed"], pose["number"],
+            deformer.hold(**held), _skeleton(deformer), pose["seed"], pose["number"],
             degrees=pose["degrees"], refine=settings.refine, progress=progress,
         )  # fmt: skip
+    if pose.get("stiffness") is not None:
+        given = np.array(pose["stiffness"], dtype=np.float64)
+        deformer = _stiffened(deformer, given.tobytes())
+    held |= {"volumes": pose.get("volumes"), "symmetry": pose.get("symmetry")}
+    held["slides"] = [Slide(*each) for each in pose.get("slides", ())]
     if "vertex" in pose:
-        own, path = _pulling(deformer, pose)
+        own, path = _pulling(deformer, pose, held)
     else:
         empty = np.zeros(0, dtype=np.int64)
         fixed, handle = pose.get("fixed", empty), pose.get("handle", empty)
-        own = deformer.hold(fixed=fixed, handle=handle, volumes=pose.get("volumes"))
+        own = deformer.hold(fixed=fixed, handle=handle, **held)
         path = pose.get("targets", [np.empty((0, 3))])
     solution = solved_along(own, path, progress=progress)
     return (own.finish(solution, progress=progress) if settings.refine else solution), None
@@ -228,7 +260,9 @@ def _skeleton(deformer: Deformer) -> Skeleton:
     return Skeleton.of(deformer.mesh, deformer.regions.labels)
 
 
-def _pulling(deformer: Deformer, pose: Mapping[str, Any]) -> tuple[Deformer, list[FloatArray]]:
+def _pulling(
+    deformer: Deformer, pose: Mapping[str, Any], held: Mapping[str, Any]
+) -> tuple[Deformer, list[FloatArray]]:
     """Return a deformer near the pulled point, and its target; as `pull`."""
     mesh = deformer.mesh
     point, radius = checked_place(mesh, pose["vertex"]), checked_radius(mesh, pose.get("radius"))
@@ -237,7 +271,7 @@ def _pulling(deformer: Deformer, pose: Mapping[str, Any]) -> tuple[Deformer, lis
         raise ConstraintError(fault)
     locality = checked_locality(pose.get("locality"))
     locality = automatic_locality(len(fixed)) if locality is None else locality
-    own = deformer.hold(fixed=fixed, handle=handle, volumes=pose.get("volumes"))
+    own = deformer.hold(fixed=fixed, handle=handle, **held)
     reach, follows, depth = own.reach_of_pull(point, radius, locality, pose.get("limb"))
     hinge = pose.get("hinge", 0.0)
     own = own.local(point, reach, SPREAD * radius, follows=follows, depth=depth, hinge=hinge)

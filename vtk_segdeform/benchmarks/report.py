@@ -11,7 +11,18 @@ from pathlib import Path
 from ..errors import Cancelled, SegDeformError
 from ..files import replacing
 from ..progress import Progress, part
-from . import atlas, batching, constrained, felt, mechanisms, opening, paper, peers, solids
+from . import (
+    atlas,
+    batching,
+    constrained,
+    felt,
+    mechanisms,
+    morphs,
+    opening,
+    paper,
+    peers,
+    solids,
+)
 from .measuring import conditions
 from .results import Scale, Section
 from .tasks import warm_up
@@ -23,6 +34,7 @@ EXPERIMENTS: dict[str, Callable[[Scale, Progress | None], Section]] = {
     "landmarks": atlas.run,
     "mechanisms": mechanisms.run,
     "batch": batching.run,
+    "motion": morphs.run,
     "paper": paper.run,
     "peers": peers.run,
     "solids": solids.run,

@@ -12,10 +12,12 @@ import numpy as np
 
 from .. import io
 from ..arrays import FloatArray
-from ..errors import ArgumentError, ConstraintError
+from ..deformer import SurfaceTrack
+from ..errors import ArgumentError, ConstraintError, MeshError
 from ..io import Surface, stored_vertices, volume_change
 from ..landmarks import (
     LANDMARK_SUFFIXES,
+    LEAST_PAIRS,
     LandmarkFit,
     Landmarks,
     Pairs,
@@ -31,6 +33,7 @@ from ..progress import Progress
 from .outputs import Say, report_surface, report_volume
 
 _LISTED = 3  # names in a line
+_FAR = 0.05  # diagonals from the mesh: landmarks that are picked on it are much nearer
 
 
 def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -41,6 +44,12 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
     for _, path in options.carry:
         if _is_of_landmarks(path) and path.suffix.lower() != ".csv":
             raise ConstraintError(f"--carry writes landmarks to .csv; got {path.name}")
+    for path, _ in options.carry:
+        if not path.is_file():
+            raise MeshError(f"{path}: there is no such file")
+    for path in filter(None, (options.residuals, *(other for _, other in options.carry))):
+        if not path.parent.is_dir():
+            raise MeshError(f"{path}: there is no folder {path.parent}")
     source, target = read_landmarks(options.source), read_landmarks(options.target)
     sliding = [_sliding(names, path, source) for names, path in options.slide]
     target = _with_unknown(target, [name for names, _ in sliding for name in names])
@@ -48,8 +57,14 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
     for path, found in ((options.source, source), (options.target, target)):
         if alone := [name for name in found.names if name not in set(pairs.names)]:
             say(f"unpaired        in {path.name}: {_listed(alone)}")
+    if len(pairs.names) < LEAST_PAIRS:
+        raise ConstraintError(
+            f"--source and --target must have {LEAST_PAIRS} landmarks of the same names or more; "
+            f"they have {len(pairs.names)}"
+        )
     surface = Surface.read(options.input)
     report_surface(surface, say)
+    _report_far(surface.mesh, pairs, say)
     given = pairs.uncertainty
     start = time.perf_counter()
     try:
@@ -108,6 +123,18 @@ def _with_unknown(target: Landmarks, names: Sequence[str]) -> Landmarks:
         np.concatenate([target.points, np.full((len(more), 3), np.nan)]),
         np.concatenate([target.uncertainty, np.full(len(more), np.nan)]),
     )
+
+
+def _report_far(mesh: Mesh, pairs: Pairs, say: Say) -> None:
+    """Print how far a landmark is from *mesh*, if that is far: its coordinates may be others."""
+    away = np.linalg.norm(SurfaceTrack(mesh)(pairs.source)[0] - pairs.source, axis=1)
+    worst = int(away.argmax())
+    if away[worst] > _FAR * mesh.diagonal:
+        share = 100.0 * away[worst] / mesh.diagonal
+        say(
+            f"far away        {pairs.names[worst][:40]} is {share:.3g} % of the diagonal from the "
+            "mesh: are the landmarks in other coordinates or units?"
+        )
 
 
 def _report(fit: LandmarkFit, pairs: Pairs, say: Say) -> None:

@@ -39,7 +39,16 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, IntArray, as_points, is_number, largest_length
 from ..cages import Cage
-from ..checks import all_of, as_callable, as_flag, as_path, as_text, require, shown
+from ..checks import (
+    all_of,
+    as_callable,
+    as_flag,
+    as_path,
+    as_text,
+    require,
+    require_sequence,
+    shown,
+)
 from ..errors import ArgumentError, ConstraintError
 from ..geometry import turned_over
 from ..kernels import compiled_kernels, load_for, one_blas_thread
@@ -646,15 +655,26 @@ class Deformer:
 
     @one_blas_thread()
     def vjp(
-        self, solution: Solution, cotangent: ArrayLike, *, volumes: Sequence[str] = ()
+        self,
+        solution: Solution,
+        cotangent: ArrayLike,
+        *,
+        volumes: Sequence[str] = (),
+        stiffness: Sequence[ArrayLike] = (),
     ) -> Gradient:
         """Return the gradient of a function of the vertices of *solution*; see `jvp`.
 
-        *cotangent* (n, 3) is its gradient by the vertices.  Returned are that by the targets, and
-        those by the goals of *volumes* with these names.
+        *cotangent* (n, 3) is its gradient by the vertices.  Returned are that by the targets, those
+        by the goals of *volumes* with these names, and those along k changes of the *stiffness*,
+        (n,) each, such as that of a region each.  Each change takes as long as the energy does.
         """
-        pose = self._linearised(solution)
-        return pose.gradient(as_points(cotangent, "cotangent", self.mesh.n_vertices), volumes)
+        require_sequence(stiffness, "stiffness")
+        return self._linearised(solution).gradient(
+            as_points(cotangent, "cotangent", self.mesh.n_vertices),
+            volumes=volumes,
+            stiffness=stiffness,
+            now=self._stiffness,
+        )
 
     def _linearised(self, solution: Solution) -> Linearised:
         """Return the pose of *solution* to first order, which has to be that of the last solve."""

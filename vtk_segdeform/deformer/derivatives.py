@@ -54,6 +54,8 @@ class Gradient(NamedTuple):
     """(k, 3), by the targets."""
     volumes: Mapping[str, float]
     """By the goals of volumes that were asked for."""
+    stiffness: FloatArray = np.empty(0)
+    """(k,), along the changes of the stiffness that were asked for."""
 
 
 class _Change(NamedTuple):
@@ -116,23 +118,35 @@ class Linearised:
             found += self._moved(self._of_parameter(self._with_stiffness(stiffness, now)))
         return found
 
-    def gradient(self, cotangent: FloatArray, volumes: Sequence[str]) -> Gradient:
-        """Return `Deformer.vjp` for *cotangent* (n, 3)."""
+    def gradient(
+        self,
+        cotangent: FloatArray,
+        *,
+        volumes: Sequence[str],
+        stiffness: Sequence[ArrayLike],
+        now: FloatArray | None,
+    ) -> Gradient:
+        """Return `Deformer.vjp` for *cotangent* (n, 3); *now* (n,) is the present stiffness."""
         v, mu, c, nu = self._loads(cotangent)
+
+        def slope(at: Callable[[float], Constraints]) -> float:
+            change = self._of_parameter(at)
+            found = -float(np.vdot(v, change.slope) + mu @ change.off)
+            if self._is_moved:
+                found += float(np.vdot(c, change.moved) - nu @ change.off_mesh)
+            return found
+
         along = {}
         for name in all_of(volumes, str, "volumes"):
             unit, at = self._with_volume(name)
-            change = self._of_parameter(at)
-            slope = -float(np.vdot(v, change.slope) + mu @ change.off)
-            if self._is_moved:
-                slope += float(np.vdot(c, change.moved) - nu @ change.off_mesh)
-            along[name] = slope / unit
+            along[name] = slope(at) / unit
+        stiffer = [slope(self._with_stiffness(each, now)) for each in stiffness]
         constraints, positions = self.path.constraints, self.path.solver.positions
         by_places = positions.weights[:, None] * (positions.rows @ v)
         found = constraints.places_of_targets.T @ by_places / constraints.problem.frame.size
         if constraints.mirror is not None:
             found = constraints.mirror.adjoint(constraints.handle, constraints.mates, found)
-        return Gradient(np.asarray(found), along)
+        return Gradient(np.asarray(found), along, np.array(stiffer, dtype=np.float64))
 
     @property
     def _volumes(self) -> Volumes:

@@ -162,15 +162,19 @@ class SurfaceTrack:
 
     def __call__(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the nearest points of *x* (k, 3), and the projectors on the normals there."""
+        faces, shares = self.nearest(x)
+        nearest = np.einsum("kc,kcj->kj", shares, self._corners[faces])
+        normals = np.einsum("kc,kcj->kj", shares, self._normals[faces])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+        return nearest, normals[:, :, None] * normals[:, None]
+
+    def nearest(self, x: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return the faces (k,) nearest to *x* (k, 3), and the shares (k, 3) of their corners."""
         near = self._tree.query(x, k=_NEIGHBOURS)[1].ravel()  # a mesh has three vertices at least
         each, k = ragged_arange(self._counts[near])
         faces, point = self._faces_at[self._starts[near][each] + k], each // _NEIGHBOURS
-        corners = self._corners[faces]
-        shares, away = nearest_on_triangles(corners, x[point])
+        shares, away = nearest_on_triangles(self._corners[faces], x[point])
         least = np.minimum.reduceat(away, np.flatnonzero(np.diff(point, prepend=-1)))
         best = np.flatnonzero(away == least[point])
         best = best[np.diff(point[best], prepend=-1) != 0]
-        nearest = np.einsum("kc,kcj->kj", shares[best], corners[best])
-        normals = np.einsum("kc,kcj->kj", shares[best], self._normals[faces[best]])
-        normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
-        return nearest, normals[:, :, None] * normals[:, None]
+        return faces[best], shares[best]

@@ -17,11 +17,12 @@ from .files import (
     write_landmarks,
     write_rows,
 )
-from .fit import LandmarkFit, fit_landmarks
+from .fit import LEAST_PAIRS, LandmarkFit, fit_landmarks
 from .spline import Spline
 
 __all__ = [
     "LANDMARK_SUFFIXES",
+    "LEAST_PAIRS",
     "LandmarkFit",
     "Landmarks",
     "Pairs",

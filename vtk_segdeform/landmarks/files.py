@@ -101,11 +101,12 @@ def read_landmarks(path: str | os.PathLike[str]) -> Landmarks:
             data = file.read(_LARGEST + 1)
         if len(data) > _LARGEST:
             raise ValueError("too large for landmarks")
-        return _checked(path, list(_READERS[suffix](data.decode("utf-8-sig"))))
+        rows = list(_READERS[suffix](data.decode("utf-8-sig")))
     except OSError as fault:
         raise MeshError(f"{path}: {fault.strerror or fault}") from None
     except (ValueError, KeyError, TypeError, ElementTree.ParseError, csv.Error) as fault:
         raise MeshError(f"{path}: is no file of landmarks ({fault})") from None
+    return _checked(path, rows)
 
 
 def write_landmarks(path: str | os.PathLike[str], landmarks: Landmarks) -> None:
@@ -149,10 +150,17 @@ def _checked(path: Path, rows: Sequence[_Row]) -> Landmarks:
     name, count = Counter(names).most_common(1)[0]
     if count > 1:
         raise MeshError(f"{path}: has {count} landmarks called {name[:60]!r}")
-    points = np.array([[float(c) for c in row[1:4]] for row in rows])
-    sigma = np.array([float(row[4]) if f"{row[4]}".strip() else np.nan for row in rows])
-    if not np.isfinite(points).all() or (sigma < 0.0).any() or np.isinf(sigma).any():
-        raise MeshError(f"{path}: has landmarks whose numbers are not finite, or negative")
+    try:
+        points = np.array([[float(c) for c in row[1:4]] for row in rows])
+        sigma = np.array([float(row[4]) if f"{row[4]}".strip() else np.nan for row in rows])
+    except (ValueError, TypeError) as fault:
+        raise MeshError(f"{path}: is no file of landmarks ({fault})") from None
+    wrong = ~np.isfinite(points).all(axis=1) | (sigma < 0.0) | np.isinf(sigma)
+    if wrong.any():
+        raise MeshError(
+            f"{path}: the coordinates of {names[int(wrong.argmax())][:60]!r} are not finite, or "
+            "its uncertainty is negative or infinite"
+        )
     return Landmarks(names, points, sigma)
 
 

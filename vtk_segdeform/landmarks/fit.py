@@ -42,7 +42,8 @@ from .spline import CENTRES, Compact, Spline, smoothing_of
 STIFFNESS = (1e-3, 1e-2, 0.1, 1.0, 10.0)
 """Of the springs that are compared, in units of the shape energy: with the first hardly anything
 moves, with the last they hold.  0, the spline alone, is compared as well."""
-_LEAST = 3  # pairs
+LEAST_PAIRS = 3
+"""Of a fit: fewer do not tell how a body is turned."""
 _GROUPS = 12  # of landmarks that are left out, at most
 _BOUND, _TESTED, _FITTED = 0.3, 0.75, 0.85  # of the progress
 _WORDS = {0: "", 1: "at least ", -1: "at most "}
@@ -148,8 +149,8 @@ def fit_landmarks(
     a = as_points(source, "source")
     tracks = checked_slides(slides, len(a))
     u = _targets(target, len(a), [ids for ids, _ in tracks])
-    if len(a) < _LEAST:
-        raise ArgumentError(f"source must have {_LEAST} landmarks or more; got {len(a)}")
+    if len(a) < LEAST_PAIRS:
+        raise ArgumentError(f"source must have {LEAST_PAIRS} landmarks or more; got {len(a)}")
     sigma = as_numbers(uncertainty, "uncertainty")
     if sigma.shape not in ((), (len(a),)) or not (np.isfinite(sigma) & (sigma >= 0.0)).all():
         raise ArgumentError(f"uncertainty must be one or {len(a)} numbers, 0 or more")
@@ -198,8 +199,8 @@ def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> Float
         free[sliding] = np.isnan(given[sliding]).any(axis=1)
     if not free.any():
         return as_points(given, "target", count)
-    if count - np.count_nonzero(free) < _LEAST:
-        raise ArgumentError(f"target must have {_LEAST} landmarks or more that are not NaN")
+    if count - np.count_nonzero(free) < LEAST_PAIRS:
+        raise ArgumentError(f"target must have {LEAST_PAIRS} landmarks or more that are not NaN")
     found = as_points(np.where(free[:, None], 0.0, given), "target", count)
     found[free] = np.nan
     return found

@@ -16,6 +16,7 @@ The files, in reading order:
     separating     components that follow others, and those with regions of their own
     finishing      poses finished on the mesh itself
     saved_poses    poses by name: saved, applied and blended
+    landmark_edits landmarks and their targets, and the pose fitted to them
     pose_copies    a pose of one mesh given to another one
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
@@ -32,6 +33,7 @@ from . import finishing, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .handles import require_handle
+from .landmark_edits import SessionLandmarks
 from .listeners import Change
 from .naming import region_name, volume_label
 from .painting import Painting
@@ -54,6 +56,7 @@ __all__ = [
     "Preparation",
     "SavedPoses",
     "Session",
+    "SessionLandmarks",
     "StandIn",
     "State",
     "SurfacePoint",

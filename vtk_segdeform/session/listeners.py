@@ -34,6 +34,8 @@ class Change(enum.Flag):
     """`Handles.pivot` of a handle."""
     SAVED_POSES = enum.auto()
     """`Session.saved_poses`."""
+    LANDMARKS = enum.auto()
+    """`Session.landmarks`."""
 
 
 Listener = Callable[[Change], None]

@@ -13,6 +13,7 @@ Each of these calls is one undo step, except that all moves of a drag are one st
     poses      `Poses`: everything that is computed from states
     handles    the handles and their edits              painting    edits of the regions
     saved_poses                                         poses by name, applied and blended
+    landmarks                                           points with targets, and the fit to them
 
 - New regions or cages reset the pose, unless `set_cages` gets the cages in the pose.  New regions
   keep the cages if each cage still encloses its region; otherwise all cages are removed.
@@ -60,6 +61,7 @@ from ..solver import Solution, Status
 from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
 from .finishing import FinishedPose
 from .handle_edits import Handles
+from .landmark_edits import SessionLandmarks
 from .listeners import Listener
 from .painting import Painting
 from .poses import Poses
@@ -190,6 +192,11 @@ class Session(Described):
     def saved_poses(self) -> SavedPoses:
         """The saved poses by name; and edits of them."""
         return SavedPoses(self.history, self.poses)
+
+    @property
+    def landmarks(self) -> SessionLandmarks:
+        """The landmarks by name; and edits of them, and the fit of the mesh to their targets."""
+        return SessionLandmarks(self.history, self.poses)
 
     @property
     def painting(self) -> Painting:

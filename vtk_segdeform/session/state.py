@@ -19,7 +19,16 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray, as_ids, as_points, frozen, is_number, is_whole
+from ..arrays import (
+    FloatArray,
+    IntArray,
+    as_ids,
+    as_numbers,
+    as_points,
+    frozen,
+    is_number,
+    is_whole,
+)
 from ..cages import Cage, require_enclosed
 from ..checks import Described, all_of, require, require_sequence, shown
 from ..deformer import (
@@ -215,6 +224,22 @@ class Locality(Frozen):
     """0 to 1: where this limb bends."""
 
 
+@dataclass(frozen=True, eq=False)
+class LandmarkSet(Frozen):
+    """k named landmarks, of the mesh at rest, and where each is to be; read-only arrays."""
+
+    names: tuple[str, ...] = ()
+    source: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
+    """(k, 3) float; NaN in the rows of those that have only a target yet."""
+    target: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
+    """(k, 3) float; NaN in the rows of those without one."""
+    uncertainty: FloatArray = field(default_factory=lambda: frozen(np.empty(0)))
+    """(k,) float: standard deviation of each coordinate; NaN where none is given, which is 0."""
+
+
+_NO_LANDMARKS = LandmarkSet()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class State(Described, Frozen):
     """Everything in a session except its mesh; immutable."""
@@ -247,6 +272,7 @@ class State(Described, Frozen):
     """Parts of the surface that have volumes under lids, with read-only arrays."""
     saved: tuple[tuple[str, State], ...] = ()
     """Saved poses by name, as in `SavedPoses`; these states have none themselves."""
+    landmarks: LandmarkSet = _NO_LANDMARKS
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -299,6 +325,7 @@ class State(Described, Frozen):
             (Change.POSE, self.pose is other.pose),
             (Change.OPTIONS, self.options == other.options),
             (Change.SAVED_POSES, self.saved is other.saved),
+            (Change.LANDMARKS, self.landmarks is other.landmarks),
         )
         changed = Change(0)
         for change, same in pairs:
@@ -357,6 +384,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
         owned_parts(mesh, state.parts), _checked_saved(mesh, state.saved),
+        owned_landmarks(mesh, state.landmarks),
     )  # fmt: skip
 
 
@@ -416,6 +444,28 @@ def owned_parts(mesh: Mesh, parts: Sequence[tuple[str, ArrayLike]]) -> Parts:
             raise ConstraintError(f"the part {name!r}: {fault}") from None
         found.append((name, frozen(own)))
     return tuple(found)
+
+
+def owned_landmarks(mesh: Mesh, landmarks: LandmarkSet) -> LandmarkSet:
+    """Return checked *landmarks* with read-only arrays; ConstraintError if they are none."""
+    if landmarks is _NO_LANDMARKS:
+        return landmarks
+    names = all_of(require(landmarks, LandmarkSet, "landmarks").names, str, "landmarks.names")
+    if len(set(names)) != len(names):
+        raise ConstraintError("two landmarks have the same name")
+    for name in names:
+        if fault := fault_of(name):
+            raise ConstraintError(f"a landmark{fault}")
+    places = []
+    for points in (landmarks.source, landmarks.target):
+        known = np.isfinite(as_numbers(points, "landmarks")).all(axis=-1, keepdims=True)
+        filled = as_points(np.where(known, points, mesh.vertices[0]), "landmarks", len(names))
+        _require_near(mesh, filled, "a landmark is")
+        places.append(frozen(np.where(known, filled, np.nan)))
+    sigma = np.array(as_numbers(landmarks.uncertainty, "uncertainty"))
+    if sigma.shape != (len(names),) or (sigma < 0.0).any() or np.isinf(sigma).any():
+        raise ConstraintError("the uncertainty of landmarks must be one number each, 0 or more")
+    return LandmarkSet(names, places[0], places[1], frozen(sigma))
 
 
 def of_mesh(mesh: Mesh, regions: Regions) -> Regions:

@@ -33,7 +33,7 @@ from .archive import (
     text,
     whole,
 )
-from .state import Finished, Locality, Options, Pose, State, split_rows
+from .state import Finished, LandmarkSet, Locality, Options, Pose, State, split_rows
 
 # The options of version 1; a file has others only if they are not at their defaults.
 FIRST_OPTIONS = {
@@ -102,6 +102,9 @@ def state_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
             for ids, each in zip(sliding, state.slides, strict=True)
         ]
         arrays["sliding"] = np.concatenate(sliding)
+    more, points = landmark_parts(state)
+    header |= more
+    arrays |= points
     if state.parts:
         header["parts"] = [[name, len(ids)] for name, ids in state.parts]
         arrays["parts"] = np.concatenate([ids for _, ids in state.parts])
@@ -172,6 +175,7 @@ def read_state(archive: Archive, header: dict[str, Any], mesh: Mesh) -> State:
         more["slides"] = tuple(
             Slide(ids, *kind) for ids, (_, *kind) in zip(own, kinds, strict=True)
         )
+    more["landmarks"] = read_landmarks(archive, header)
     if "parts" in header:
         named = field(header, "parts", list_of(row_of(text, whole)))
         lengths = [count for _, count in named]
@@ -262,3 +266,25 @@ def _options(values: Mapping[str, Any]) -> Options:
 
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
+
+
+def landmark_parts(state: State) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the part of the header, and the arrays, for the landmarks of *state*."""
+    own = state.landmarks
+    if not own.names:
+        return {}, {}
+    arrays = {"source": own.source, "target": own.target, "uncertainty": own.uncertainty}
+    named = {f"landmark_{name}": array for name, array in arrays.items()}
+    return {"landmarks": list(own.names)}, named
+
+
+def read_landmarks(archive: Archive, header: dict[str, Any]) -> LandmarkSet:
+    """Return the landmarks in a file."""
+    if "landmarks" not in header:
+        return State().landmarks
+    names = tuple(field(header, "landmarks", list_of(text)))
+    source, target = (
+        archive.array(f"landmark_{name}", "f", (len(names), 3)) for name in ("source", "target")
+    )
+    sigma = archive.array("landmark_uncertainty", "f", (len(names),))
+    return LandmarkSet(names, source, target, sigma)

@@ -17,6 +17,8 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
                                            as in `state.Finished`
     saved_0_pose.npy ...  the same of saved poses, for the handles of the session  if any;
                           all of the above of a pose that was saved with other cages
+    landmark_source.npy, landmark_target.npy, landmark_uncertainty.npy
+                          as in `state.LandmarkSet`                                if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends

@@ -625,6 +625,56 @@ def blending(first: str | None, second: str | None, share: float) -> Action:
     return blend
 
 
+# Landmarks.
+
+
+def toggle_landmarks(controller: Controller) -> None:
+    """Let a press on the surface add a landmark, or no longer."""
+    marks = controller.widgets.landmarks
+    marks.adds = not marks.adds
+    if marks.adds:
+        marks.is_hidden = False
+    else:
+        controller.say("Landmarks are no longer added")
+
+
+def fitting_landmarks(*, keep_volume: bool) -> Action:
+    """Return the action that fits the mesh to its landmarks, in the background."""
+
+    def fit(controller: Controller) -> None:
+        session, before = controller.session, controller.session.state
+        volume = "keep" if keep_volume else "free"
+
+        def show(after: State) -> str:
+            if session.state is not before:  # changed in another view of the same session
+                raise SessionError("The session changed while it was being fitted. Try again")
+            session.history.step("fit landmarks", after)
+            return f"Fitted to {_count(len(session.landmarks), 'landmark')}"
+
+        def work(progress: Progress) -> State:
+            return session.landmarks.fitted(volume, progress).state
+
+        controller.start("Fitting landmarks", work, show)
+
+    return fit
+
+
+def loading_landmarks(path: Path, *, targets: bool) -> Action:
+    """Return the action that reads landmarks, or their targets, from a file."""
+
+    def load(controller: Controller) -> None:
+        lacking = controller.session.landmarks.read(path, targets=targets)
+        controller.widgets.landmarks.is_hidden = False
+        what = _count(len(controller.session.landmarks), "landmark")
+        if not lacking:
+            controller.say(f"{what}, all with targets")
+        else:
+            more = "" if len(lacking) == 1 else f" and {len(lacking) - 1} more"
+            controller.say(f"{what}; without a point or a target: {lacking[0]}{more}")
+
+    return load
+
+
 # Painting.
 
 

@@ -119,6 +119,13 @@ BINDINGS = (
     Binding(
         "show_volume_change", ("o",), P | C | D, "Show local volume change", actions.toggle_overlay
     ),
+    Binding(
+        "add_landmarks",
+        ("shift+l",),
+        DRAGGING,
+        "Add landmarks by clicks, or stop",
+        actions.toggle_landmarks,
+    ),
     Binding("keep_part", ("shift+p",), DRAGGING, "Keep volume of part", actions.keep_part),
     Binding("grow_part", ("e",), DRAGGING, "Enlarge part by 20 %", actions.grow_part),
     Binding("", ("x", "y", "z"), DRAGGING, "While dragging: constrain to axis", None),

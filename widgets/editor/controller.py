@@ -318,7 +318,7 @@ class Controller:
             widget.AddObserver("InteractionEvent", self._gesture_moved)
             widget.AddObserver("EndInteractionEvent", self._gesture_ended)
         self.widgets.puller.says = self.say
-        for widget in (self.widgets.puller, self.widgets.dragger):
+        for widget in (self.widgets.puller, self.widgets.dragger, self.widgets.landmarks):
             widget.AddObserver("ModifiedEvent", lambda *_: self.refresh())
 
     def _gesture_ended(self, widget: Widget, _: str) -> None:

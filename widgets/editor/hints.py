@@ -48,6 +48,9 @@ def missing(session: Session, mode: Mode, keys: Keys) -> str:
 
 def hint(widgets: WidgetSet, mode: Mode, keys: Keys) -> str:
     """Return the hint for *mode*: the current action, and the next step."""
+    if mode in (Mode.PULL, Mode.DEFORM) and widgets.landmarks.adds:
+        stop = f"{keys.cap('add_landmarks')}: stop"
+        return f"Click the surface to add a landmark, or drag from there to its target · {stop}"
     if mode is Mode.PULL:
         return _pull_hint(widgets, keys)
     lacking = missing(widgets.session, mode, keys)

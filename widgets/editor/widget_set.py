@@ -22,7 +22,7 @@ from vtk_segdeform.session import Options, Session, pulls
 from ..cage_display import CageDisplay
 from ..handle_dragger import HandleDragger
 from ..picking import Picker
-from ..puller import Puller
+from ..puller import LandmarkMarks, Puller
 from ..region_selector import (
     Paint,
     RegionColours,
@@ -83,6 +83,7 @@ class WidgetSet:
         self.puller.is_locked = lambda name: name in self.dragger.locked
         self.puller.is_hidden = lambda name: name in self.dragger.hidden
         self.dragger.pulls_with = lambda: self.puller.options
+        self.landmarks = LandmarkMarks(view, session, self.surface)
         self.overlay = VolumeOverlay(view, session, self.surface)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
@@ -91,8 +92,8 @@ class WidgetSet:
 
     @property
     def interactive(self) -> tuple[Widget, ...]:
-        """The widgets that respond to events; one of them is on in each mode."""
-        return self.puller, self.selector, self.cages, self.dragger
+        """The widgets that respond to events; one of them, and the landmarks, is on in a mode."""
+        return self.landmarks, self.puller, self.selector, self.cages, self.dragger
 
     @property
     def n_regions(self) -> int:
@@ -155,6 +156,7 @@ class WidgetSet:
             self.selector.paints = Paint.HANDLE if len(self.session.fixed) else Paint.FIXED
         self.surface.instead = None
         self.show(mode)
+        self.landmarks.SetEnabled(mode in (Mode.PULL, Mode.DEFORM))  # before those that it covers
         self.cages.SetEnabled(mode is Mode.CAGES)
         self.selector.SetEnabled(mode in (Mode.REGIONS, Mode.HANDLES))
         self.dragger.SetEnabled(mode is Mode.DEFORM)
@@ -203,6 +205,7 @@ class WidgetSet:
         self.puller.locality, self.puller.limb = before.puller.locality, before.puller.limb
         self.puller.hinge = before.puller.hinge
         self.dragger.local = before.dragger.local
+        self.landmarks.is_hidden = before.landmarks.is_hidden
         self.overlay.wanted_range = before.overlay.wanted_range
         self.surface.style = before.surface.style
         self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted

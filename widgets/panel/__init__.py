@@ -6,6 +6,7 @@
     status(editor)                    the message, the next step, progress
     history(editor)                   the states by name
     press(editor, name, value)        use a control: one entry for every skin
+    use_file(editor, name, path)      the same of one that asks for a file
 
 Qt and the web page draw these models and call `press`; nothing of a control is written twice.
 
@@ -13,7 +14,7 @@ The files, in reading order:
 
     fields      what fields, tables and sections are
     panel       `sections` and `press`
-    pulling handles motion poses options volumes regions painting
+    pulling handles motion poses landmarks options volumes regions painting
                 the sections
     toolbar     the toolbar and the menu about the view
     menu        the menu of the right button
@@ -36,7 +37,7 @@ from .fields import (
     tooltip,
 )
 from .menu import menu
-from .panel import all_sections, press, sections
+from .panel import all_sections, press, sections, use_file
 from .status import history, status
 from .toolbar import toolbar, view_entries
 
@@ -60,5 +61,6 @@ __all__ = [
     "status",
     "toolbar",
     "tooltip",
+    "use_file",
     "view_entries",
 ]

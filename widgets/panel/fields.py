@@ -65,6 +65,10 @@ class Field:
     """The group of a button: one of those with a value in a group is down."""
     items: tuple[Field | None, ...] = ()
     """The entries of a menu; None separates two groups."""
+    suffixes: tuple[str, ...] = ()
+    """Of the files that a "file" of a section asks for; without any, of any kind."""
+    saves: bool = False
+    """Whether it writes this file."""
     while_busy: bool = False
     """Whether it works during a job and leaves a drag alone."""
     act: Act | None = field(default=None, compare=False, repr=False)

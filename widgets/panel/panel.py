@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -14,6 +15,7 @@ from vtk_segdeform.errors import ArgumentError
 from ..editor import DeformEditor, Mode, jumping_to, preview
 from .fields import Field, Item, Section, Table
 from .handles import handles_section
+from .landmarks import landmarks_section
 from .menu import menu
 from .motion import motion_section
 from .options import advanced_section, cages_section, deform_section
@@ -31,6 +33,7 @@ _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (handles_section, {Mode.PULL, Mode.HANDLES, Mode.DEFORM}),
     (motion_section, {Mode.DEFORM}),
     (poses_section, {Mode.PULL, Mode.DEFORM}),
+    (landmarks_section, {Mode.PULL, Mode.DEFORM}),
     (cages_section, {Mode.CAGES}),
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
@@ -120,6 +123,22 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
                 works = section.visible and table.visible and table.enabled
                 return editor.do(table.acts[verb](*arguments)) if works else None
     raise ArgumentError(f"name: there is no control {shown(name)} in the panel")
+
+
+def use_file(editor: DeformEditor, name: str, path: Path) -> Exception | None:
+    """Use a control of the kind "file" of a section with the file that the skin has asked for.
+
+    Raises
+    ------
+    ArgumentError
+        If there is no such control.
+    """
+    for section in _one_by_one(editor):
+        for field in section.fields:
+            if field.name == name and field.kind == "file" and field.act is not None:
+                works = section.visible and field.visible and field.enabled
+                return editor.do(field.act(path)) if works else None
+    raise ArgumentError(f"name: there is no control {shown(name)} that asks for a file")
 
 
 def checked(field: Field, value: Any) -> Any:

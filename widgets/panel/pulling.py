@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ..editor import Action, Controller, DeformEditor, actions
-from ..puller import Puller
 from ..volume_overlay import percent
 from .fields import Field, Section, key_button
 
@@ -128,7 +127,7 @@ def _with_locality(locality: float | None) -> Action:
     return actions.assigning(_puller, "locality", locality)
 
 
-def _puller(controller: Controller) -> Puller:
+def _puller(controller: Controller) -> object:
     return controller.widgets.puller
 
 

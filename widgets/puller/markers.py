@@ -48,11 +48,11 @@ class Markers:
         self._is_shown = False
         front, behind = self._view.renderer, self._view.foreground
         self._dots = {
-            (is_pin, part): _Dots(behind if part == "through" else front)
+            (is_pin, part): Dots(behind if part == "through" else front)
             for part in ("rim", "fill", "through")
             for is_pin in (True, False)
         }
-        self._bright = _Dots(front)
+        self._bright = Dots(front)
         self._stop = self._view.before_render(self._lay_out)
 
     def show(self, shown: bool) -> None:
@@ -141,7 +141,7 @@ def marked_vertices(session: Session) -> dict[str, int]:
     return found
 
 
-class _Dots:
+class Dots:
     """Points as discs or spheres of constant size on the screen."""
 
     def __init__(self, renderer: Any) -> None:
@@ -172,4 +172,5 @@ class _Dots:
         style.SetOpacity(opacity)
 
     def remove(self) -> None:
+        """Remove them from the renderer permanently."""
         self._renderer.RemoveActor(self._actor)

@@ -7,12 +7,13 @@ screens.  Buttons take the focus by Tab only, so that the view still receives ke
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from qtpy import QtCore, QtGui, QtWidgets
 
 from ..editor import DeformEditor
-from ..panel import press
+from ..panel import press, use_file
 from .icons import SIZE
 
 Qt = QtCore.Qt
@@ -21,7 +22,7 @@ _DARK = 128  # lightness of a field, 0 to 255, below which its palette is dark
 
 
 Press = Callable[..., object]
-"""Uses a control by its name, perhaps with a value; see `panel.press`."""
+"""Uses a control by its name, perhaps with a value or a file; see `panel.press`, `use_file`."""
 
 
 def using(editor: DeformEditor) -> Press:
@@ -29,7 +30,10 @@ def using(editor: DeformEditor) -> Press:
 
     def use(name: str, value: Any = None) -> None:
         with editor.view.guarded():
-            press(editor, name, value)
+            if isinstance(value, Path):
+                use_file(editor, name, value)
+            else:
+                press(editor, name, value)
             editor.controller.refresh()  # and with it the panel, even if nothing was done
 
     return use

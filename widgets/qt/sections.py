@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 from qtpy import QtCore, QtWidgets
@@ -118,6 +119,9 @@ def _control(field: Field, press: Callable[..., object]) -> Any:
     if field.kind == "button":
         control = push_button(field.label)
         control.clicked.connect(lambda: press())
+    elif field.kind == "file":
+        control = push_button(field.label)
+        control.clicked.connect(lambda: _ask(control, field, press))
     elif field.kind == "toggle":
         control = check_box(field.label)
         control.clicked.connect(lambda on: press(on))
@@ -134,6 +138,20 @@ def _control(field: Field, press: Callable[..., object]) -> Any:
             control = number_box(QtWidgets.QSpinBox() if is_whole else QtWidgets.QDoubleSpinBox())
         control.valueChanged.connect(lambda value: press(value))
     return control
+
+
+def _ask(parent: Any, field: Field, press: Callable[..., object]) -> None:
+    """Ask for the file of *field*, and use that."""
+    title, every = field.label.rstrip(" ."), ";;All files (*)" * (not field.saves)
+    kinds = f"{title} ({' '.join('*' + suffix for suffix in field.suffixes)}){every}"
+    if field.saves:
+        path, _ = QtWidgets.QFileDialog.getSaveFileName(parent, title, "", kinds)
+    else:
+        path, _ = QtWidgets.QFileDialog.getOpenFileName(parent, title, "", kinds)
+    if path:
+        chosen = Path(path)
+        is_whole = chosen.suffix or not field.saves
+        press(chosen if is_whole else chosen.with_suffix(field.suffixes[0]))
 
 
 def _set_up(control: Any, field: Field, before: Field | None) -> None:
@@ -174,7 +192,7 @@ def _frame_of(field: Field) -> tuple[object, ...]:
 def _put(control: Any, field: Field) -> None:
     """Show the value of *field*; emit no signals."""
     value: Any = field.minimum if field.special and field.value is None else field.value
-    if field.kind == "button":
+    if field.kind in ("button", "file"):
         if value is not None:
             control.setChecked(value)  # only clicks trigger its action
         return

@@ -241,7 +241,9 @@ def test_each_mode_switches_on_its_own_widget_and_display(bench):
     }
     for key, widget in owners.items():
         bench.type(key)
-        assert [w for w in widgets.interactive if w.GetEnabled()] == [widget]
+        others = [w for w in widgets.interactive if w is not widgets.landmarks]
+        assert [w for w in others if w.GetEnabled()] == [widget]
+        assert widgets.landmarks.GetEnabled() == (key == "4")
         assert widgets.cages.is_shown == (key == "2")
     bench.type("c")
     assert widgets.cages.is_shown

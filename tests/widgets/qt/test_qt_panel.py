@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,12 +30,13 @@ def widget(unprepared):
     mesh, state = small()
     session = Session(mesh, state=state)
     session.handles.pin(int(np.argmin(np.abs(mesh.vertices[:, 0]))))
+    session.landmarks.add(0, mesh.vertices[0])
     widget = DeformWidget(session)
     widget.plotter.setUpdatesEnabled(False)  # the view is not tested, and slow to draw
     widget.resize(900, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
-    for name in ("volumes", "advanced"):
+    for name in ("volumes", "advanced", "landmarks"):
         box = widget.panel.boxes[name]
         assert not any(control.isVisibleTo(box) for control in box.controls.values())
         box.fold.click()
@@ -67,7 +69,7 @@ def said(control):
 
 def expected(field):
     """Return what the control of *field* has to show."""
-    if field.kind in ("button", "toggle"):
+    if field.kind in ("button", "toggle", "file"):
         return field.label, field.value
     if field.kind == "choice":
         return next(label for label, value in field.choices if value == field.value)
@@ -146,6 +148,9 @@ def test_every_visible_control_presses_its_field(widget, monkeypatch):
     pressed = []
     module = "vtk_segdeform.widgets.qt.controls.press"
     monkeypatch.setattr(module, lambda _, name, value=None: pressed.append((name, value)))
+    monkeypatch.setattr(f"{module.rpartition('.')[0]}.use_file", lambda *a: pressed.append(a[1:]))
+    for ask in ("getOpenFileName", "getSaveFileName"):
+        monkeypatch.setattr(QtWidgets.QFileDialog, ask, lambda *_, ask=ask: (f"/{ask}", ""))
     panel, editor = widget.panel, widget.editor
     kinds = set()
     for mode in Mode:
@@ -158,10 +163,13 @@ def test_every_visible_control_presses_its_field(widget, monkeypatch):
                 pressed.clear()
                 use(panel.controls[field.name], field)
                 assert [name for name, _ in pressed] == [field.name]
+                if field.kind == "file":  # asked for by the skin
+                    name = "getSaveFileName.csv" if field.saves else "getOpenFileName"
+                    assert pressed[0][1] == Path(f"/{name}")
                 kinds.add(field.kind)
                 panel.refresh()  # nothing was done, which the control shows
                 assert said(panel.controls[field.name]) == expected(field)
-    assert kinds >= {"button", "toggle", "number", "integer", "slider"}
+    assert kinds >= {"button", "toggle", "number", "integer", "slider", "file"}
 
 
 def test_rows_that_are_selected_elsewhere_are_selected_in_the_list(widget):

@@ -83,6 +83,7 @@ const Field = {
     <div v-else-if="field.kind === 'label'" class="sd-field sd-label" :title="field.tip">
       <span>{{ field.label }}</span><output>{{ field.value }}</output>
     </div>
+    <span v-else-if="field.kind === 'file'" hidden></span>
     <button v-else type="button" class="sd-button" :class="{ down: isDown }" :title="field.tip"
         :disabled="!field.enabled" :aria-pressed="field.value === null ? null : isDown"
         @click="press(null)">
