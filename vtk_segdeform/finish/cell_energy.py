@@ -9,11 +9,11 @@ larger: the share of a triangle takes k steps of a random walk over the mesh, c 
     P_ij = (1 - t) delta_ij + t / degree(j)  if j is a neighbour of i
 
 whose columns sum to 1.  A triangle mesh resists bending only because rotations are shared, the more
-the larger the cells.  If these were measured in edges, a dense mesh would wrinkle where it is
-compressed: the dihedral angles of a bent cactus of 50,000 vertices changed by 2.4 degrees, instead
-of 0.5 before its finish, which took 300 steps.  So k t is 0.01 times the vertices per cage vertex,
-which makes the walk a tenth of the spacing of the cages on any mesh: of the same bend the angles
-change by 0.5 degrees, in 36 steps.  The energy stays a minimum over the rotations, and its
+the larger the cells.  With cells of radius c it bends like a plate, on the foundation of stiffness
+1 / l^2 that holds it to the pose of the cages (`finisher`), and wrinkles where it is compressed by
+more than some 2 c / l.  So k t is 0.1 times the vertices per cage vertex, which makes c a third of
+the spacing of the cages on any mesh, and l is two: the inner side of a thick body stays smooth in
+a bend until it is shorter by a third.  The energy stays a minimum over the rotations, and its
 quadratic part is the Laplacian, whatever the cells,
 
     E(x) = min_R  tr(x^T C x) - 2 sum_i tr(R_i S_i) + tr(X^T C X),     S = P^k K x,     X at rest
@@ -49,8 +49,8 @@ from ..geometry import IntrinsicTriangulation, area_gradients, closest_rotations
 from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import Mesh
 
-_CELL = 0.01  # k t, relative to the vertices per cage vertex
-_WALK, _ROUNDS = 0.5, 12  # t and k, at most; of more than about 120,000 vertices cells are smaller
+_CELL = 0.1  # k t, relative to the vertices per cage vertex
+_WALK, _ROUNDS = 0.5, 128  # t and k, at most; of more than some 100,000 vertices cells are smaller
 _TIMES = 20  # a cell takes as long as the volume of so many faces
 _PIECE = 8_000  # cells to a task
 _MOST = 0.7  # share of the triangles up to which it pays to leave out the others
