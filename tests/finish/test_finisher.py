@@ -139,9 +139,9 @@ def test_the_energy_and_its_gradient_are_those_of_the_formula(rounds):
     """E is summed here over cells and triangles."""
     ball, faces = icosphere(1)
     mesh = Mesh(ball * [1.0, 0.7, 0.5], faces)
-    energy, rng = CellEnergy.of(mesh, 4.0 * rounds), np.random.default_rng(0)
+    energy, rng = CellEnergy.of(mesh, 7.0 * rounds), np.random.default_rng(0)
     x = [1.0, 1.0, 0.6] * (mesh.vertices + 0.1 * rng.normal(size=mesh.vertices.shape))
-    t = 0.4  # 4 vertices per cage vertex: that of one round
+    t = 0.7  # 7 vertices per cage vertex: that of one round
 
     n, a = mesh.n_vertices, mesh.adjacency.toarray() > 0.0
     p = (1.0 - t) * np.eye(n) + t * a / a.sum(axis=0)

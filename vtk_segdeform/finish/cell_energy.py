@@ -50,7 +50,7 @@ from ..kernels import compiled_kernels, in_parallel, inputs
 from ..mesh import Mesh
 
 _CELL = 0.1  # k t, relative to the vertices per cage vertex
-_WALK, _ROUNDS = 0.5, 128  # t and k, at most; of more than some 100,000 vertices cells are smaller
+_WALK, _ROUNDS = 0.75, 85  # t and k, at most; of more than some 100,000 vertices cells are smaller
 _TIMES = 20  # a cell takes as long as the volume of so many faces
 _PIECE = 8_000  # cells to a task
 _MOST = 0.7  # share of the triangles up to which it pays to leave out the others
