@@ -59,7 +59,10 @@ def solve(
         places = wanted
         if shift is not None:
             own = shift[deformer.handle]
-            aim = Aim(wanted, own) if aim is None else aim.turned(wanted, own)
+            if aim is None or not deformer.has_arrived:
+                aim = Aim(wanted, own)
+            else:
+                aim = aim.turned(wanted, own)
             places = wanted - aim.shift
         solution = deformer.solve(places, max_steps=max_steps, progress=progress)
         if not np.isfinite(solution.vertices).all():
@@ -91,10 +94,13 @@ def solve(
     return pose, solution
 
 
-def with_region_at_rest(poses: Poses, state: State, region: int) -> State:
+def with_region_at_rest(
+    poses: Poses, state: State, region: int, progress: Progress | None = None
+) -> State:
     """Return *state* with the vertices of a region where they were at rest; the others follow.
 
     Its handles, pins and pulled points go back to rest as well; later drags may move it again.
+    It may run in another thread.
     """
     regions, rest = state.regions, poses.mesh.vertices
     if state.pose is None or regions is None:
@@ -109,7 +115,8 @@ def with_region_at_rest(poses: Poses, state: State, region: int) -> State:
     targets |= {name: frozen(rest[state.handles[name]]) for name in inside}
     handles = MappingProxyType({**state.handles, **held})
     pose = replace(state.pose, targets=targets_at(handles, poses.vertices(state)))
-    pose, _ = solve(poses, replace(state, handles=handles, pose=pose), targets)
+    here = replace(state, handles=handles, pose=pose)
+    pose, _ = solve(poses, here, targets, progress=progress)
     kept = {name: points for name, points in pose.targets.items() if name in state.handles}
     return replace(state, pose=replace(pose, targets=MappingProxyType(kept)))
 
