@@ -215,14 +215,8 @@ def attaching(component: int, carrier: str, label: str) -> Action:
         if carrier != "auto":
             wanted[component] = carrier if carrier == FREE else int(carrier)
 
-        def show(after: State) -> str:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while cages were being fitted. Try again")
-            session.history.step(label, after)
-            return label[:1].upper() + label[1:]
-
         work = partial(separating.attached, session.poses, before, wanted)
-        controller.start("Fitting cages", work, show)
+        _start_step(controller, "Fitting cages", work, label, lambda: _sentence(label))
 
     return attach
 
@@ -255,6 +249,25 @@ def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> Non
         return f"{count} fitted, {total} vertices in total{_reset(controller, before)}"
 
     controller.start("Fitting cages", work, show)
+
+
+def _start_step(
+    controller: Controller,
+    name: str,
+    work: Callable[[Progress], State],
+    label: str,
+    then: Callable[[], str | None] = lambda: None,
+) -> None:
+    """Start the job *name*, whose result is the state of a step called *label*; *then* follows."""
+    session, before = controller.session, controller.session.state
+
+    def show(after: State) -> str | None:
+        if session.state is not before:  # changed in another view of the same session
+            raise SessionError("The session changed meanwhile. Try again")
+        session.history.step(label, after)
+        return then()
+
+    controller.start(name, work, show)
 
 
 def _reset(controller: Controller, before: State) -> str:
@@ -446,15 +459,9 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
             session.commit(label, join=joins)
             _settle(controller)
 
-        def show(after: State) -> None:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while cages were being fitted. Try again")
-            session.history.step(label, after)
-            finish(joins=True)
-
         if separating.separated_by(session.poses, before, goals) is not None:
             work = partial(separating.apart, session.poses, before, goals)
-            controller.start("Fitting cages", work, show)
+            _start_step(controller, "Fitting cages", work, label, partial(finish, joins=True))
         else:
             finish()
 
@@ -500,8 +507,10 @@ def resetting(region: int) -> Action:
     """Return the action that moves a region back to rest, while the others follow."""
 
     def reset_part(controller: Controller) -> None:
-        controller.session.reset_region(region)
-        controller.say(f"Reset {controller.session.painting.name(region)}")
+        session = controller.session
+        label = f"reset {session.painting.name(region)}"
+        work = partial(solving.with_region_at_rest, session.poses, session.state, region)
+        _start_step(controller, "Resetting", work, label, lambda: _sentence(label))
 
     return reset_part
 
@@ -596,18 +605,12 @@ def going_to(name: str) -> Action:
     """Return the action that lets the mesh have a saved pose."""
 
     def go(controller: Controller) -> None:
-        session = controller.session
-        saved, before = session.saved_poses, session.state
-
-        def show(after: State) -> None:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while the pose was being fitted. Try again")
-            session.history.step(f"go to {name}", after)
-
+        saved = controller.session.saved_poses
         if saved.has_cages(name):
             saved.apply(name)
         else:
-            controller.start("Fitting the pose to other cages", lambda _: saved.applied(name), show)
+            work, label = lambda _: saved.applied(name), f"go to {name}"
+            _start_step(controller, "Fitting the pose to other cages", work, label)
 
     return go
 
@@ -813,6 +816,10 @@ def _handle_names(controller: Controller) -> list[str]:
 
 def _detecting(controller: Controller) -> str:
     return f"Press {controller.keys.cap('segment')} to detect them"
+
+
+def _sentence(label: str) -> str:
+    return label[:1].upper() + label[1:]
 
 
 def _count(number: int, noun: str) -> str:
