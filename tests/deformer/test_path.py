@@ -87,7 +87,9 @@ def test_goals_that_wind_a_handle_up_are_passed_and_others_are_left_out(goals, w
     frame = path.constraints.problem.frame
 
     def angle():
-        turns = [rigid_fit(a, b)[0] for a, b in itertools.pairwise([start, *[t for t, *_ in solves]])]
+        turns = [
+            rigid_fit(a, b)[0] for a, b in itertools.pairwise([start, *[t for t, *_ in solves]])
+        ]
         return np.degrees(sum(Rotation.from_matrix(R).as_rotvec()[0] for R in turns))
 
     angles = []

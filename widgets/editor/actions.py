@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
@@ -26,6 +27,7 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as find_regions
 from vtk_segdeform.session import (
     FinishedPose,
+    Session,
     State,
     blend_label,
     finishing,
@@ -548,10 +550,10 @@ def isolating(spot: Spot) -> Action:
     def isolate(controller: Controller) -> None:
         widgets, session = controller.widgets, controller.session
         if widgets.surface.only is not None:
-            widgets.surface.only = None
+            widgets.show_only(None)
             controller.say("Everything is shown")
             return
-        widgets.surface.only = widgets.mask_of(spot)
+        widgets.show_only(widgets.mask_of(spot))
         name = "this part" if spot.region is None else session.painting.name(spot.region)
         controller.say(f"Only {name} is shown. {controller.keys.cap('isolate')}: show everything")
 
@@ -570,6 +572,85 @@ def isolate(controller: Controller) -> None:
 def framing(spot: Spot) -> Action:
     """Return the action that frames the part at *spot*."""
     return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
+
+
+# Bodies, by their vertices, a mask (n,), and their names: "Body 2".
+
+
+def hide_body(controller: Controller) -> None:
+    """Hide the body under the pointer."""
+    hiding(*_body_under_pointer(controller, "hide"), hidden=True)(controller)
+
+
+def hiding(body: BoolArray, name: str, *, hidden: bool) -> Action:
+    """Return the action that hides a *body*, as `isolating` does, or shows it again."""
+
+    def hide(controller: Controller) -> None:
+        only = controller.widgets.surface.only
+        shown = np.ones(len(body), dtype=bool) if only is None else only
+        controller.widgets.show_only(shown & ~body if hidden else shown | body)
+        everything = f" hidden. {controller.keys.cap('isolate')}: show everything"
+        controller.say(f"{name} is{everything if hidden else ' shown'}")
+
+    return hide
+
+
+def lock_body(controller: Controller) -> None:
+    """Lock the body under the pointer, or unlock it."""
+    body, name = _body_under_pointer(controller, "lock")
+    locking(body, name, locked=not is_locked(controller.session, body))(controller)
+
+
+def locking(body: BoolArray, name: str, *, locked: bool) -> Action:
+    """Return the action that fixes a *body* where it is, or lets it move again.
+
+    Handles on it keep their places; while it is locked, they cannot be grabbed.  With a symmetry,
+    its mirror image is locked as well.
+    """
+
+    def lock(controller: Controller) -> None:
+        session, state = controller.session, controller.session.state
+        mirror = session.poses.mirror(state)
+        own = body if mirror is None else body | body[mirror.mates]
+        ids = np.flatnonzero(own)
+        fixed = np.setdiff1d(state.fixed, ids)
+        if locked:
+            fixed = np.union1d(state.fixed, np.setdiff1d(ids, state.handle))
+
+        def show() -> str:
+            for handle, vertices in session.handles.items():
+                if own[vertices].all():
+                    controller.widgets.dragger.set_locked(handle, locked)
+            return f"{name} is {'locked' if locked else 'unlocked'}"
+
+        work = partial(separating.with_fixed, session.poses, state, fixed)
+        verb = "lock" if locked else "unlock"
+        label = f"{verb} {name[:1].lower()}{name[1:]}"
+        _start_step(controller, f"{_sentence(verb)}ing {name}", work, label, show)
+
+    return lock
+
+
+def is_locked(session: Session, body: BoolArray) -> bool:
+    """Return whether all vertices of a *body* are fixed, but for those in handles."""
+    fixed, free = session.fixed, body.copy()
+    free[fixed] = free[session.state.handle] = False
+    return not free.any() and bool(body[fixed].any())
+
+
+def _body_under_pointer(controller: Controller, verb: str) -> tuple[BoolArray, str]:
+    session = controller.session
+    if not session.is_bound:
+        raise SessionError("The mesh is not ready yet. Wait until it is prepared")
+    spot = controller.widgets.spot_at(controller.view.pointer(Phase.HOVER))
+    bodies, components = session.deformer.bodies, session.mesh.components
+    number = -1 if spot is None else int(bodies.of_component[components[spot.vertex]])
+    if number < 0:
+        raise ConstraintError(f"Point at the body to {verb}")
+    body = np.asarray(bodies.of_component[components] == number)
+    if body.all():
+        raise ConstraintError(f"The mesh is a single body: there is none to {verb}")
+    return body, _sentence(volume_label(session.state.region_names, f"body {number}"))
 
 
 # Saved poses.
