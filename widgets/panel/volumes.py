@@ -24,11 +24,11 @@ _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set",
 _OTHERS = ("area", "centroid x", "centroid y", "centroid z")  # of the whole
 _MOST_BODIES, _AUTO, _NOTHING = 12, "auto", "Nothing"
 _COLUMNS = (
-    Column("show", "Show", "A hidden body cannot be picked or painted"),
-    Column("lock", "Lock", "A locked body stays where it is: its vertices are fixed"),
     Column("volume", "Volume", "In the unit of the mesh, cubed"),
     Column("change", "Change"),
     Column("follows", "Follows"),
+    Column("show", "Show", "A hidden body cannot be picked or painted"),
+    Column("lock", "Lock", "A locked body stays where it is: its vertices are fixed"),
 )
 _SYMMETRY = (("None", "none"), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
 _chosen: WeakKeyDictionary[Controller, str] = WeakKeyDictionary()
@@ -226,7 +226,7 @@ def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: b
         carrier = component if regions.carrier is None else int(regions.carrier[component])
         follows = _NOTHING if carrier == component else _carrier(bodies, carrier)
         colour = of_region(regions.label_at(int((session.mesh.components == component).argmax())))
-    cells = Cell(checked=shown), Cell(checked=locked), Cell(volume), Cell(change), Cell(follows)
+    cells = Cell(volume), Cell(change), Cell(follows), Cell(checked=shown), Cell(checked=locked)
     return Row(name, _label(session, name), as_rgb(colour), cells, is_chosen)
 
 

@@ -77,13 +77,13 @@ def follows(editor: DeformEditor):
 def test_bodies_are_listed_with_their_volumes_and_what_they_follow(editor):
     volumes = editor.session.volumes()
     shown = rows(editor)
-    assert [(row[0], *row[4:]) for row in shown] == [
+    assert [(row[0], *row[2:4]) for row in shown] == [
         ("Body 1", "0 %", "Nothing"), ("Body 2", "0 %", "Body 1"), ("Body 3", "0 %", "Nothing"),
     ]  # fmt: skip
-    assert [row[3] for row in shown] == [f"{volumes[f'body {k}']:.4g}" for k in range(3)]
+    assert [row[1] for row in shown] == [f"{volumes[f'body {k}']:.4g}" for k in range(3)]
     editor.session.set_volume("body 2", "+10%")
     editor.session.commit()
-    assert rows(editor)[2][3:5] == (f"{1.1 * volumes['body 2']:.4g}", "+10.0 %")
+    assert rows(editor)[2][1:3] == (f"{1.1 * volumes['body 2']:.4g}", "+10.0 %")
 
 
 def test_what_a_body_follows_is_changed_at_once_in_one_step(editor):
@@ -96,7 +96,7 @@ def test_what_a_body_follows_is_changed_at_once_in_one_step(editor):
     press(editor, "bodies.follows", "free")
     editor.wait()
     assert_array_equal(session.regions.carrier, [0, 1, 2])
-    assert (follows(editor).value, rows(editor)[1][5]) == ("free", "Nothing")
+    assert (follows(editor).value, rows(editor)[1][3]) == ("free", "Nothing")
     session.bind()
     press(editor, "bodies.list.select", ["body 2"])
     press(editor, "bodies.follows", "0")
@@ -178,6 +178,8 @@ def test_a_hidden_body_is_not_drawn_picked_or_painted_until_everything_is_shown(
     editor.controller.finishing.is_wanted = False
     balls = vertices_of(editor, 2)
     name = session.handles.add(balls[:5])
+    editor.mode = Mode.DEFORM
+    editor.wait()
     assert boxes(editor, "show") == [True, True, True]
     hand = point_at(editor, 2)
     assert widgets.spot_at(editor.view.pointer(Phase.HOVER)).vertex in balls
@@ -188,8 +190,6 @@ def test_a_hidden_body_is_not_drawn_picked_or_painted_until_everything_is_shown(
     assert shown == session.mesh.n_faces - len(SOLIDS[2][1])
     spot = widgets.spot_at(editor.view.pointer(Phase.HOVER))
     assert spot is None or spot.vertex not in balls
-    editor.mode = Mode.DEFORM
-    editor.wait()
     assert widgets.dragger.gizmo.centre is None  # of the handle on it
     editor.mode = Mode.HANDLES
     widgets.selector.paints = Paint.FIXED
@@ -203,6 +203,10 @@ def test_a_hidden_body_is_not_drawn_picked_or_painted_until_everything_is_shown(
     widgets.selector.tool = Tool.RECTANGLE
     hand.drag([(1, 1), (399, 399)])
     assert len(session.fixed) == session.mesh.n_vertices - len(balls)
+    widgets.selector.paints = Paint.STIFFNESS
+    hand.drag([(1, 1), (399, 399)])
+    assert (session.state.stiffness[balls] == 1.0).all()
+    assert (np.delete(session.state.stiffness, balls) == 10.0).all()
     hand.types("slash", (2, 2))
     assert boxes(editor, "show") == [True, True, True]
     assert not session.history.redo_label
