@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from weakref import WeakKeyDictionary
 
@@ -160,8 +161,8 @@ def bodies_section(editor: DeformEditor) -> Section:
                 n_rows=5,
                 acts={
                     "select": lambda keys: _choosing(next(iter(keys), "")),
-                    "show": lambda key, on: actions.hiding(*_body(session, key), hidden=not on),
-                    "lock": lambda key, on: actions.locking(*_body(session, key), locked=on),
+                    "show": lambda key, on: _to_body(key, actions.hiding, hidden=not on),
+                    "lock": lambda key, on: _to_body(key, actions.locking, locked=on),
                 },
             ),
             Field(
@@ -234,6 +235,10 @@ def _body(session: Session, name: str) -> tuple[BoolArray, str]:
     """Return the vertices of a body, a mask (n,), and what it is called."""
     numbers = _bodies[session].of_component[session.mesh.components]
     return np.asarray(numbers == int(name.rpartition(" ")[2])), _label(session, name)
+
+
+def _to_body(name: str, action: Callable[..., Action], **how: bool) -> Action:
+    return lambda controller: action(*_body(controller.session, name), **how)(controller)
 
 
 def _carrier(bodies: Bodies, component: int) -> str:
