@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from scenes import sausage
+from scipy.spatial.transform import Rotation
 
 from vtk_segdeform.deformer.path import Path
+from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.solver import Contact, SolverOptions, Status, waypoints
 
 SCENE = sausage(2, is_coarse=True)
@@ -53,6 +55,52 @@ def test_a_far_goal_is_reached_by_rough_solves_for_its_waypoints(solves):
     nearer, count = path.constraints.problem.frame.inward(SCENE.turned(95)), len(solves)
     path.solve(nearer, OPTIONS)
     assert len(solves) == count + 1  # from there on, not from rest
+
+
+LIVE = SolverOptions(tolerance=1e-6, max_steps=8)
+
+
+def test_a_live_solve_stops_on_its_way_and_the_next_one_goes_on_from_there(solves):
+    path, goal = begun(170)
+    way = waypoints(path.targets, goal, path.constraints.handles)
+    poses = [path.solve(goal, LIVE, is_live=True)]
+    while path.way:
+        assert poses[-1].result.status is Status.STEP_LIMIT
+        poses.append(path.solve(goal, LIVE, is_live=True))
+    assert len(poses) > 2
+    assert max(pose.steps for pose in poses) < 2 * LIVE.max_steps
+    assert sum(pose.steps for pose in poses) == sum(result.steps for *_, result in solves)
+    assert len(solves) == len(way)
+    for (targets, _, _), expected in zip(solves, way, strict=True):
+        np.testing.assert_allclose(targets, expected, atol=1e-12)
+    full, _ = begun(170)
+    end, other = path.solve(goal, OPTIONS), full.solve(goal, OPTIONS)
+    np.testing.assert_allclose(end.x, other.x, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("goals", "way"), [([90, 180, 270], [30.0, 60.0, 90.0]), ([90, -60], [30.0, 0.0])]
+)
+def test_goals_that_wind_a_handle_up_are_passed_and_others_are_left_out(goals, way, solves):
+    """Faster than live solves follow, of which each gets one waypoint farther."""
+    path, start = begun(0)
+    frame = path.constraints.problem.frame
+
+    def angle():
+        turns = [
+            rigid_fit(a, b)[0] for a, b in itertools.pairwise([start, *[t for t, *_ in solves]])
+        ]
+        return np.degrees(sum(Rotation.from_matrix(R).as_rotvec()[0] for R in turns))
+
+    angles = []
+    for degrees in goals:
+        goal = frame.inward(SCENE.turned(degrees, axis=(1.0, 0.0, 0.0)))
+        path.solve(goal, SolverOptions(1e-6, 1), is_live=True)
+        angles.append(angle())
+    np.testing.assert_allclose(angles, way, atol=1e-6)
+    while path.way:
+        path.solve(goal, LIVE, is_live=True)
+    assert angle() == pytest.approx(goals[-1])
 
 
 @pytest.mark.parametrize(("first", "then"), [(0.0, 0.0), (0.05, 0.05), (0.1, 0.1), (0.1, 0.0)])

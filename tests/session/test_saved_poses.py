@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from vtk_segdeform import Session, load_session, save_session
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.regions import Regions
-from vtk_segdeform.session import Change
+from vtk_segdeform.session import Change, solving
 from vtk_segdeform.session.saved_poses import between
 
 pytestmark = pytest.mark.usefixtures("bound_once")
@@ -140,6 +140,17 @@ def test_with_other_cages_they_are_as_near_as_these_can_be(posed):
     session.saved_poses.apply("up")
     assert np.abs(session.vertices - poses["up"]).max() < 0.02 * session.mesh.diagonal
     assert abs(session.volume_change) < 1e-12
+
+
+def test_cages_are_carried_as_far_as_they_may_be(posed):
+    """Some shapes they could have only if they were farther away: those are met less well."""
+    session, _ = posed
+    poses, state = session.poses, session.state.at_rest()
+    noise = np.random.default_rng(0).normal(size=X.shape)
+    cages = solving.carried(poses, state, X + 0.3 * SCENE.mesh.diagonal * noise)
+    away = np.abs(np.concatenate(cages) - X.mean(axis=0)).max() / SCENE.mesh.diagonal
+    assert 4.0 < away < 10.0
+    solving.free_form(poses, state, cages)  # which refuses cages that are too far away
 
 
 def test_what_is_no_pose_or_share_is_refused(posed):

@@ -467,6 +467,11 @@ class Deformer:
         return self._path.constraints
 
     @property
+    def has_arrived(self) -> bool:
+        """Whether the last solve came to its targets; with *max_steps* it may end on its way."""
+        return not self._path.way
+
+    @property
     def fixed(self) -> IntArray:
         """Vertices that stay in place, (f,)."""
         return self._constraints.fixed
@@ -590,8 +595,9 @@ class Deformer:
             last solve.  So the body is wound up by half a turn or more if it is solved for targets
             on the way, each less than half a turn from the last ones.
         max_steps : int, optional
-            Instead of the deformer's own limit, from the last waypoint on: a drag may stop early
-            and continue with the next event.
+            Instead of the deformer's own limit, which counts from the last waypoint on.  A drag may
+            stop early, also on its way, and the next solve, for the same targets or others, goes on
+            from there.
         progress : Progress, optional
             Called before every step; may raise `Cancelled`.  Then, as after any other exception in
             it, the deformer is as it was before the call.
@@ -775,7 +781,7 @@ class Deformer:
         is_frame = is_live and not np.array_equal(goal, path.targets)
         if is_frame:
             options = replace(options, tolerance=max(options.tolerance, _FRAME))
-        pose = path.solve(goal, options)
+        pose = path.solve(goal, options, is_live=is_live)
         if is_frame and pose.result.status is Status.CONVERGED:
             result = replace(pose.result, status=Status.STEP_LIMIT)
             pose = pose._replace(result=result)

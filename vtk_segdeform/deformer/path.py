@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, largest_length
+from ..geometry import rigid_fit
 from ..solver import (
     LONGEST_MOVE,
     GaussNewton,
@@ -29,6 +31,7 @@ from .growth import VOLUME_LEG
 from .problem import Problem
 
 _WAYPOINT_TOLERANCE, _WAYPOINT_STEPS = 1e-3, 12
+_LONGEST_TURN = math.radians(120.0)  # of a handle without a stop: from 180 it turns the other way
 _MORE_SOLVES = 4  # at most, after a scaling or with other planes of slides
 _SCALED = 3e-5  # relative scale from which another solve follows
 _ROUNDING = 1e-7  # relative scale that counts as rounding
@@ -57,9 +60,11 @@ class Path:
     solver: GaussNewton  # with its factor, its acceleration and the way of the last solves
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
-    targets: FloatArray  # (k, 3)
+    targets: FloatArray  # (k, 3), of the last solve
     active: tuple[int, ...] = ()  # `active_volumes`, of a mesh that is not scaled
     is_on_volumes: bool = True
+    # The targets (k, 3) where the last solve stopped on its way, and the goals to come; else empty.
+    way: tuple[FloatArray, ...] = ()
 
     @classmethod
     def begin(cls, constraints: Constraints, p: FloatArray, targets: FloatArray) -> Path:
@@ -91,16 +96,23 @@ class Path:
         """Return a path that continues from here independently."""
         return replace(self, solver=self.solver.copy())
 
-    def solve(self, goal: FloatArray, options: SolverOptions) -> Pose:
+    def solve(self, goal: FloatArray, options: SolverOptions, *, is_live: bool = False) -> Pose:
         """Go on to the pose for *goal* (k, 3), with exact volumes.
+
+        If *is_live*, the steps on the way count as well: so it may end at a waypoint, from where
+        the next solve goes on.
 
         For a large mesh the steps preserve the volumes of a coarse surface only, so it is scaled
         to the exact ones.  If by more than `_SCALED`, they are taken again with the coarse volumes
         of the scaled mesh.
         """
         steps = self.change_volumes(options)
-        steps += self._follow_waypoints(goal, options)
+        on_the_way, stopped = self._follow_waypoints(goal, options, is_live=is_live)
+        steps += on_the_way
         self.targets = goal
+        if stopped is not None:
+            x, _ = self._with_exact_volume(stopped)
+            return Pose(x, replace(stopped, status=Status.STEP_LIMIT), steps)
         contact = self.constraints.contact
         if contact is not None and contact.is_active(self.end):
             options = replace(
@@ -211,14 +223,55 @@ class Path:
         )
         return True
 
-    def _follow_waypoints(self, goal: FloatArray, options: SolverOptions) -> int:
-        """Move through the waypoints before *goal*; return the number of steps."""
-        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
-        return sum(self._minimise(targets, options).steps for targets in self._way_to(goal))
+    def _follow_waypoints(
+        self, goal: FloatArray, options: SolverOptions, *, is_live: bool
+    ) -> tuple[int, SolverResult | None]:
+        """Move through the waypoints before *goal*.
+
+        Return the number of steps, and the last result if there was no step left for the goal.
+        """
+        most = options.max_steps if is_live else math.inf
+        longest = min(most, _WAYPOINT_STEPS)
+        options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=int(longest))
+        steps, result = 0, None
+        for count, (targets, ahead) in enumerate(self._legs(self._goals_to(goal))):
+            if steps + count >= most:  # a minimisation without steps takes as long as one
+                return steps, result
+            result = self._minimise(targets, options)
+            steps += result.steps
+            self.way = (targets, *ahead)
+        if steps >= most:
+            return steps, result
+        self.way = ()
+        return steps, None
+
+    def _goals_to(self, goal: FloatArray) -> list[FloatArray]:
+        """Return the goals of the way to *goal*: those that wind a handle up, and *goal*."""
+        stops = list(self.way)
+        while len(stops) > 1:
+            turns = self._turns(stops[-2], stops[-1]) + self._turns(stops[-1], goal)
+            if largest_length(turns) > _LONGEST_TURN:
+                break
+            stops.pop()
+        return [*stops[1:], goal]
+
+    def _turns(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Return the rotation vectors (h, 3) of the handles of three vertices or more."""
+        handles = [ids for ids in self.constraints.handles if len(ids) > 2]
+        turns = [Rotation.from_matrix(rigid_fit(start[ids], end[ids])[0]) for ids in handles]
+        return np.array([each.as_rotvec() for each in turns]).reshape(-1, 3)
+
+    def _legs(self, goals: list[FloatArray]) -> Iterator[tuple[FloatArray, list[FloatArray]]]:
+        """Yield the waypoints (k, 3) before the last of *goals*, each with the goals ahead."""
+        for k, goal in enumerate(goals, 1):
+            for targets in self._way_to(goal):
+                yield targets, goals[k - 1 :]
+            if goals[k:]:
+                yield goal, goals[k:]
 
     def _way_to(self, goal: FloatArray) -> Iterator[FloatArray]:
         """Yield the waypoints (k, 3) before *goal*; near a contact they are close together."""
-        handles, start = self.constraints.handles, self.targets
+        handles, start = self.constraints.handles, self.way[0] if self.way else self.targets
         shortest = self._longest_leg(0.0)
         way = [start, *waypoints(start, goal, handles, shortest)]
         done, last, most = 0, len(way) - 1, round(1.0 / shortest)

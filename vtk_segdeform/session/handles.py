@@ -174,13 +174,17 @@ def cage_places(mesh: Mesh, vertices: ArrayLike, count: int, name: str) -> Float
 
 def require_near(mesh: Mesh, points: FloatArray, name: str) -> None:
     """Raise a ConstraintError if *points* are unreasonably far from *mesh*."""
-    if _farthest(points, mesh.vertices[0]) / mesh.diagonal <= _FARTHEST - 1.0:
-        return  # sufficient, and faster: the centre is within a diagonal of every vertex
-    away = _farthest(points, mesh.vertices.mean(axis=0)) / mesh.diagonal
-    if not away <= _FARTHEST:
+    if not is_near(mesh, points):
         raise ConstraintError(
             f"{name} are more than {_FARTHEST:.0f} mesh diagonals away from the mesh; move less"
         )
+
+
+def is_near(mesh: Mesh, points: FloatArray) -> bool:
+    """Return whether *points* (k, 3) are near enough to *mesh* for `require_near`."""
+    if _farthest(points, mesh.vertices[0]) / mesh.diagonal <= _FARTHEST - 1.0:
+        return True  # sufficient, and faster: the centre is within a diagonal of every vertex
+    return _farthest(points, mesh.vertices.mean(axis=0)) / mesh.diagonal <= _FARTHEST
 
 
 def _farthest(points: FloatArray, place: FloatArray) -> float:

@@ -23,19 +23,27 @@ from ..errors import ArgumentError, SessionError
 from ..geometry import carriers, towards
 from ..progress import Progress, part
 from ..regions import Regions, segment, with_regions_apart
-from . import pulls, solving
+from . import handles, pulls, solving
 from .poses import Poses
 from .preparing import fitted, held_firmly
 from .state import State
 
 
-def separated(poses: Poses, state: State) -> State:
+def separated(poses: Poses, state: State, progress: Progress | None = None) -> State:
     """Return *state* with regions of their own for the components that must deform by themselves.
 
     Itself if there are none.  A pose remains, nearly as it is.
     """
     regions = _separated(state)
-    return state if regions is None else _with_regions(poses, state, regions)
+    return state if regions is None else _with_regions(poses, state, regions, progress)
+
+
+def with_fixed(
+    poses: Poses, state: State, fixed: IntArray, progress: Progress | None = None
+) -> State:
+    """Return *state* with other *fixed* vertices (f,), where they are now, and `separated`."""
+    after = handles.with_fixed(poses.mesh, state, fixed, poses.vertices(state))
+    return separated(poses, after, progress)
 
 
 def attached(

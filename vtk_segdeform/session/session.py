@@ -67,7 +67,7 @@ from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .saved_poses import SavedPoses
-from .separating import apart, separated
+from .separating import apart, with_fixed
 from .state import (
     Cages,
     Options,
@@ -430,8 +430,7 @@ class Session(Described):
         """
         fixed, _ = checked_constraints(self.mesh, vertices, self.state.handle)
         if not np.array_equal(fixed, self.fixed):
-            after = handles.with_fixed(self.mesh, self.state, fixed, self.vertices)
-            self.history.step("set fixed vertices", separated(self.poses, after))
+            self.history.step("set fixed vertices", with_fixed(self.poses, self.state, fixed))
 
     # The pose.
 
@@ -464,8 +463,7 @@ class Session(Described):
         label = "let fixed vertices slide" if slides else "fix sliding vertices"
         after = replace(self.state, slides=owned_slides(self.mesh, own))
         places, _ = checked_constraints(self.mesh, fixed, self.state.handle)
-        after = handles.with_fixed(self.mesh, after, places, self.vertices)
-        self.history.step(label, separated(self.poses, after))
+        self.history.step(label, with_fixed(self.poses, after, places))
 
     def drag(
         self,

@@ -21,10 +21,12 @@ from ..progress import Progress
 from ..solver import Solution
 from . import pulls
 from .finishing import errors, moved_on
-from .handles import require_near, stacked, targets_at
+from .handles import is_near, require_near, stacked, targets_at
 from .poses import Aim, Path, Poses, Shown
 from .state import Cages, Pose, State
 
+_REGULAR = 1e-6  # relative weight of cages at rest among those nearest to a surface, at least
+_MARGIN = 1.1  # by which they may be farther away, for the volume that is to be restored
 _SAMPLED = 200  # vertices that hold a region in its place, at most about twice as many
 
 
@@ -59,7 +61,10 @@ def solve(
         places = wanted
         if shift is not None:
             own = shift[deformer.handle]
-            aim = Aim(wanted, own) if aim is None else aim.turned(wanted, own)
+            if aim is None or not deformer.has_arrived:
+                aim = Aim(wanted, own)
+            else:
+                aim = aim.turned(wanted, own)
             places = wanted - aim.shift
         solution = deformer.solve(places, max_steps=max_steps, progress=progress)
         if not np.isfinite(solution.vertices).all():
@@ -91,10 +96,13 @@ def solve(
     return pose, solution
 
 
-def with_region_at_rest(poses: Poses, state: State, region: int) -> State:
+def with_region_at_rest(
+    poses: Poses, state: State, region: int, progress: Progress | None = None
+) -> State:
     """Return *state* with the vertices of a region where they were at rest; the others follow.
 
     Its handles, pins and pulled points go back to rest as well; later drags may move it again.
+    It may run in another thread.
     """
     regions, rest = state.regions, poses.mesh.vertices
     if state.pose is None or regions is None:
@@ -109,7 +117,8 @@ def with_region_at_rest(poses: Poses, state: State, region: int) -> State:
     targets |= {name: frozen(rest[state.handles[name]]) for name in inside}
     handles = MappingProxyType({**state.handles, **held})
     pose = replace(state.pose, targets=targets_at(handles, poses.vertices(state)))
-    pose, _ = solve(poses, replace(state, handles=handles, pose=pose), targets)
+    here = replace(state, handles=handles, pose=pose)
+    pose, _ = solve(poses, here, targets, progress=progress)
     kept = {name: points for name, points in pose.targets.items() if name in state.handles}
     return replace(state, pose=replace(pose, targets=MappingProxyType(kept)))
 
@@ -155,7 +164,8 @@ def carried(poses: Poses, state: State, x: FloatArray, progress: Progress | None
     """Return the cage vertices (m_r, 3) of *state* whose mesh is nearest to *x* (n, 3).
 
     In the sense of least squares over some thousand vertices, of which fixed ones and handles count
-    most.  It binds *state*, and may run in another thread, as `Poses.bind`.
+    most, and among cages as near to the mesh as `require_near` asks for.  It binds *state*, and may
+    run in another thread, as `Poses.bind`.
     """
     deformer, mesh = poses.bind(state, progress), poses.mesh
     held = np.concatenate([state.fixed, state.handle])
@@ -166,7 +176,10 @@ def carried(poses: Poses, state: State, x: FloatArray, progress: Progress | None
     rows = weights * deformer.subspace.at(ids)
     moved = rows.T @ (weights * (x - mesh.vertices)[ids])
     normal = rows.T @ rows
-    normal[np.diag_indices_from(normal)] += 1e-6 * np.trace(normal) / len(normal)
     rest = np.concatenate([cage.vertices for cage in state.cages])
-    p = rest + np.linalg.solve(normal, moved)
+    added, shift = _REGULAR * np.trace(normal) / len(normal), np.full_like(rest, np.inf)
+    while not is_near(mesh, rest + _MARGIN * shift):
+        shift = np.linalg.solve(normal + added * np.eye(len(normal)), moved)
+        added *= 2.0
+    p = rest + shift
     return tuple(p[columns] for columns in deformer.subspace.columns)

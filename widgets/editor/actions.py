@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.cages import Cage
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, ConstraintError, RegionError, SessionError
@@ -26,6 +27,7 @@ from vtk_segdeform.regions import Regions
 from vtk_segdeform.regions import segment as find_regions
 from vtk_segdeform.session import (
     FinishedPose,
+    Session,
     State,
     blend_label,
     finishing,
@@ -215,14 +217,8 @@ def attaching(component: int, carrier: str, label: str) -> Action:
         if carrier != "auto":
             wanted[component] = carrier if carrier == FREE else int(carrier)
 
-        def show(after: State) -> str:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while cages were being fitted. Try again")
-            session.history.step(label, after)
-            return label[:1].upper() + label[1:]
-
         work = partial(separating.attached, session.poses, before, wanted)
-        controller.start("Fitting cages", work, show)
+        _start_step(controller, "Fitting cages", work, label, lambda: _sentence(label))
 
     return attach
 
@@ -255,6 +251,25 @@ def fit_cages(controller: Controller, n_cage_vertices: int | None = None) -> Non
         return f"{count} fitted, {total} vertices in total{_reset(controller, before)}"
 
     controller.start("Fitting cages", work, show)
+
+
+def _start_step(
+    controller: Controller,
+    name: str,
+    work: Callable[[Progress], State],
+    label: str,
+    then: Callable[[], str | None] = lambda: None,
+) -> None:
+    """Start the job *name*, whose result is the state of a step called *label*; *then* follows."""
+    session, before = controller.session, controller.session.state
+
+    def show(after: State) -> str | None:
+        if session.state is not before:  # changed in another view of the same session
+            raise SessionError("The session changed meanwhile. Try again")
+        session.history.step(label, after)
+        return then()
+
+    controller.start(name, work, show)
 
 
 def _reset(controller: Controller, before: State) -> str:
@@ -446,15 +461,9 @@ def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
             session.commit(label, join=joins)
             _settle(controller)
 
-        def show(after: State) -> None:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while cages were being fitted. Try again")
-            session.history.step(label, after)
-            finish(joins=True)
-
         if separating.separated_by(session.poses, before, goals) is not None:
             work = partial(separating.apart, session.poses, before, goals)
-            controller.start("Fitting cages", work, show)
+            _start_step(controller, "Fitting cages", work, label, partial(finish, joins=True))
         else:
             finish()
 
@@ -500,8 +509,10 @@ def resetting(region: int) -> Action:
     """Return the action that moves a region back to rest, while the others follow."""
 
     def reset_part(controller: Controller) -> None:
-        controller.session.reset_region(region)
-        controller.say(f"Reset {controller.session.painting.name(region)}")
+        session = controller.session
+        label = f"reset {session.painting.name(region)}"
+        work = partial(solving.with_region_at_rest, session.poses, session.state, region)
+        _start_step(controller, "Resetting", work, label, lambda: _sentence(label))
 
     return reset_part
 
@@ -539,10 +550,10 @@ def isolating(spot: Spot) -> Action:
     def isolate(controller: Controller) -> None:
         widgets, session = controller.widgets, controller.session
         if widgets.surface.only is not None:
-            widgets.surface.only = None
+            widgets.show_only(None)
             controller.say("Everything is shown")
             return
-        widgets.surface.only = widgets.mask_of(spot)
+        widgets.show_only(widgets.mask_of(spot))
         name = "this part" if spot.region is None else session.painting.name(spot.region)
         controller.say(f"Only {name} is shown. {controller.keys.cap('isolate')}: show everything")
 
@@ -561,6 +572,85 @@ def isolate(controller: Controller) -> None:
 def framing(spot: Spot) -> Action:
     """Return the action that frames the part at *spot*."""
     return lambda c: c.camera.viewpoint.frame(c.widgets.part_of(spot))
+
+
+# Bodies, by their vertices, a mask (n,), and their names: "Body 2".
+
+
+def hide_body(controller: Controller) -> None:
+    """Hide the body under the pointer."""
+    hiding(*_body_under_pointer(controller, "hide"), hidden=True)(controller)
+
+
+def hiding(body: BoolArray, name: str, *, hidden: bool) -> Action:
+    """Return the action that hides a *body*, as `isolating` does, or shows it again."""
+
+    def hide(controller: Controller) -> None:
+        only = controller.widgets.surface.only
+        shown = np.ones(len(body), dtype=bool) if only is None else only
+        controller.widgets.show_only(shown & ~body if hidden else shown | body)
+        everything = f" hidden. {controller.keys.cap('isolate')}: show everything"
+        controller.say(f"{name} is{everything if hidden else ' shown'}")
+
+    return hide
+
+
+def lock_body(controller: Controller) -> None:
+    """Lock the body under the pointer, or unlock it."""
+    body, name = _body_under_pointer(controller, "lock")
+    locking(body, name, locked=not is_locked(controller.session, body))(controller)
+
+
+def locking(body: BoolArray, name: str, *, locked: bool) -> Action:
+    """Return the action that fixes a *body* where it is, or lets it move again.
+
+    Handles on it keep their places; while it is locked, they cannot be grabbed.  With a symmetry,
+    its mirror image is locked as well.
+    """
+
+    def lock(controller: Controller) -> None:
+        session, state = controller.session, controller.session.state
+        mirror = session.poses.mirror(state)
+        own = body if mirror is None else body | body[mirror.mates]
+        ids = np.flatnonzero(own)
+        fixed = np.setdiff1d(state.fixed, ids)
+        if locked:
+            fixed = np.union1d(state.fixed, np.setdiff1d(ids, state.handle))
+
+        def show() -> str:
+            for handle, vertices in session.handles.items():
+                if own[vertices].all():
+                    controller.widgets.dragger.set_locked(handle, locked)
+            return f"{name} is {'locked' if locked else 'unlocked'}"
+
+        work = partial(separating.with_fixed, session.poses, state, fixed)
+        verb = "lock" if locked else "unlock"
+        label = f"{verb} {name[:1].lower()}{name[1:]}"
+        _start_step(controller, f"{_sentence(verb)}ing {name}", work, label, show)
+
+    return lock
+
+
+def is_locked(session: Session, body: BoolArray) -> bool:
+    """Return whether all vertices of a *body* are fixed, but for those in handles."""
+    fixed, free = session.fixed, body.copy()
+    free[fixed] = free[session.state.handle] = False
+    return not free.any() and bool(body[fixed].any())
+
+
+def _body_under_pointer(controller: Controller, verb: str) -> tuple[BoolArray, str]:
+    session = controller.session
+    if not session.is_bound:
+        raise SessionError("The mesh is not ready yet. Wait until it is prepared")
+    spot = controller.widgets.spot_at(controller.view.pointer(Phase.HOVER))
+    bodies, components = session.deformer.bodies, session.mesh.components
+    number = -1 if spot is None else int(bodies.of_component[components[spot.vertex]])
+    if number < 0:
+        raise ConstraintError(f"Point at the body to {verb}")
+    body = np.asarray(bodies.of_component[components] == number)
+    if body.all():
+        raise ConstraintError(f"The mesh is a single body: there is none to {verb}")
+    return body, _sentence(volume_label(session.state.region_names, f"body {number}"))
 
 
 # Saved poses.
@@ -596,18 +686,12 @@ def going_to(name: str) -> Action:
     """Return the action that lets the mesh have a saved pose."""
 
     def go(controller: Controller) -> None:
-        session = controller.session
-        saved, before = session.saved_poses, session.state
-
-        def show(after: State) -> None:
-            if session.state is not before:  # changed in another view of the same session
-                raise SessionError("The session changed while the pose was being fitted. Try again")
-            session.history.step(f"go to {name}", after)
-
+        saved = controller.session.saved_poses
         if saved.has_cages(name):
             saved.apply(name)
         else:
-            controller.start("Fitting the pose to other cages", lambda _: saved.applied(name), show)
+            work, label = lambda _: saved.applied(name), f"go to {name}"
+            _start_step(controller, "Fitting the pose to other cages", work, label)
 
     return go
 
@@ -863,6 +947,10 @@ def _handle_names(controller: Controller) -> list[str]:
 
 def _detecting(controller: Controller) -> str:
     return f"Press {controller.keys.cap('segment')} to detect them"
+
+
+def _sentence(label: str) -> str:
+    return label[:1].upper() + label[1:]
 
 
 def _count(number: int, noun: str) -> str:

@@ -121,7 +121,7 @@ BINDINGS = (
     ),
     Binding(
         "add_landmarks",
-        ("shift+l",),
+        ("shift+k",),
         DRAGGING,
         "Add landmarks by clicks, or stop",
         actions.toggle_landmarks,
@@ -134,6 +134,8 @@ BINDINGS = (
     Binding("style", ("w",), ALL, "Shaded, with edges, wireframe", actions.next_style),
     Binding("show_regions", ("shift+g",), ALL, "Show regions", actions.toggle_regions),
     Binding("isolate", ("slash",), ALL, "Isolate part, or show everything", actions.isolate),
+    Binding("hide_body", ("shift+h",), ALL, "Hide body under pointer", actions.hide_body),
+    Binding("lock_body", ("shift+l",), ALL, "Lock or unlock body", actions.lock_body),
     Binding("before_after", ("backslash",), ALL, "Hold: show the mesh at rest", actions.show_rest),
     *(
         Binding(name, (key,), ALL, label, action, while_busy=True, heading=VIEW)
@@ -165,6 +167,7 @@ _BLENDER: dict[str, tuple[str, ...]] = {
     "show_cages": ("k",),
     "help": ("f1", "question"),
     "style": ("shift+z",),
+    "hide_body": ("h",),
     "before_after": ("grave",),
     "brush": ("c",),
     "lasso": ("w",),

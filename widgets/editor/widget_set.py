@@ -191,6 +191,12 @@ class WidgetSet:
         self.outlines.show(lines=False, numbers=False)
         self.surface.instead = vertices
 
+    def show_only(self, vertices: BoolArray | None) -> None:
+        """Show some *vertices*, a mask (n,), and what is on them; None shows all."""
+        self.finish()
+        self.surface.only = None if vertices is None or vertices.all() else vertices
+        self.dragger.update()
+
     def wants_overlay(self, mode: Mode) -> bool:
         """Return whether volume changes are shown in *mode*; painting hides them."""
         return self.overlay_wanted and mode in (Mode.PULL, Mode.CAGES, Mode.DEFORM)

@@ -34,7 +34,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from vtk_segdeform.arrays import FloatArray, is_number, is_whole
+from vtk_segdeform.arrays import FloatArray, IntArray, is_number, is_whole
 from vtk_segdeform.checks import as_flag, require, shown
 from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.geometry import rigid_fit
@@ -82,6 +82,7 @@ class HandleDragger(Widget):
         self._surface = SurfaceDisplay(self.view, session) if surface is None else surface
         self._picker = Picker(self._surface)
         self._marks = HandleMarks(self.view, session)
+        self._marks.is_shown = self._is_on_shown_surface
         self.gizmo = Gizmo(self.view)
         self.pulls_with: Callable[[], dict[str, Any]] = dict
         self._local = False
@@ -132,6 +133,10 @@ class HandleDragger(Widget):
         self._marks.hidden = (
             self.hidden | {name} if as_flag(hidden, "hidden") else (self.hidden - {name})
         )
+        self.update()
+
+    def update(self) -> None:
+        """Show the handles and the gizmo again, as others of them may be hidden."""
         self._marks.show(bool(self.GetEnabled()) and self.session.state.is_ready)
         self._update_gizmo()
 
@@ -483,7 +488,12 @@ class HandleDragger(Widget):
         return None if name is None or self._is_out_of_reach(name) else (name, hit.point)
 
     def _is_out_of_reach(self, name: str) -> bool:
-        return name in self.hidden or name in self.locked
+        is_seen = self._is_on_shown_surface(self.session.handles[name])
+        return name in self.hidden or name in self.locked or not is_seen
+
+    def _is_on_shown_surface(self, vertices: IntArray) -> bool:
+        only = self._surface.only
+        return only is None or bool(only[vertices].any())
 
     # Display.
 

@@ -5,8 +5,11 @@ The highlighted handle is yellow.  Handles may be hidden; their vertices stay wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from vtk_segdeform.arrays import IntArray
 from vtk_segdeform.pictures import COLOURS, rgb
 from vtk_segdeform.session import Session
 
@@ -24,6 +27,8 @@ class HandleMarks:
     ----------
     hidden : frozenset of str
         The handles that are not shown; takes effect at the next `show`.
+    is_shown : callable
+        Of vertices (k,): whether any of them is shown; by default all are.
     """
 
     def __init__(self, view: View, session: Session) -> None:
@@ -32,6 +37,7 @@ class HandleMarks:
         self._dots: dict[str, Wireframe] = {}
         self._highlighted: str | None = None
         self.hidden: frozenset[str] = frozenset()
+        self.is_shown: Callable[[IntArray], bool] = lambda _: True
         self._is_shown = False
         self._stop = view.before_render(self._set_sizes)
 
@@ -46,7 +52,7 @@ class HandleMarks:
         self._dots = {}
         if self._is_shown:
             for name, ids in self.session.handles.items():
-                if name in self.hidden:
+                if name in self.hidden or not self.is_shown(ids):
                     continue
                 dots = Wireframe(self.session.vertices[ids], _NO_EDGES, np.arange(len(ids)))
                 self.view.renderer.AddActor(dots.actor)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from vtk_segdeform.arrays import BoolArray
 from vtk_segdeform.geometry import FREE
 from vtk_segdeform.pictures import BODY, of_region, rgb
 from vtk_segdeform.session import Session, volume_label
@@ -26,6 +28,8 @@ _COLUMNS = (
     Column("volume", "Volume", "In the unit of the mesh, cubed"),
     Column("change", "Change"),
     Column("follows", "Follows"),
+    Column("show", "Show", "A hidden body cannot be picked or painted"),
+    Column("lock", "Lock", "A locked body stays where it is: its vertices are fixed"),
 )
 _SYMMETRY = (("None", "none"), ("X", "x"), ("Y", "y"), ("Z", "z"), ("Auto", "auto"))
 _chosen: WeakKeyDictionary[Controller, str] = WeakKeyDictionary()
@@ -155,7 +159,11 @@ def bodies_section(editor: DeformEditor) -> Section:
                 "The closed parts of the mesh, the largest first. "
                 "The selected one is that of the section Volumes as well",
                 n_rows=5,
-                acts={"select": lambda keys: _choosing(next(iter(keys), ""))},
+                acts={
+                    "select": lambda keys: _choosing(next(iter(keys), "")),
+                    "show": lambda key, on: _to_body(key, actions.hiding, hidden=not on),
+                    "lock": lambda key, on: _to_body(key, actions.locking, locked=on),
+                },
             ),
             Field(
                 "bodies.more",
@@ -204,6 +212,12 @@ def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: b
     session = editor.session
     bodies, regions = _bodies[session], session.regions
     volume = change = follows = ""
+    own, _ = _body(session, name)
+    only = editor.widgets.surface.only
+    shown = locked = None  # a chamber has no vertices of its own
+    if component is not None:
+        shown = only is None or bool(only[own].any())
+        locked = actions.is_locked(session, own)
     if session.is_bound:
         share = editor.widgets.overlay.region_volumes.change(name)
         rest = float(bodies.volumes[int(name.rpartition(" ")[2])])
@@ -213,8 +227,18 @@ def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: b
         carrier = component if regions.carrier is None else int(regions.carrier[component])
         follows = _NOTHING if carrier == component else _carrier(bodies, carrier)
         colour = of_region(regions.label_at(int((session.mesh.components == component).argmax())))
-    cells = Cell(volume), Cell(change), Cell(follows)
+    cells = Cell(volume), Cell(change), Cell(follows), Cell(checked=shown), Cell(checked=locked)
     return Row(name, _label(session, name), as_rgb(colour), cells, is_chosen)
+
+
+def _body(session: Session, name: str) -> tuple[BoolArray, str]:
+    """Return the vertices of a body, a mask (n,), and what it is called."""
+    numbers = _bodies[session].of_component[session.mesh.components]
+    return np.asarray(numbers == int(name.rpartition(" ")[2])), _label(session, name)
+
+
+def _to_body(name: str, action: Callable[..., Action], **how: bool) -> Action:
+    return lambda controller: action(*_body(controller.session, name), **how)(controller)
 
 
 def _carrier(bodies: Bodies, component: int) -> str:

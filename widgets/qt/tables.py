@@ -1,6 +1,7 @@
 """A table of the panel: rows with a colour, a name, texts and check boxes.
 
-A double click on a name, or F2, renames the row in place.
+A double click on a name, or F2, renames the row in place.  The keys Left and Right go to its boxes,
+which Space checks.
 """
 
 from __future__ import annotations
@@ -46,7 +47,6 @@ class TableView(QtWidgets.QTreeWidget):
         self.setHeaderLabels([table.title, *(column.title for column in table.columns)])
         self.setRootIsDecorated(False)
         self.setUniformRowHeights(True)
-        self.setAllColumnsShowFocus(True)
         self.setToolTip(table.tip)
         self.setTabKeyNavigation(False)  # Tab leaves the table
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
@@ -72,7 +72,11 @@ class TableView(QtWidgets.QTreeWidget):
 
     def keyPressEvent(self, event: Any) -> None:  # noqa: N802
         """Pass on letters and digits, which would search for a name, and are keys of the editor."""
-        if event.text().isprintable() and event.text().strip():
+        step = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}.get(event.key(), 0)
+        beside = self.currentIndex().siblingAtColumn(self.currentIndex().column() + step)
+        if step and beside.isValid():
+            self.setCurrentIndex(beside)
+        elif event.text().isprintable() and event.text().strip():
             event.ignore()
         else:
             super().keyPressEvent(event)
@@ -160,12 +164,12 @@ class TableView(QtWidgets.QTreeWidget):
         self.viewport().update()  # signals are blocked
 
     def _selection_changed(self) -> None:
-        keys = [self._rows[k].key for k in self._selected()]
+        keys = [self._table.rows[k].key for k in self._selected()]
         if keys:
             self._press(f"{self._table.name}.select", keys)
 
     def _item_edited(self, item: Any, place: int) -> None:
-        row = self._rows[self.indexOfTopLevelItem(item)]
+        row = self._table.rows[self.indexOfTopLevelItem(item)]
         self._rows = ()  # draw the row again even if the change is refused
         if not place and item.text(0) != row.label:
             self._press(f"{self._table.name}.rename", (row.key, item.text(0)))

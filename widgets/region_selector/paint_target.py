@@ -36,13 +36,17 @@ class Paint(enum.Enum):
 
 @dataclass(frozen=True)
 class PaintTarget:
-    """One region, the fixed vertices, one handle or a stiffness, of a session with n vertices."""
+    """One region, the fixed vertices, one handle or a stiffness, of a session with n vertices.
+
+    Only the vertices that are *shown*, (n,), are added or erased; by default all are.
+    """
 
     session: Session
     paint: Paint
     region: int
     handle: str | None
     stiffness: float = 1.0
+    shown: BoolArray | np.bool_ = np.True_
 
     @property
     def colour(self) -> NDArray[np.uint8]:
@@ -118,6 +122,7 @@ class PaintTarget:
         if self.paint is Paint.STIFFNESS:
             self.stiffen(vertices.astype(np.float64), erase=False)
             return self.handle
+        vertices = vertices & self.shown
         new = self.changed(vertices, erase=False)
         if not new.any():
             if (vertices & self._candidates(False)).any():
@@ -149,6 +154,7 @@ class PaintTarget:
         if self.paint is Paint.STIFFNESS:
             self.stiffen(vertices.astype(np.float64), erase=True)
             return self.handle
+        vertices = vertices & self.shown
         old = vertices & self._candidates(True)
         if not old.any():
             return self.handle
@@ -204,14 +210,14 @@ class PaintTarget:
         members = self.members()
         if not members.any():
             return self.select_all()
-        others = ~members & ~self._protected(False)
+        others = ~members & ~self._protected(False) & self.shown
         if not others.any():
             raise ConstraintError(
                 f"Cannot invert {self._name}: all other vertices are fixed or in a handle"
                 if not members.all()
                 else f"Cannot invert {self._name}: it contains all vertices"
             )
-        return self._assign(others)
+        return self._assign(others | (members & ~self.shown))
 
     def _assign(self, members: BoolArray) -> str | None:
         """Make *members* the fixed vertices or the handle; return its name, None if it is empty."""

@@ -17,6 +17,7 @@ With a symmetry, strokes fix or stiffen both sides.  A change of regions resets 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -140,7 +141,8 @@ class RegionSelector(Widget):
     def select_all(self) -> None:
         """Add all vertices that are free to the painted region, fixed vertices or handle."""
         target = self._target
-        self.remark = target.remark(np.ones(self.session.mesh.n_vertices, bool), erase=False)
+        everything = np.ones(self.session.mesh.n_vertices, dtype=bool)
+        self.remark = target.remark(everything & target.shown, erase=False)
         self.handle = target.select_all()
 
     def select_none(self) -> None:
@@ -278,13 +280,16 @@ class RegionSelector(Widget):
     def _shares(self, stroke: Stroke, target: PaintTarget) -> FloatArray:
         """Return `shares_of` a stroke, and of its mirror image where that has the same effect.
 
+        Hidden vertices are not selected.
+
         With a symmetry, fixed vertices and stiffness count on both sides.  A handle on both sides
         could move along the plane only, and their regions are not mirrored.
         """
         shares = shares_of(stroke)
         is_mirrored = target.paint in (Paint.FIXED, Paint.STIFFNESS)
         mirror = self.session.poses.mirror(self.session.state) if is_mirrored else None
-        return shares if mirror is None else np.maximum(shares, shares[mirror.mates])
+        shares = shares if mirror is None else np.maximum(shares, shares[mirror.mates])
+        return np.where(target.shown, shares, 0.0)
 
     def _apply(self, shares: FloatArray, target: PaintTarget, erase: bool) -> None:
         vertices = shares > 0.0
@@ -298,7 +303,9 @@ class RegionSelector(Widget):
 
     @property
     def _target(self) -> PaintTarget:
-        return PaintTarget(self.session, self.paints, self.region, self.handle, self.stiffness)
+        target = PaintTarget(self.session, self.paints, self.region, self.handle, self.stiffness)
+        only = self.surface.only
+        return target if only is None else replace(target, shown=only)
 
     def _neighbours(self, vertices: BoolArray) -> BoolArray:
         """Return the vertices, (n,) bool, that share an edge with one of *vertices*."""

@@ -55,7 +55,7 @@ view_right kp_3, view_left ctrl+kp_3, view_top kp_7, view_bottom ctrl+kp_7, view
 projection kp_5, frame_selection period, frame_all comma, keep_part shift+p, grow_part e,
 paint_stiffness s, smaller_limb bracketleft, larger_limb bracketright,
 hinge b,
-isolate slash, next_up_axis shift+u, add_landmarks shift+l
+isolate slash, next_up_axis shift+u, add_landmarks shift+k, hide_body shift+h, lock_body shift+l
 """
 
 

@@ -8,14 +8,17 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from bodies import ball, joined, rod, tube
-from hands import Hand, draw_seldom, plain_view
+from hands import Hand, draw_seldom, look_from, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform.session import Session
 from vtk_segdeform.widgets.editor.editor import DeformEditor
+from vtk_segdeform.widgets.editor.widget_set import Mode
 from vtk_segdeform.widgets.panel.fields import Section
 from vtk_segdeform.widgets.panel.panel import all_sections, press
+from vtk_segdeform.widgets.region_selector import Paint, Tool
+from vtk_segdeform.widgets.scene import Phase
 
 pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 
@@ -74,7 +77,7 @@ def follows(editor: DeformEditor):
 def test_bodies_are_listed_with_their_volumes_and_what_they_follow(editor):
     volumes = editor.session.volumes()
     shown = rows(editor)
-    assert [(row[0], *row[2:]) for row in shown] == [
+    assert [(row[0], *row[2:4]) for row in shown] == [
         ("Body 1", "0 %", "Nothing"), ("Body 2", "0 %", "Body 1"), ("Body 3", "0 %", "Nothing"),
     ]  # fmt: skip
     assert [row[1] for row in shown] == [f"{volumes[f'body {k}']:.4g}" for k in range(3)]
@@ -149,3 +152,102 @@ def test_one_body_is_no_list():
     scene = sausage(is_coarse=True)
     for editor in editing(scene.session()):
         assert not bodies(editor).visible
+
+
+def boxes(editor: DeformEditor, column: str) -> list[bool | None]:
+    (table,) = bodies(editor).tables
+    place = [each.name for each in table.columns].index(column)
+    return [row.cells[place].checked for row in table.rows]
+
+
+def vertices_of(editor: DeformEditor, component: int) -> np.ndarray:
+    return np.flatnonzero(editor.session.mesh.components == component)
+
+
+def point_at(editor: DeformEditor, component: int) -> Hand:
+    """Return a hand at the vertex of a component that is nearest to the eye."""
+    look_from(editor.view, 20.0, 0.0, 0.0)
+    ids, hand = vertices_of(editor, component), Hand(editor.view)
+    near = ids[editor.session.vertices[ids, 0].argmax()]
+    hand.hover(hand.at(editor.session.vertices[near]))
+    return hand
+
+
+def test_a_hidden_body_is_not_drawn_picked_or_painted_until_everything_is_shown(editor):
+    session, widgets = editor.session, editor.widgets
+    editor.controller.finishing.is_wanted = False
+    balls = vertices_of(editor, 2)
+    name = session.handles.add(balls[:5])
+    editor.mode = Mode.DEFORM
+    editor.wait()
+    assert boxes(editor, "show") == [True, True, True]
+    hand = point_at(editor, 2)
+    assert widgets.spot_at(editor.view.pointer(Phase.HOVER)).vertex in balls
+    assert press(editor, "bodies.list.show", ["body 2", False]) is None
+    assert boxes(editor, "show") == [True, True, False]
+    assert "Body 3 is hidden. /: show everything" in editor.status
+    shown = widgets.surface.polydata.GetNumberOfPolys()
+    assert shown == session.mesh.n_faces - len(SOLIDS[2][1])
+    spot = widgets.spot_at(editor.view.pointer(Phase.HOVER))
+    assert spot is None or spot.vertex not in balls
+    assert widgets.dragger.gizmo.centre is None  # of the handle on it
+    editor.mode = Mode.HANDLES
+    widgets.selector.paints = Paint.FIXED
+    widgets.selector.through = True
+    widgets.selector.select_all()
+    assert len(session.fixed) == session.mesh.n_vertices - len(balls)
+    session.set_fixed(balls[-5:])  # some that are hidden
+    widgets.selector.invert()
+    assert len(session.fixed) == session.mesh.n_vertices - len(balls) + 5
+    session.set_fixed([])
+    widgets.selector.tool = Tool.RECTANGLE
+    hand.drag([(1, 1), (399, 399)])
+    assert len(session.fixed) == session.mesh.n_vertices - len(balls)
+    widgets.selector.paints = Paint.STIFFNESS
+    hand.drag([(1, 1), (399, 399)])
+    assert (session.state.stiffness[balls] == 1.0).all()
+    assert (np.delete(session.state.stiffness, balls) == 10.0).all()
+    hand.types("slash", (2, 2))
+    assert boxes(editor, "show") == [True, True, True]
+    assert not session.history.redo_label
+    editor.mode = Mode.DEFORM
+    editor.wait()
+    assert widgets.dragger.handle == name
+    assert widgets.dragger.gizmo.centre is not None
+    hand = point_at(editor, 2)
+    hand.types("shift+h", None)
+    assert boxes(editor, "show") == [True, True, False]
+    press(editor, "bodies.list.show", ["body 2", True])
+    assert widgets.surface.only is None
+
+
+def test_a_locked_body_stays_where_it_is_until_it_is_unlocked(editor):
+    session, locked = editor.session, editor.widgets.dragger.locked
+    editor.controller.finishing.is_wanted = False
+    ids = vertices_of(editor, 2)
+    session.pull(int(ids[0]), session.vertices[ids[0]] + [0.0, 0.3, 0.0])
+    session.commit()
+    there, (pulled,) = session.vertices, session.handles
+    assert np.abs(there - session.mesh.vertices)[ids].max() > 0.2
+    assert press(editor, "bodies.list.lock", ["body 2", True]) is None
+    editor.wait()
+    assert editor.status.startswith("Body 3 is locked")
+    assert boxes(editor, "lock") == [False, False, True]
+    assert_array_equal(np.union1d(session.fixed, session.state.handle), ids)
+    assert session.history.undo_label == "lock body 3"
+    assert editor.widgets.dragger.locked == {pulled}
+    rod_end = int(vertices_of(editor, 0)[-1])
+    session.pull(rod_end, session.vertices[rod_end] + [0.5, 0.0, 0.0])
+    session.commit()
+    assert np.abs(session.vertices - there)[ids].max() < 1e-3
+    assert np.abs(session.vertices - there).max() > 0.4
+    session.undo()
+    session.undo()
+    assert boxes(editor, "lock") == [False, False, False]
+    hand = point_at(editor, 2)
+    for is_locked in (True, False):
+        hand.types("shift+l", None)
+        editor.wait()
+        assert boxes(editor, "lock") == [False, False, is_locked]
+    assert editor.widgets.dragger.locked == locked == frozenset()
+    assert session.history.labels[-2:] == ("lock body 3", "unlock body 3")

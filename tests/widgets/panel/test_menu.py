@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, look_from, plain_view
@@ -9,6 +11,7 @@ from numpy.testing import assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform import Session
+from vtk_segdeform.session import solving
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel import menu, press
 from vtk_segdeform.widgets.scene import Phase, Pointer
@@ -105,6 +108,7 @@ def test_a_part_is_reset_and_the_rest_follows(bench, arm):
     own, posed, state = SCENE.regions.labels == 1, session.vertices, session.state
     assert bench.entry("reset").label == "Reset arm"
     assert press(bench.editor, "menu.reset") is None
+    bench.editor.wait()
     away = np.linalg.norm(session.vertices - rest, axis=1)
     assert away[own].max() < 0.05 < 0.5 < np.linalg.norm(posed - rest, axis=1)[own].max()
     assert away[~own].max() > 0.3
@@ -113,6 +117,27 @@ def test_a_part_is_reset_and_the_rest_follows(bench, arm):
     assert list(session.handles) == list(state.handles)
     bench.hand.types("ctrl+z")
     assert_array_equal(session.vertices, posed)
+
+
+def test_a_slow_reset_of_a_part_leaves_the_window_free_and_is_cancelled(bench, arm, monkeypatch):
+    session, editor, goes_on = bench.session, bench.editor, threading.Event()
+
+    def slow(*how, progress, **more):
+        assert goes_on.wait(60.0)
+        progress(0.5, "")
+        raise AssertionError("not cancelled")
+
+    monkeypatch.setattr(solving, "solve", slow)
+    before = session.state
+    assert press(editor, "menu.reset") is None
+    assert editor.is_busy
+    assert "Resetting" in editor.status
+    bench.hand.types("kp_1")  # the camera moves meanwhile
+    bench.hand.types("Escape")
+    goes_on.set()
+    editor.wait()
+    assert session.state is before
+    assert not editor.is_busy
 
 
 def test_points_are_pinned_parts_rigid_kept_and_enlarged_handles_locked(bench, arm):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hands import Hand
@@ -9,6 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 from scipy.spatial.transform import Rotation
 
+from vtk_segdeform.deformer.path import Path
+from vtk_segdeform.widgets.handle_dragger import STEPS
 from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.panel import press, sections
 from vtk_segdeform.widgets.scene import Phase, Pointer
@@ -60,6 +64,29 @@ def test_a_turn_of_more_than_half_a_round_goes_the_way_that_was_asked_for(editor
     between = [each for each in solved if abs(each[b, 1] - each[a, 1]) > 0.8 * np.ptp(REST[:, 2])]
     assert between  # it stopped half-way
     assert_allclose(session.targets[name][:, 2], -REST[:, 2], atol=1e-9)
+
+
+def test_a_far_number_is_reached_by_solves_of_a_few_steps_each(editor, monkeypatch):
+    """Where contact is avoided, waypoints are near each other; the window stays usable."""
+    session, hand, steps, solve = editor.session, Hand(editor.view), [], Path.solve
+
+    def counted(self, *how, **more):
+        pose = solve(self, *how, **more)
+        steps.append(pose.steps)
+        return pose
+
+    monkeypatch.setattr(Path, "solve", counted)
+    session.change_options(avoid_contact=True)
+    press(editor, "motion.move_x", 6.0)
+    assert session.is_unsettled
+    assert session.vertices[SCENE.handle].mean(axis=0)[0] < REST.mean(axis=0)[0] + 3.0
+    ticks = itertools.takewhile(lambda _: session.is_unsettled, range(200))
+    for _ in ticks:
+        hand.tick()
+    assert max(steps) < 2 * STEPS
+    assert_allclose(session.vertices[SCENE.handle], REST + [6.0, 0.0, 0.0], atol=0.01)
+    editor.run("undo")
+    assert session.state.pose is None
 
 
 def test_a_drag_shows_its_numbers(editor):

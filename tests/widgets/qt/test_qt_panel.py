@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from bodies import ball, joined
 from qt_hands import Qt, QtTest, QtWidgets, application, small, until
-from qtpy import QtGui
+from qtpy import QtCore, QtGui
 
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
@@ -342,3 +342,19 @@ def test_what_a_body_follows_is_chosen_by_mouse_and_undone_by_a_key(two_bodies):
     QtTest.QTest.keyClick(widget.focusWidget(), Qt.Key.Key_Z, Qt.ControlModifier)
     settle(widget)
     assert session.regions.carrier.tolist() == [0, 0]
+
+
+def test_a_body_is_hidden_by_mouse_and_locked_by_keys_in_the_list(two_bodies):
+    widget, session = two_bodies, two_bodies.session
+    table, surface = entered(widget, Mode.PULL, "bodies.list"), widget.editor.widgets.surface
+    own, box = session.mesh.components == 1, table.visualRect(table.model().index(1, 4))
+    place = QtCore.QPoint(box.left() + 10, box.center().y())
+    QtTest.QTest.mouseClick(table.viewport(), Qt.LeftButton, Qt.NoModifier, place)
+    settle(widget)
+    np.testing.assert_array_equal(surface.only, ~own)
+    keys = [Qt.Key.Key_Down, *[Qt.Key.Key_Right] * 6, Qt.Key.Key_Left, Qt.Key.Key_Space]
+    for key in (*keys, Qt.Key.Key_Right, Qt.Key.Key_Space):
+        QtTest.QTest.keyClick(table, key)
+    assert surface.only is None
+    settle(widget)
+    np.testing.assert_array_equal(session.fixed, np.flatnonzero(own))
