@@ -32,7 +32,7 @@ def editor():
 def test_a_press_adds_a_landmark_and_a_drag_leads_to_its_target_in_one_step(editor):
     made, hand = editor
     session, place = made.session, hand.at(X[FRONT])
-    hand.types("shift+l", place)
+    hand.types("shift+k", place)
     assert "Click the surface to add a landmark" in made.controller.hint
     hand.click(place)
     ((source, target),) = session.landmarks.values()
@@ -64,8 +64,8 @@ def test_a_target_is_dragged_and_other_presses_pull_the_surface(editor):
     assert session.history.labels[-1] == "move target of landmark 1"
     assert_allclose(hand.at(session.landmarks["landmark 1"][1]), (ring[0] + 30, ring[1]), atol=1.0)
     assert session.state.pose is None
-    hand.types("shift+l")
-    hand.types("shift+l")  # on, and off again
+    hand.types("shift+k")
+    hand.types("shift+k")  # on, and off again
     tip = hand.at(X[X[:, 0].argmax()] * 0.95)
     hand.drag([tip, (tip[0], tip[1] + 20.0)])
     assert session.history.labels[-1] == "pull"
@@ -78,7 +78,7 @@ def test_a_press_gives_a_place_to_the_landmarks_of_a_file_of_targets(editor, tmp
     path.write_text("nose,1,0,2\near,0,0,2\n")
     session.landmarks.read(path, targets=True)
     made.widgets.landmarks.chosen = "ear"
-    hand.types("shift+l")
+    hand.types("shift+k")
     place = hand.at(X[FRONT])
     hand.drag([place, (place[0], 300.0)])
     source, target = session.landmarks["ear"]
