@@ -246,7 +246,7 @@ class Path:
         return steps, None
 
     def _goals_to(self, goal: FloatArray) -> list[FloatArray]:
-        """Return the goals of the way to *goal*: those that wind a handle up, and *goal*."""
+        """Return *goal*, after those goals on the way without which a handle would turn back."""
         stops = list(self.way)
         while len(stops) > 1:
             turns = self._turns(stops[-2], stops[-1]) + self._turns(stops[-1], goal)

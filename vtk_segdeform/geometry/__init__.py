@@ -77,6 +77,7 @@ from .volume import (
     volume_along,
     volume_along_path,
     volume_gradient,
+    volume_gradients,
     volume_slopes_along,
 )
 
@@ -140,6 +141,7 @@ __all__ = [
     "volume_along",
     "volume_along_path",
     "volume_gradient",
+    "volume_gradients",
     "volume_slopes_along",
     "volume_summary",
     "voronoi_cells",

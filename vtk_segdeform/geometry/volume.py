@@ -99,16 +99,24 @@ def signed_volumes(vertices: FloatArray, parts: Parts) -> FloatArray:
 
 def volume_gradient(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """Return dV/dx, (n, 3): the entries of J_g in eq. (12), one row per vertex."""
-    gradient = np.zeros(vertices.shape)
-    if kernels := compiled_kernels(len(faces)):
-        kernels.volume_gradient(*inputs(vertices, faces), gradient)
-        return gradient
-    _, e, f = corner_and_edges(vertices, faces)
-    normals = cross_rows(e, f) / 6.0  # on a closed mesh, in sum b x c, c x a, a x b
-    for axis in range(3):
-        column = np.repeat(normals[:, axis], 3)
-        gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
-    return gradient
+    return volume_gradients(vertices, Parts.of([faces]))[0]
+
+
+def volume_gradients(vertices: FloatArray, parts: Parts) -> list[FloatArray]:
+    """Return dV/dx, (n, 3), for the volume of each of *parts*."""
+    found, kernels = [], compiled_kernels(len(parts.faces))
+    for faces in parts:
+        gradient = np.zeros(vertices.shape)
+        if kernels:
+            kernels.volume_gradient(*inputs(vertices, faces), gradient)
+        else:
+            _, e, f = corner_and_edges(vertices, faces)
+            normals = cross_rows(e, f) / 6.0  # on a closed mesh, in sum b x c, c x a, a x b
+            for axis in range(3):
+                column = np.repeat(normals[:, axis], 3)
+                gradient[:, axis] = np.bincount(faces.ravel(), column, minlength=len(vertices))
+        found.append(gradient)
+    return found
 
 
 def volume_along(vertices: FloatArray, direction: FloatArray, faces: IntArray) -> FloatArray:

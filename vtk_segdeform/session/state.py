@@ -230,7 +230,7 @@ class LandmarkSet(Frozen):
 
     names: tuple[str, ...] = ()
     source: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
-    """(k, 3) float; NaN in the rows of those that have only a target yet."""
+    """(k, 3) float; NaN for those that only have a target."""
     target: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
     """(k, 3) float; NaN in the rows of those without one."""
     uncertainty: FloatArray = field(default_factory=lambda: frozen(np.empty(0)))

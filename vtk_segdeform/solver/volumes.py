@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray
-from ..geometry import Parts, signed_volumes, volume_slopes_along
+from ..geometry import Parts, signed_volumes, volume_gradients, volume_slopes_along
 from ..subspace import Subspace
 from .volume_constraints import VolumeConstraint
 
@@ -83,7 +83,14 @@ def violations(constraints: Sequence[VolumeConstraint], x: FloatArray) -> FloatA
 
 def gradients(constraints: Sequence[VolumeConstraint], x: FloatArray) -> list[FloatArray]:
     """Return J_g of all *constraints*, (n, 3) each: the derivative of g by each vertex."""
-    return [each.gradient(x) for each in constraints]
+    every, found = together(constraints), [x] * len(constraints)
+    for group in every.groups:
+        points, extension = group.first.extended(x), group.first.extension
+        slopes = volume_gradients(points, group.parts) if group.cubic else []
+        slopes += [every[k].slope(points) for k in group.others]
+        for k, slope in zip([*group.cubic, *group.others], slopes, strict=True):
+            found[k] = slope if extension is None else extension.T @ slope
+    return found
 
 
 def values_along(
@@ -115,10 +122,7 @@ class Volumes:
 
     def rows(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """Return the rows of G = J_g W~, (m, 3) each, where the surface is *x* (n, 3)."""
-        if not self.constraints:
-            return ()
-        found = self.surface.adjoint(np.hstack(gradients(self.constraints, x)))
-        return tuple(np.ascontiguousarray(each) for each in np.hsplit(found, len(self.constraints)))
+        return tuple(self.surface.adjoint(slope) for slope in gradients(self.constraints, x))
 
     def among(self, which: Sequence[int]) -> Volumes:
         """Return those constraints only whose numbers are *which*, in ascending order."""

@@ -128,15 +128,15 @@ class Subspace(Frozen):
         return x
 
     def adjoint(self, y: FloatArray) -> FloatArray:
-        """Return W~^T y, (m, k), for *y* (n, k) on the mesh."""
+        """Return W~^T y, (m, 3), for *y* (n, 3) on the mesh."""
         p = np.empty((self.n_columns, y.shape[1]))
-        kernels = compiled_kernels() if self._is_compiled and y.shape[1] % 3 == 0 else None
+        kernels = compiled_kernels() if self._is_compiled and y.shape[1] == 3 else None
         y = writable(y) if kernels else y
         for rows, block, columns in self._pieces:
             if isinstance(block, InterpolatedBlock):
                 p[columns] = block.adjoint(y[rows])
             elif kernels:
-                kernels.add_adjoint(total := np.zeros((len(p.T), block.shape[1])), rows, block, y)
+                kernels.add_adjoint(total := np.zeros((3, block.shape[1])), rows, block, y)
                 p[columns] = total.T
             else:
                 p[columns] = _adjoint_product(rows, block, y)

@@ -105,26 +105,28 @@ def _add_row(x, row, b, p):
     "f8[:,:], const i8[:], const f8[:,:], f8[:,:]", "f8[:,:], const i8[:], const f4[:,:], f8[:,:]"
 )
 def add_adjoint(p, rows, block, y):
-    """Add (block.T @ y[rows]).T to *p* (k, m), for *y* (n, k), k a multiple of 3."""
+    """Add (block.T @ y[rows]).T to *p* (3, m), for *y* (n, 3)."""
     m = block.shape[1]
+    px, py, pz = p[0], p[1], p[2]
     four = len(rows) // 4 * 4
     for i in range(0, four, 4):
         b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
-        y0, y1 = y[np.uint64(rows[i])], y[np.uint64(rows[i + 1])]
-        y2, y3 = y[np.uint64(rows[i + 2])], y[np.uint64(rows[i + 3])]
-        for c in range(0, len(p), 3):
-            px, py, pz = p[c], p[c + 1], p[c + 2]
-            x0, x1, x2, x3 = y0[c], y1[c], y2[c], y3[c]
-            v0, v1, v2, v3 = y0[c + 1], y1[c + 1], y2[c + 1], y3[c + 1]
-            z0, z1, z2, z3 = y0[c + 2], y1[c + 2], y2[c + 2], y3[c + 2]
-            for j in range(m):
-                q, r, s, t = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
-                px[j] += q * x0 + r * x1 + s * x2 + t * x3
-                py[j] += q * v0 + r * v1 + s * v2 + t * v3
-                pz[j] += q * z0 + r * z1 + s * z2 + t * z3
+        r0, r1 = np.uint64(rows[i]), np.uint64(rows[i + 1])
+        r2, r3 = np.uint64(rows[i + 2]), np.uint64(rows[i + 3])
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        x1, y1, z1 = y[r1, 0], y[r1, 1], y[r1, 2]
+        x2, y2, z2 = y[r2, 0], y[r2, 1], y[r2, 2]
+        x3, y3, z3 = y[r3, 0], y[r3, 1], y[r3, 2]
+        for j in range(m):
+            s, t, u, v = float(b0[j]), float(b1[j]), float(b2[j]), float(b3[j])
+            px[j] += s * x0 + t * x1 + u * x2 + v * x3
+            py[j] += s * y0 + t * y1 + u * y2 + v * y3
+            pz[j] += s * z0 + t * z1 + u * z2 + v * z3
     for i in range(four, len(rows)):
-        b0, y0 = block[i], y[rows[i]]
-        for c in range(len(p)):
-            pc, yc = p[c], y0[c]
-            for j in range(m):
-                pc[j] += float(b0[j]) * yc
+        b0, r0 = block[i], rows[i]
+        x0, y0, z0 = y[r0, 0], y[r0, 1], y[r0, 2]
+        for j in range(m):
+            t = float(b0[j])
+            px[j] += t * x0
+            py[j] += t * y0
+            pz[j] += t * z0
