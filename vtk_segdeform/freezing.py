@@ -14,6 +14,8 @@ from typing import Any, Literal, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from .checks import shown
+
 _T = TypeVar("_T")
 _POINTS = 3  # columns of an array of points, which has few zeros
 
@@ -21,8 +23,13 @@ _POINTS = 3  # columns of an array of points, which has few zeros
 class Frozen:
     """A frozen dataclass that is copied and pickled by its fields alone.
 
-    Arrays among its fields, also in tuples and mappings, become read-only.
+    Arrays among its fields, also in tuples and mappings, become read-only.  Its text, for which the
+    dataclass must not have one, is short whatever is in them.
     """
+
+    def __repr__(self) -> str:
+        own = (f"{each.name}={shown(vars(self)[each.name])}" for each in fields(self))  # type: ignore[arg-type]
+        return f"{type(self).__name__}({', '.join(own)})"
 
     def __getstate__(self) -> dict[str, Any]:
         return {each.name: _plain(vars(self)[each.name]) for each in fields(self)}  # type: ignore[arg-type]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import BoolArray, FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray, largest_length
 from ..freezing import read_only
-from ..geometry import Carrying
+from ..geometry import Carrying, rigid_fit
 from ..mesh import SurfacePoint
 from ..solver import (
     Anchors,
@@ -232,6 +232,21 @@ class Constraints:
         places[pulled.targets] += x[own] + frame.size * pulled.levers - pulled.at(x)
         at = places, self.fixed_at
         return errors_at((self.handle, self.fixed), at, self.problem.mesh.diagonal, x)
+
+    def shape_errors(self, x: FloatArray) -> tuple[float, float]:
+        """Return `Solution.rigid_error` and `slide_error` of *x* (n, 3)."""
+        problem, rigid, slide = self.problem, 0.0, 0.0
+        x, stiff = problem.frame.about_origin(x), problem.inputs.stiffness
+        for ids in () if stiff is None else stiff.rigid:
+            turn, shift = rigid_fit(problem.rest_pose.vertices[ids], x[ids])
+            off = problem.rest_pose.vertices[ids] @ turn.T + shift - x[ids]
+            rigid = max(rigid, largest_length(off))
+        is_held = np.zeros(len(x), dtype=bool)
+        is_held[self.handle] = is_held[self.fixed] = True
+        for guide in self.guides:
+            off = x[guide.vertices] - guide.track(x[guide.vertices])[0]
+            slide = max(slide, largest_length(off[~is_held[guide.vertices]]))
+        return rigid / problem.mesh.diagonal, slide / problem.mesh.diagonal
 
     @cached_property
     def carrying(self) -> Carrying:

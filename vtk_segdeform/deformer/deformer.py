@@ -91,7 +91,8 @@ from .volume_goals import OTHER_MEASURE, Goals, checked_goals
 _FRAME = 1e-5  # tolerance of the first solve for targets of a drag, which go on
 _SIZES, _MOTIONS = 2.0, 1.5  # a pose moves at most so many mesh sizes and motions of targets
 _SEEN = 10_000  # vertices, of which this is checked
-_MET = 1e-3  # position error, in diagonals, below which a target is met
+_MET = 1e-3  # position error, in diagonals, below which a target or a place is met
+_BENT = 5e-3  # the same of a rigid part or a slide in the cages' own pose, which bends both a bit
 _SAME = 1e-9  # mesh sizes, within which cages are those of a solution
 _TRIAL_MOTION = 1e-4  # mesh sizes
 _SHARE_LEFT = 0.97  # of the progress bar, after each step
@@ -749,6 +750,7 @@ class Deformer:
             volume=partial(self._enclosed.total.relative, found.vertices),
             region_volumes=self._enclosed.changes_of_regions,
             held_volumes=self._constraints.held_volumes,
+            shape_errors=self._constraints.shape_errors,
             remaining=found.remaining / self.mesh.diagonal,
             unfinished=unfinished,
             unmoved=self._constraints.unmoved,
@@ -801,6 +803,7 @@ class Deformer:
             volume=partial(self._enclosed.total.relative, x),
             region_volumes=self._enclosed.changes_of_regions,
             held_volumes=self._constraints.held_volumes,
+            shape_errors=self._constraints.shape_errors,
             crossed=partial(new_crossings, rest=rest, faces=faces),
             folded=partial(turned_over, rest=rest, faces=faces),
             remaining=0.0 if status is Status.CONVERGED else np.inf,
@@ -863,6 +866,9 @@ class Deformer:
         is_off = self._constraints.has_goals and solution.volume_error > VOLUME_MET
         if is_off:
             return Status.VOLUME_MISSED
+        bent = max(solution.rigid_error, solution.slide_error)
+        if bent > (_MET if solution.is_finished else _BENT):
+            return Status.RIGID_MISSED
         has_contact = self._constraints.contact is not None
         return Status.CROSSED if has_contact and len(solution.crossings()) else None
 

@@ -24,8 +24,6 @@ from .symmetry import Mirror
 
 VOLUME_MET = 1e-9
 """Relative error of a volume, at most; a finish with a larger error is not used."""
-_FIRM = 1e9  # weight of a handle, fixed or sliding vertex in the place of a rigid part
-_ROUNDS, _PLACED = 100, 1e-13  # of placing a rigid part that slides; diagonals of its last motion
 _STAYS = 0.1  # weight of `locality` from which a finish moves nothing: at 1.15 times the reach
 
 
@@ -112,27 +110,17 @@ def _symmetric(path: Path, mirror: Mirror, pose: FloatArray) -> FloatArray:
 
 
 def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: FloatArray) -> None:
-    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices.
-
-    Those that slide are placed again and again, nearest to where they are on their tracks.
-    """
+    """Hold rigid parts where they are nearest to the *pose* (n, 3), and to their held vertices."""
     constraints, problem = path.constraints, path.constraints.problem
-    stiff, rest = problem.inputs.stiffness, problem.rest_pose
+    stiff, rest = problem.inputs.stiffness, problem.rest_pose.vertices
     slides = np.zeros(len(pose), dtype=bool)
     for guide in constraints.guides:
         slides[guide.vertices] = True
     slides[constraints.fixed] = slides[constraints.handle] = False
     for ids in () if stiff is None else stiff.rigid:
-        firm = held[ids]
-        near = np.where(firm[:, None], places[ids], pose[ids])
-        weights = np.where(firm, _FIRM, 1.0)
-        for _ in range(_ROUNDS):
-            before, moved = near, rigid_places(rest.vertices[ids], near, weights)
-            near = np.where(slides[ids][:, None], _on_tracks(constraints, ids, moved), near)
-            if not np.abs(near - before).max() > _PLACED * rest.diagonal:
-                break
-        own = held[ids] & ~slides[ids]
-        places[ids[~own]] = moved[~own]
+        firm, on_tracks = held[ids] & ~slides[ids], partial(_on_tracks, constraints, ids, slides)
+        moved = rigid_places(rest[ids], pose[ids], firm, places[ids], on_tracks)
+        places[ids[~firm]] = moved[~firm]
         held[ids] = True
 
 
@@ -168,13 +156,18 @@ def on_volumes(
     return np.asarray(moved_along(paths, steps_to_volume(constraints, paths)) + centre)
 
 
-def _on_tracks(constraints: Constraints, ids: IntArray, x: FloatArray) -> FloatArray:
-    """Return *x* (k, 3) of the vertices *ids*, with sliding vertices on their tracks."""
-    full = np.zeros((constraints.problem.mesh.n_vertices, 3))
-    full[ids] = x
+def _on_tracks(
+    constraints: Constraints, ids: IntArray, slides: BoolArray, x: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where *x* (k, 3) of the vertices *ids* is nearest to their tracks, and the normals.
+
+    They are projections (k, 3, 3), 0 for vertices that are not among *slides* (n,).
+    """
+    at, normals = np.zeros((len(slides), 3)), np.zeros((len(slides), 3, 3))
+    at[ids] = x
     for guide in constraints.guides:
-        full[guide.vertices] = guide.track(full[guide.vertices])[0]
-    return full[ids]
+        at[guide.vertices], normals[guide.vertices] = guide.track(at[guide.vertices])
+    return at[ids], np.where(slides[ids, None, None], normals[ids], 0.0)
 
 
 def _is_near_pulled_points(constraints: Constraints) -> BoolArray:

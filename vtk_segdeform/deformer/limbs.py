@@ -36,6 +36,7 @@ from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..energy import Energy, with_rotating_rows
+from ..freezing import Frozen
 from ..mesh import Mesh, SurfacePoint
 
 _WIDENS, _AHEAD = 1.75, 0.5  # growth of a front until 1.5 L where a limb ends; 1.5 on a disc
@@ -45,8 +46,8 @@ _SHORTEST = 1e-12  # the mesh has size 1
 _STIFFEST, _GRADED = 10.0, 3.0  # c(1) / e, and the exponent of h
 
 
-@dataclass(frozen=True, eq=False)
-class Limb:
+@dataclass(frozen=True, eq=False, repr=False)
+class Limb(Frozen):
     """A part of the surface that bends at a joint, on which a point is grabbed.
 
     Lengths are in the mesh's unit, along the surface at rest.

@@ -41,7 +41,7 @@ _LED, _GAPS = 1.0, 400  # and points at which it is kept, about
 _LOOSE = 1e-4  # weight of the anchors of a loose component, in traces of the energy of its region
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Problem(Frozen):
     """A mesh and its energy in the subspace of its cages; made by `Problem.of`."""
 

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray, as_ids, plain
 from ..checks import require, shown
 from ..errors import ConstraintError
+from ..freezing import Frozen
 from ..geometry import VertexNormals
 from ..mesh import Mesh, nearest_on_triangles, ragged_arange
 from ..solver import Track
@@ -27,8 +28,8 @@ _MOST_POINTS = 500  # vertices of one slide in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for the nearest point of a surface
 
 
-@dataclass(frozen=True, eq=False)
-class Slide:
+@dataclass(frozen=True, eq=False, repr=False)
+class Slide(Frozen):
     """Vertices that slide.
 
     Parameters

@@ -11,12 +11,15 @@ nearly (`subspace.affine_parts`); a finish places it exactly, where it is neares
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
-from ..arrays import FloatArray, IntArray, plain
+from ..arrays import BoolArray, FloatArray, IntArray, largest_length, plain
 from ..checks import shown
 from ..errors import ConstraintError
 from ..geometry import rigid_fit
@@ -25,6 +28,9 @@ from ..solver import connected_sets
 from .symmetry import Mirror
 
 _LEAST, _MOST = 1e-2, 1e2  # of s, in medians
+# Of placing a rigid part, in its sizes and radians: rounds, the longest step, and one that is
+# rounding; and the length of a motion of unit length that counts as none.
+_ROUNDS, _LONGEST, _SHORTEST, _RANK = 50, 0.3, 1e-14, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +75,61 @@ class Stiffness:
         return cls(values, tuple(rigid[own] for own in connected_sets(mesh, rigid)))
 
 
-def rigid_places(rest: FloatArray, pose: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return *rest* (k, 3) moved as one body to where it is nearest to *pose* (k, 3).
+def rigid_places(
+    rest: FloatArray,
+    pose: FloatArray,
+    held: BoolArray,
+    places: FloatArray,
+    on_tracks: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
+) -> FloatArray:
+    """Return *rest* (k, 3) moved as one body, with the *held* points (k,) at their *places* (k, 3).
 
-    In the mean of squares with *weights* (k,).
+    As far as that leaves it free, points that slide are on their tracks, and as far as this leaves
+    it free, the others are where they are in the *pose* (k, 3); each by least squares, and solved
+    by Newton's method.  *on_tracks* returns the nearest points (k, 3) of the tracks of (k, 3), and
+    the projections on their normals (k, 3, 3), which are 0 for points that do not slide.
     """
-    turn, shift = rigid_fit(rest, pose, weights)
-    return rest @ turn.T + shift
+    turn, shift = rigid_fit(rest, np.where(held[:, None], places, pose))
+    x, size = rest @ turn.T + shift, largest_length(rest - rest.mean(axis=0)) or 1.0
+    for _ in range(_ROUNDS):
+        centre = x.mean(axis=0)
+        motions = _of_one_body((x - centre) / size)
+        on_track, normals = on_tracks(x)
+        step = _in_turn(
+            (motions[held], (places - x)[held] / size),
+            (normals @ motions, np.einsum("kab,kb->ka", normals, on_track - x) / size),
+            (motions[~held], (pose - x)[~held] / size),
+        )
+        step *= min(1.0, _LONGEST / max(float(np.linalg.norm(step)), _SHORTEST))
+        turn = Rotation.from_rotvec(step[:3]).as_matrix()
+        x = (x - centre) @ turn.T + centre + size * step[3:]
+        if np.linalg.norm(step) <= _SHORTEST:
+            break
+    return x
+
+
+def _of_one_body(arms: FloatArray) -> FloatArray:
+    """Return the motions (k, 3, 6) of *arms* (k, 3) by rotations about three axes, and by shifts.
+
+    Row a of ``motions[:, :, c]`` is e_c x arm.
+    """
+    turns = np.cross(np.eye(3)[:, None], arms).transpose(1, 2, 0)
+    return np.concatenate([turns, np.broadcast_to(np.eye(3), turns.shape)], axis=2)
+
+
+def _in_turn(*levels: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Return the z (6,) with A z = b nearly, for each of *levels* as far as those before allow.
+
+    A is (k, 3, 6) and b (k, 3).
+    """
+    z, free = np.zeros(6), np.eye(6)
+    for a, b in levels:
+        rows, off = a.reshape(-1, 6), b.ravel()
+        padding = max(0, 6 - len(rows))
+        across = np.pad(rows @ free, ((0, padding), (0, 0)))
+        u, s, vt = np.linalg.svd(across, full_matrices=False)
+        own = s > _RANK * math.sqrt(1 + len(rows))
+        along = u.T[own] @ np.pad(off - rows @ z, (0, padding))
+        z = z + free @ (vt[own].T @ (along / s[own]))
+        free = free @ vt[~own].T
+    return z

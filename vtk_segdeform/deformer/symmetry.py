@@ -28,6 +28,7 @@ from scipy.spatial import cKDTree
 from ..arrays import FloatArray, IntArray, plain
 from ..checks import shown
 from ..errors import ArgumentError, ConstraintError
+from ..freezing import Frozen
 from ..mesh import Mesh, SurfacePoint, nearest_on_triangles, ragged_arange
 from ..solver import MirrorTerm
 from ..subspace import Subspace
@@ -46,8 +47,8 @@ _TERM_POINTS = 400  # vertices in the objective
 _NEIGHBOURS = 3  # vertices whose triangles are searched for a mate
 
 
-@dataclass(frozen=True, eq=False)
-class Mirror:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mirror(Frozen):
     """A plane of symmetry of a mesh, with the mates of its vertices; made by `Mirror.of`."""
 
     point: FloatArray  # (3,)

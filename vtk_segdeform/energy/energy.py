@@ -60,7 +60,7 @@ from .operators import reduced_operators, surface_operators
 _CAGE_STIFFNESS = 3e-4  # e by traces, as a share of the shape energy: the distortion rises by 1 %
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Energy(Frozen):
     """E(p) in the subspace; made by `shape_energy`."""
 

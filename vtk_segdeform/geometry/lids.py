@@ -47,6 +47,7 @@ from scipy import sparse
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..checks import shown
 from ..errors import ArgumentError
+from ..freezing import Frozen
 from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
 from .chambers import NO_CHAMBERS, Chambers, chambers_of
 from .volume import corner_and_edges, signed_volume
@@ -59,8 +60,8 @@ _NO_VOLUME = 1e-11  # of the area to the power 3/2
 _known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True, eq=False)
-class Lids:
+@dataclass(frozen=True, eq=False, repr=False)
+class Lids(Frozen):
     """The lids of a mesh with n vertices and k border loops.
 
     Attributes

@@ -36,7 +36,7 @@ from ..mesh import cross_rows
 _FACES_PER_SUM = 4096  # partial sums are fixed, so that results do not depend on threads
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Parts(Frozen):
     """Faces of c parts of a surface, part after part; sums over them are made together.
 

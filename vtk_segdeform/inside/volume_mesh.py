@@ -38,7 +38,7 @@ _FLAT_KINDS = range(10)  # VTK's types of vertices, lines and surfaces
 _LINEAR = "use linear cells, such as of grid.linear_copy()"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class VolumePose(Frozen):
     """Where the points of a volume mesh are, and how good its cells are there."""
 

@@ -22,7 +22,7 @@ from ..progress import Progress, part, tell
 from . import repair_steps as steps
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Repair(Frozen):
     """A repaired mesh and the steps that led to it; *report* lists what remains.
 

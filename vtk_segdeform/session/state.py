@@ -155,7 +155,7 @@ def _pairs(volumes: object) -> tuple[tuple[str, str | float], ...]:
     return tuple(goals.items())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Finished(Frozen):
     """The mesh in a pose that was finished, or dragged on from one that was; see `finishing`."""
 
@@ -178,7 +178,7 @@ class Finished(Frozen):
         return shift
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Pose(Frozen):
     """A deformation of the cages, and the targets it was solved for; read-only arrays."""
 
@@ -204,7 +204,7 @@ class Pose(Frozen):
         return replace(self, cage_vertices=cages, stiffness=stiffness)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Locality(Frozen):
     """The part of the surface that the last pull deforms; see `Deformer.local`."""
 
@@ -224,7 +224,7 @@ class Locality(Frozen):
     """0 to 1: where this limb bends."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LandmarkSet(Frozen):
     """k named landmarks, of the mesh at rest, and where each is to be; read-only arrays."""
 

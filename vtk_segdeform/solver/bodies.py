@@ -25,7 +25,7 @@ _LEAST_BODY = 1e-4  # relative to the largest: too small for one of its own
 _PIECE = 1 << 15  # faces processed together
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Bodies(Frozen):
     """The b bodies of a mesh, and the constraints that preserve the volume of each.
 

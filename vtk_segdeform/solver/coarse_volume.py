@@ -103,7 +103,7 @@ class CoarseVolume:
         return Volumes(self.surface, preserved, of_few if of_few.curved else None)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _VolumeHessian(Frozen):
     """Second derivatives of volumes by the cages, from few points; called as `Volumes.hessian`."""
 

@@ -64,7 +64,7 @@ _STIFFNESS = 1.5e5  # k, times the scale of the shape energy
 _TINY = 1e-30
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactSurface(Frozen):
     """Samples of a surface at rest, size about 1, and which of them are in contact with which.
 

@@ -22,7 +22,7 @@ from ..kernels import compiled_kernels, inputs
 from .volume_constraints import VolumeConstraint
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AreaConstraint(VolumeConstraint):
     """The area of *faces* is equal to *target*."""
 
@@ -44,7 +44,7 @@ class AreaConstraint(VolumeConstraint):
         return area_slopes_along(paths, self.faces)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CentroidConstraint(VolumeConstraint):
     """A coordinate of the centroid of the body inside *faces* is equal to *target*.
 

@@ -78,7 +78,7 @@ class TargetTerm:
         return value + more, slope + steeper
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PositionTerm(Frozen):
     """The term for k vertices in sets.
 

@@ -49,6 +49,10 @@ class Status(enum.Enum):
         "a volume cannot be reached: change it less, set another one free, or leave more room "
         "between handle and fixed vertices"
     )
+    RIGID_MISSED = (
+        "a rigid part is bent, or vertices leave what they slide along: move less, or let fewer "
+        "vertices of that part be fixed, in handles or rigid"
+    )
     CROSSED = (
         "parts of the surface cross although contact is avoided: go there in smaller moves, or "
         "leave more room between them"
@@ -94,6 +98,10 @@ class Solution(Described):
     """Computes `crossings`."""
     folded: Callable[[FloatArray], IntArray] = field(repr=False)
     """Computes `folds`."""
+    shape_errors: Callable[[FloatArray], tuple[float, float]] = field(
+        default_factory=lambda: lambda _: (0.0, 0.0), repr=False
+    )
+    """Computes `rigid_error` and `slide_error`."""
     remaining: float = 0.0
     """Estimate of the largest distance of a vertex to its place in the converged pose, in diagonals
     of the mesh: the length of Newton's step at this pose.  Infinite where it is not computed, in a
@@ -128,6 +136,7 @@ class Solution(Described):
     def __getstate__(self) -> dict[str, Any]:
         measured = {
             "errors": partial(_known, self._errors),
+            "shape_errors": partial(_known, self._shape_errors),
             "volume": partial(_known, self.volume_change),
             "region_volumes": partial(_known, self.region_volume_change),
             "held_volumes": partial(_known, self._held_volumes),
@@ -149,13 +158,35 @@ class Solution(Described):
 
     @property
     def handle_error(self) -> float:
-        """Largest distance of a handle vertex from its target, in diagonals of the mesh."""
+        """Largest distance of a handle vertex from its target, in diagonals of the mesh.
+
+        With a plane of symmetry the targets are those of symmetric motions: of a handle across the
+        plane, or two that are each other's image, the means of the given targets and their images.
+        """
         return self._errors[0]
 
     @property
     def fixed_error(self) -> float:
         """Largest distance of a fixed vertex from its place, in diagonals of the mesh."""
         return self._errors[1]
+
+    @cached_property
+    def _shape_errors(self) -> tuple[float, float]:
+        return self.shape_errors(self.vertices)
+
+    @property
+    def rigid_error(self) -> float:
+        """Largest distance of a vertex of a rigid part from where the part is as one body.
+
+        In diagonals of the mesh.  Of the finished pose about 1e-16, unless the handle and fixed
+        vertices of the part move against each other; of the cages' own pose up to some 1e-3.
+        """
+        return self._shape_errors[0]
+
+    @property
+    def slide_error(self) -> float:
+        """Largest distance of a sliding vertex from what it slides along, in diagonals."""
+        return self._shape_errors[1]
 
     @cached_property
     def _held_volumes(self) -> HeldVolumes:

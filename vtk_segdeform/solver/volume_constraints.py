@@ -23,6 +23,7 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ..arrays import BoolArray, FloatArray, IntArray
+from ..freezing import Frozen
 from ..geometry import (
     Lids,
     Parts,
@@ -36,8 +37,8 @@ from ..geometry import (
 from ..mesh import Mesh, edge_keys
 
 
-@dataclass(frozen=True, eq=False)
-class VolumeConstraint:
+@dataclass(frozen=True, eq=False, repr=False)
+class VolumeConstraint(Frozen):
     """The volume enclosed by *faces* over the points ``extension @ x`` is equal to *target*.
 
     These points are *x* and the centres of lids and fans.  With a *bound* of 1 it is at least

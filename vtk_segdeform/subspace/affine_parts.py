@@ -41,7 +41,7 @@ from .subspace import Subspace, row_pieces
 _FLAT = 1e-9  # of the largest second moment of a part; an axis with less has no gradient
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AffineParts(Frozen):
     """q parts of a surface of n vertices with m cage vertices; made by `AffineParts.of`."""
 

@@ -41,7 +41,7 @@ from ..progress import Progress, part
 from .subspace import Subspace
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Passengers(Frozen):
     """k points bound to the cages; made by `bind_passengers` or `Deformer.passengers`."""
 

@@ -46,7 +46,7 @@ _CACHED_NUMBERS = 1 << 17  # of a block, that are multiplied together: a megabyt
 _DENSE_NUMBERS = 1 << 22  # of a dense piece: 32 megabytes
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Subspace(Frozen):
     """W~ as blocks: rows[r] (n_r,) mesh vertices, blocks[r] (n_r, m_r), columns in cage order.
 
