@@ -87,6 +87,7 @@ def test_fixed_and_handle_vertices_take_precedence():
     assert off_plate(pose.vertices) == pytest.approx(0.1 / BLOCK.diagonal)
     off = (pose.vertices - BLOCK.vertices)[BASE[4:]] @ NORMAL
     assert np.abs(off).max() < FLAT
+    assert pose.slide_error < FLAT  # of those that may slide
 
 
 def test_a_line_is_kept():
@@ -139,6 +140,30 @@ def test_a_rigid_part_that_slides_is_rigid_and_flat():
     assert off_plate(pose.vertices) < FLAT
     assert along_plate(pose.vertices) > 0.02
     assert abs(pose.volume_change) < 1e-12
+
+
+def test_a_rigid_part_that_is_held_and_slides_along_a_surface_is_rigid_and_on_it():
+    ball = Mesh(*icosphere(3))
+    x = ball.vertices
+    rigid, fixed = x[:, 2] > 0.3, (x[:, 2] > 0.3) & (x[:, 0] > 0.7)
+    slides = (x[:, 2] > 0.3) & (x[:, 0] < -0.4)
+    handle = np.flatnonzero(x[:, 2] < -0.9)
+    pose = sd.deform(
+        ball, fixed, handle, x[handle] + [0.2, 0.1, -0.2],
+        stiffness=np.where(rigid, np.inf, 1.0), slides=[sd.Slide(slides, "surface")],
+    )  # fmt: skip
+    assert str(pose.status) == "converged"
+    assert pose.rigid_error < 1e-12  # where projections on the surface left 1e-6 and more
+    assert pose.slide_error < FLAT
+    assert distance_to_surface(pose.vertices[slides], x, ball.faces).max() < FLAT
+
+
+def test_what_leaves_its_plane_is_told():
+    deformer = block().hold(handle=TOP, slides=[sd.Slide(BASE)])
+    pose = deformer.solve(BLOCK.vertices[TOP] + [0.3, 0.2, 0.1])
+    assert pose.slide_error == pytest.approx(off_plate(pose.vertices), rel=1e-6)
+    assert 0.0 < pose.slide_error < 1e-3
+    assert deformer.finish(pose).slide_error < FLAT
 
 
 def test_slides_of_one_side_of_a_symmetric_body_are_mirrored():

@@ -14,11 +14,13 @@ from solids import icosphere, rotation
 import vtk_segdeform as sd
 from vtk_segdeform import models
 from vtk_segdeform.deformer import Stiffness
+from vtk_segdeform.deformer.stiffness import rigid_places
 from vtk_segdeform.energy import grown_gradients, shape_energy
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.finish import CellEnergy
 from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.mesh import Mesh, mesh_of
+from vtk_segdeform.solver import Status
 
 BAR = models.bar((0.3, 0.16, 2.4), divisions=(5, 4, 48))
 X = BAR.vertices
@@ -193,6 +195,56 @@ def test_rigid_parts_are_congruent_after_the_finish(name, mesh, fixed, handle, r
     assert pose.fixed_error < 1e-12
     soft = deformer.stiffened(None).hold(fixed=fixed, handle=handle)
     assert max(residuals(mesh, stiffness, soft.finish(soft.solve(targets)).vertices)) > 1e-3
+
+
+def test_a_rigid_part_that_its_handle_and_fixed_vertices_tear_is_told():
+    rigid = np.where(np.abs(X[:, 0]) < 0.1, np.inf, 1.0)  # from the fixed end to the handle
+    deformer = bar_deformer().stiffened(rigid).hold(fixed=LOWER, handle=UPPER)
+    pose = deformer.solve(X[UPPER] @ rotation([1, 0, 0], 0.5).T)
+    finished = deformer.finish(pose)
+    assert finished.handle_error == finished.fixed_error == 0.0
+    assert finished.status is Status.RIGID_MISSED
+    for each in (pose, finished):
+        assert each.rigid_error == pytest.approx(max(residuals(BAR, rigid, each.vertices)), rel=0.5)
+    half = bar_deformer().stiffened(np.where(HEIGHT > LENGTH / 2, np.inf, 1.0))
+    half = half.hold(fixed=LOWER, handle=UPPER)
+    whole = half.finish(half.solve(X[UPPER] + [0.2, 0.0, 0.0]))
+    assert whole.status is Status.CONVERGED
+    assert whole.rigid_error < 1e-12
+
+
+def test_a_rigid_part_is_placed_by_what_holds_it_then_by_tracks_then_by_the_pose():
+    rng = np.random.default_rng(5)
+    rest, turn = rng.normal(size=(40, 3)), rotation([0.4, 0.5, -0.8], 0.9)
+    pose = rest @ turn.T + [1.0, 2.0, 3.0] + 0.01 * rng.normal(size=rest.shape)
+    slides = np.arange(40) >= 38
+
+    def on_plane(x, height=3.2):
+        normals = np.zeros((40, 3, 3))
+        normals[slides, 2, 2] = 1.0
+        return np.where(slides[:, None], x * [1.0, 1.0, 0.0] + [0.0, 0.0, height], x), normals
+
+    def free(x):
+        return x, np.zeros((40, 3, 3))
+
+    held = np.zeros(40, dtype=bool)
+    r, t = rigid_fit(rest, pose)
+    assert_allclose(rigid_places(rest, pose, held, pose, free), rest @ r.T + t, atol=1e-12)
+    for count, tracks in ((0, on_plane), (1, on_plane), (2, free), (3, free)):
+        held[:] = np.arange(40) < count
+        x = rigid_places(rest, pose, held, rest @ turn.T + [1.5, 2.0, 3.0], tracks)
+        r, t = rigid_fit(rest, x)
+        assert_allclose(rest @ r.T + t, x, atol=1e-12)
+        assert_allclose(x[held], (rest @ turn.T + [1.5, 2.0, 3.0])[held], atol=1e-12)
+        if tracks is on_plane:
+            assert_allclose(x[slides, 2], 3.2, atol=1e-12)
+        if count == 2:  # it may still turn about their line
+            for angle in (-1e-3, 1e-3):
+                other = (x - x[0]) @ rotation(x[1] - x[0], angle).T + x[0]
+                assert np.linalg.norm(other - pose) > np.linalg.norm(x - pose)
+    held[:] = np.arange(40) < 1  # a plane that is out of reach leaves it where it is
+    x = rigid_places(rest, pose, held, rest, lambda x: on_plane(x, 9.0))
+    assert_allclose(x[0], rest[0], atol=1e-12)
 
 
 def drag(**options) -> tuple[sd.Deformer, np.ndarray, list[sd.Solution]]:

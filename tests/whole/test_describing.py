@@ -58,6 +58,17 @@ def test_an_open_mesh_has_borders_and_a_session_without_anything_has_a_line():
     assert "next: create regions" in repr(sd.Session(mesh))
 
 
+def test_objects_with_large_arrays_have_short_texts():
+    deformer = SESSION.deformer
+    for each in (
+        sd.Slide(np.arange(1000)), SESSION.state.pose, deformer.subspace, deformer.bodies,
+        deformer.passengers(SCENE.mesh.vertices), SESSION.lids,
+    ):  # fmt: skip
+        assert repr(each).startswith(f"{type(each).__name__}(")
+        assert len(repr(each)) < 400
+    assert "an array of int64 and shape" in repr(SESSION.lids)
+
+
 def test_text_in_a_table_is_escaped():
     class Odd(Described):
         def facts(self):

@@ -28,9 +28,10 @@ from ..solver import connected_sets
 from .symmetry import Mirror
 
 _LEAST, _MOST = 1e-2, 1e2  # of s, in medians
-# Of placing a rigid part, in its sizes and radians: rounds, the longest step, and one that is
-# rounding; and the length of a motion of unit length that counts as none.
-_ROUNDS, _LONGEST, _SHORTEST, _RANK = 50, 0.3, 1e-14, 1e-6
+# Of placing a rigid part: rounds; the longest step, in its sizes and radians, and by how much it is
+# shortened in each round; a step that is rounding; the change of a place by a motion of length 1
+# that counts as none; and the weight of held points in the first fit.
+_ROUNDS, _LONGEST, _SHORTENED, _SHORTEST, _RANK, _FIRM = 100, 0.3, 0.8, 1e-14, 1e-6, 1e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,12 +87,14 @@ def rigid_places(
 
     As far as that leaves it free, points that slide are on their tracks, and as far as this leaves
     it free, the others are where they are in the *pose* (k, 3); each by least squares, and solved
-    by Newton's method.  *on_tracks* returns the nearest points (k, 3) of the tracks of (k, 3), and
-    the projections on their normals (k, 3, 3), which are 0 for points that do not slide.
+    by Newton's method, in ever shorter steps where they contradict each other.  *on_tracks* returns
+    the nearest points (k, 3) of the tracks of (k, 3), and the projections on their normals
+    (k, 3, 3), which are 0 for points that do not slide.
     """
-    turn, shift = rigid_fit(rest, np.where(held[:, None], places, pose))
+    near, firmly = np.where(held[:, None], places, pose), np.where(held, _FIRM, 1.0)
+    turn, shift = rigid_fit(rest, near, firmly)
     x, size = rest @ turn.T + shift, largest_length(rest - rest.mean(axis=0)) or 1.0
-    for _ in range(_ROUNDS):
+    for turns in range(_ROUNDS):
         centre = x.mean(axis=0)
         motions = _of_one_body((x - centre) / size)
         on_track, normals = on_tracks(x)
@@ -99,8 +102,8 @@ def rigid_places(
             (motions[held], (places - x)[held] / size),
             (normals @ motions, np.einsum("kab,kb->ka", normals, on_track - x) / size),
             (motions[~held], (pose - x)[~held] / size),
+            longest=_LONGEST * _SHORTENED**turns,
         )
-        step *= min(1.0, _LONGEST / max(float(np.linalg.norm(step)), _SHORTEST))
         turn = Rotation.from_rotvec(step[:3]).as_matrix()
         x = (x - centre) @ turn.T + centre + size * step[3:]
         if np.linalg.norm(step) <= _SHORTEST:
@@ -117,10 +120,11 @@ def _of_one_body(arms: FloatArray) -> FloatArray:
     return np.concatenate([turns, np.broadcast_to(np.eye(3), turns.shape)], axis=2)
 
 
-def _in_turn(*levels: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _in_turn(*levels: tuple[FloatArray, FloatArray], longest: float) -> FloatArray:
     """Return the z (6,) with A z = b nearly, for each of *levels* as far as those before allow.
 
-    A is (k, 3, 6) and b (k, 3).
+    A is (k, 3, 6) and b (k, 3).  What a level adds to the first one has at most the length
+    *longest*.
     """
     z, free = np.zeros(6), np.eye(6)
     for a, b in levels:
@@ -130,6 +134,8 @@ def _in_turn(*levels: tuple[FloatArray, FloatArray]) -> FloatArray:
         u, s, vt = np.linalg.svd(across, full_matrices=False)
         own = s > _RANK * math.sqrt(1 + len(rows))
         along = u.T[own] @ np.pad(off - rows @ z, (0, padding))
-        z = z + free @ (vt[own].T @ (along / s[own]))
+        added = free @ (vt[own].T @ (along / s[own]))
+        limit = math.inf if a is levels[0][0] else longest
+        z = z + added * min(1.0, limit / max(float(np.linalg.norm(added)), _SHORTEST))
         free = free @ vt[~own].T
     return z
