@@ -229,10 +229,12 @@ def test_a_rigid_part_is_placed_by_what_holds_it_then_by_tracks_then_by_the_pose
 
     held = np.zeros(40, dtype=bool)
     r, t = rigid_fit(rest, pose)
-    assert_allclose(rigid_places(rest, pose, held, pose, free), rest @ r.T + t, atol=1e-12)
+    assert_allclose(
+        rigid_places(rest, pose, held, pose, on_tracks=free), rest @ r.T + t, atol=1e-12
+    )
     for count, tracks in ((0, on_plane), (1, on_plane), (2, free), (3, free)):
         held[:] = np.arange(40) < count
-        x = rigid_places(rest, pose, held, rest @ turn.T + [1.5, 2.0, 3.0], tracks)
+        x = rigid_places(rest, pose, held, rest @ turn.T + [1.5, 2.0, 3.0], on_tracks=tracks)
         r, t = rigid_fit(rest, x)
         assert_allclose(rest @ r.T + t, x, atol=1e-12)
         assert_allclose(x[held], (rest @ turn.T + [1.5, 2.0, 3.0])[held], atol=1e-12)
@@ -243,7 +245,7 @@ def test_a_rigid_part_is_placed_by_what_holds_it_then_by_tracks_then_by_the_pose
                 other = (x - x[0]) @ rotation(x[1] - x[0], angle).T + x[0]
                 assert np.linalg.norm(other - pose) > np.linalg.norm(x - pose)
     held[:] = np.arange(40) < 1  # a plane that is out of reach leaves it where it is
-    x = rigid_places(rest, pose, held, rest, lambda x: on_plane(x, 9.0))
+    x = rigid_places(rest, pose, held, rest, on_tracks=lambda x: on_plane(x, 9.0))
     assert_allclose(x[0], rest[0], atol=1e-12)
 
 

@@ -119,7 +119,7 @@ def _place_rigid_parts(path: Path, places: FloatArray, held: BoolArray, pose: Fl
     slides[constraints.fixed] = slides[constraints.handle] = False
     for ids in () if stiff is None else stiff.rigid:
         firm, on_tracks = held[ids] & ~slides[ids], partial(_on_tracks, constraints, ids, slides)
-        moved = rigid_places(rest[ids], pose[ids], firm, places[ids], on_tracks)
+        moved = rigid_places(rest[ids], pose[ids], firm, places[ids], on_tracks=on_tracks)
         places[ids[~firm]] = moved[~firm]
         held[ids] = True
 

@@ -81,6 +81,7 @@ def rigid_places(
     pose: FloatArray,
     held: BoolArray,
     places: FloatArray,
+    *,
     on_tracks: Callable[[FloatArray], tuple[FloatArray, FloatArray]],
 ) -> FloatArray:
     """Return *rest* (k, 3) moved as one body, with the *held* points (k,) at their *places* (k, 3).
