@@ -618,7 +618,8 @@ class Deformer:
         if self._is_plausible(solution.vertices, goal, before.p):
             return solution
         self._path = before
-        return self._far(goal, solution)
+        before.missed = goal
+        return self._far(solution)
 
     @one_blas_thread()
     def jvp(
@@ -746,7 +747,7 @@ class Deformer:
             vertices=solution.vertices if is_start else frame.in_scene(found.vertices),
             steps=solution.steps + found.steps,
             merits=found.merits,
-            errors=partial(self._constraints.errors, self._path.targets),
+            errors=partial(self._constraints.errors, self._path.asked),
             volume=partial(self._enclosed.total.relative, found.vertices),
             region_volumes=self._enclosed.changes_of_regions,
             held_volumes=self._constraints.held_volumes,
@@ -836,7 +837,7 @@ class Deformer:
         at = problem.frame.in_scene(problem.map(before))
         return largest_length(x[some] - rest) <= largest_length(at[some] - rest)
 
-    def _far(self, goal: FloatArray, solution: Solution) -> Solution:
+    def _far(self, solution: Solution) -> Solution:
         """Return the current pose instead of *solution*, which is far from every reasonable one."""
         x = self._problem.frame.in_scene(self._problem.map(self._path.p))
         return replace(
@@ -844,7 +845,7 @@ class Deformer:
             vertices=x,
             cage_vertices=self._problem.cages_in_scene(self._path.p),
             status=Status.MISSED,
-            errors=partial(self._constraints.errors, goal),
+            errors=partial(self._constraints.errors, self._path.asked),
             volume=partial(self._enclosed.total.relative, x),
             remaining=np.inf,
         )

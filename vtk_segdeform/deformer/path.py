@@ -60,7 +60,8 @@ class Path:
     solver: GaussNewton  # with its factor, its acceleration and the way of the last solves
     p: FloatArray  # (m, 3), the cages of the pose, in solver coordinates
     end: FloatArray  # (m, 3), where the solver ended: p, before the exact volumes
-    targets: FloatArray  # (k, 3), of the last solve
+    targets: FloatArray  # (k, 3), of the last solve that came to a pose
+    missed: FloatArray | None = None  # (k, 3), of one after it that came to none
     active: tuple[int, ...] = ()  # `active_volumes`, of a mesh that is not scaled
     is_on_volumes: bool = True
     # The targets (k, 3) where the last solve stopped on its way, and the goals to come; else empty.
@@ -88,6 +89,11 @@ class Path:
         return self.constraints.problem
 
     @property
+    def asked(self) -> FloatArray:
+        """The targets (k, 3) of the last solve."""
+        return self.targets if self.missed is None else self.missed
+
+    @property
     def is_solved(self) -> bool:
         """Whether the handles are in their places, unlike those of a grown shape at rest."""
         return not (self.constraints.has_goals and self.p is self.constraints.rest_cages)
@@ -106,7 +112,7 @@ class Path:
         to the exact ones.  If by more than `_SCALED`, they are taken again with the coarse volumes
         of the scaled mesh.
         """
-        steps = self.change_volumes(options)
+        self.missed, steps = None, self.change_volumes(options)
         on_the_way, stopped = self._follow_waypoints(goal, options, is_live=is_live)
         steps += on_the_way
         self.targets = goal
