@@ -17,6 +17,7 @@ from vtk_segdeform.errors import ArgumentError, MeshError
 from vtk_segdeform.inside.volume_files import write_volume_file
 
 meshio = pytest.importorskip("meshio")
+pytestmark = pytest.mark.usefixtures("bound_once")
 
 
 def with_patches():

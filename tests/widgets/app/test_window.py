@@ -39,7 +39,7 @@ from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 
 BALL = models.sphere(300)
 PREPARED = preparing.lacking
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 BLANK = pytest.mark.usefixtures("unpainted")
 
 

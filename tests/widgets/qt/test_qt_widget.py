@@ -37,7 +37,7 @@ from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, close_view, deform_dock
 
 MESH = models.cactus(500)
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 
 
 @pytest.fixture
