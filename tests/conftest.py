@@ -33,6 +33,7 @@ import pytest  # noqa: E402 - its plugins read the variables above
 _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 _WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 _PROGRAMS = {"app", "qt", "web"}
+_parts: dict[bytes, Any] = {}  # of coarse surfaces
 
 
 class _Backwards(pytest.Dir):
@@ -130,6 +131,31 @@ def fitted_once() -> Iterator[Any]:
         yield fitting
 
 
+@pytest.fixture(scope="module", autouse=True)
+def segmented_once() -> Iterator[None]:
+    """Find the parts of equal coarse surfaces once per process, unless with reports of progress."""
+    from vtk_segdeform.regions import segmentation
+
+    find = segmentation._parts
+
+    def found(surface: Any, n_regions: int | None, progress: Any) -> Any:
+        if progress is not None:
+            return find(surface, n_regions, progress)
+        inputs = hashlib.blake2b(repr(n_regions).encode())
+        tables = (surface.graph, surface.contact)
+        arrays = [array for t in tables for array in (t.data, t.indices, t.indptr)]
+        for array in (surface.vertices, surface.faces, surface.areas, *arrays):
+            inputs.update(np.ascontiguousarray(array))
+        key = inputs.digest()
+        if key not in _parts:
+            _parts[key] = find(surface, n_regions, None)
+        return _parts[key].copy()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(segmentation, "_parts", found)
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _windows_again() -> Iterator[None]:
     hands = sys.modules.get("hands")  # which imports VTK
@@ -139,24 +165,25 @@ def _windows_again() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def _bodies_once() -> Iterator[None]:
-    """Create each cactus and dinosaur once per process; meshes are immutable."""
+    """Create each body of limbs once per process; meshes are immutable."""
     from vtk_segdeform import models
 
     def once(make: Any) -> Any:
-        known: dict[tuple[int, ...], Any] = {}
+        known: dict[Any, Any] = {}
 
         @functools.wraps(make)
         def body(*args: Any, **named: Any) -> Any:
-            if named or not all(type(value) is int for value in args):
+            if not all(type(value) is int for value in (*args, *named.values())):
                 return make(*args, **named)
-            if args not in known:
-                known[args] = make(*args)
-            return known[args]
+            key = args, tuple(sorted(named.items()))
+            if key not in known:
+                known[key] = make(*args, **named)
+            return known[key]
 
         return body
 
     with pytest.MonkeyPatch.context() as patch:
-        for name in ("cactus", "dinosaur"):
+        for name in ("cactus", "dinosaur", "random_limbs"):
             patch.setattr(models, name, once(getattr(models, name)))
         yield
 

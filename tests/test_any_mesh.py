@@ -20,6 +20,7 @@ VERTICES, FACES = icosphere(2)
 TOP, BOTTOM = int(VERTICES[:, 2].argmax()), int(VERTICES[:, 2].argmin())
 HEIGHT = VERTICES[:, 2].copy()
 TO = VERTICES[TOP] + [0.1, 0.0, 0.4]
+pytestmark = pytest.mark.usefixtures("bound_once")
 
 
 def polydata() -> pv.PolyData:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from limbed import crab, torso
 
 import vtk_segdeform as sd
 from vtk_segdeform.batches.run import _AHEAD
@@ -28,7 +29,6 @@ from vtk_segdeform.batches.tasks import (
 )
 from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.errors import ArgumentError, ConstraintError, SegDeformError
-from vtk_segdeform.models import random_limbs
 
 BEND = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
 RANDOM = {"random": 4, "seed": 7, "degrees": 40.0}
@@ -52,7 +52,7 @@ class Here(Executor):
 
 @pytest.fixture(scope="module")
 def meshes():
-    return [random_limbs(600, 1), random_limbs(700, 2)]
+    return [torso(3), crab(3)]
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +63,7 @@ def own_cache(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def plan(meshes):
-    return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2}
+    return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2, "n_cage_vertices": 60}
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_poses_start_from_rest_so_their_order_makes_no_difference(meshes, tmp_pa
     other = {**BEND, "handles": [{"select": "z>90%", "rotate": "y,-30"}]}
     poses, found = [BEND, other, {**RANDOM, "random": 1}], []
     for name in ("forward", "backward"):
-        plan = {"meshes": meshes[:1], "poses": poses}
+        plan = {"meshes": meshes[:1], "poses": poses, "n_cage_vertices": 60}
         store = sd.batch(plan, tmp_path / name, executor=Here())
         found.append({np.concatenate(store.cage_vertices(k)).tobytes() for k in range(3)})
         poses = poses[::-1]
@@ -217,7 +217,7 @@ import signal
 import sys
 import time
 import vtk_segdeform as sd
-from vtk_segdeform.models import random_limbs
+from limbed import crab, torso
 
 def tell(fraction, text):
     print(f"{fraction:.3f}", flush=True)
@@ -228,8 +228,8 @@ if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background
     random = {"random": 4, "seed": 7, "degrees": 40.0}
     bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
-    meshes = [random_limbs(600, 1), random_limbs(700, 2)]
-    plan = {"meshes": meshes, "poses": [bend, random], "block": 2}
+    meshes = [torso(3), crab(3)]
+    plan = {"meshes": meshes, "poses": [bend, random], "block": 2, "n_cage_vertices": 60}
     sd.batch(plan, sys.argv[1], n_workers=1, progress=tell)
 """
 
@@ -243,7 +243,8 @@ def test_a_killed_client_continues(number, plan, reference, tmp_path):
     program.write_text(PROGRAM)
     command = [sys.executable, str(program), str(tmp_path / "out")]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
-    with subprocess.Popen(command, **pipes) as client:
+    paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
+    with subprocess.Popen(command, **pipes, env={**os.environ, **paths}) as client:
         for line in client.stdout:
             if float(line) > 0.1:
                 if number == signal.SIGINT:  # as a terminal sends it, to all processes

@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 
 import numpy as np
+from limbed import torso
 
 import vtk_segdeform as sd
 from vtk_segdeform.cli.main import main
-from vtk_segdeform.models import random_limbs
 
 
 def test_a_plan_is_computed_and_a_pose_is_written(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("SEGDEFORM_CACHE", str(tmp_path / "cache"))
-    sd.write_mesh(tmp_path / "limb.ply", random_limbs(600, 1))
+    sd.write_mesh(tmp_path / "limb.ply", torso(3))
     poses = [{"random": 1, "seed": 7}, {"fixed": "z<-9", "volumes": {"whole": "+5%"}}]
     plan, out = tmp_path / "plan.json", str(tmp_path / "out")
-    plan.write_text(json.dumps({"meshes": ["limb*.ply"], "poses": poses}))
+    plan.write_text(json.dumps({"meshes": ["limb*.ply"], "poses": poses, "n_cage_vertices": 60}))
     assert main(["batch", str(plan), "-o", out, "--workers", "1"]) == 1
     printed = capsys.readouterr().out
     assert "2: 1 converged, 1 failed" in printed

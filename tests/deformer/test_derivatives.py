@@ -18,14 +18,20 @@ pytestmark = pytest.mark.usefixtures("bound_once")
 BENT = np.array([-0.4, 0.5, 0.1])
 
 
+@pytest.fixture(autouse=True)
+def _coarse_volume(request):
+    if "coarse" in request.node.name:
+        request.getfixturevalue("coarse")
+
+
 @functools.cache
-def bound(n_vertices: int = 900, n_regions: int = 2) -> sd.Deformer:
+def bound(n_vertices: int = 500, n_regions: int = 2) -> sd.Deformer:
     """Return a deformer of random limbs, held at one end."""
     mesh = sd.models.random_limbs(n_vertices, seed=4)
     regions = sd.segment(mesh, n_regions)
     x = mesh.vertices[:, 0]
     ends = {"fixed": x < np.quantile(x, 0.04), "handle": x > np.quantile(x, 0.97)}
-    cages = sd.fit_cages(mesh, regions, 80)
+    cages = sd.fit_cages(mesh, regions, 50)
     return sd.Deformer(mesh, regions, cages, **ends, tolerance=1e-11)
 
 
@@ -36,15 +42,15 @@ def bent(deformer: sd.Deformer, share: float = 0.3) -> tuple[np.ndarray, sd.Solu
 
 
 HELD = {
-    "small": (900, 2, {}),
-    "coarse volume": (3100, 3, {}),
-    "goal": (900, 2, {"volumes": {"whole": "-15%"}}),
-    "coarse goal": (3100, 3, {"volumes": {"whole": "+10%"}}),
-    "bound": (900, 2, {"volumes": {"whole": "at least 110%"}}),
-    "free": (900, 1, {"preserve_volume": False}),
-    "regions": (900, 2, {"preserve_region_volumes": True}),
-    "centroid": (900, 2, {"volumes": {"whole": "keep", "centroid z": "keep"}}),
-    "slide": (900, 2, {"slides": [sd.Slide(np.arange(5), "plane", (0.0, 0.0, 1.0))]}),
+    "small": (500, 2, {}),
+    "coarse volume": (600, 3, {}),
+    "goal": (500, 2, {"volumes": {"whole": "-15%"}}),
+    "coarse goal": (600, 3, {"volumes": {"whole": "+10%"}}),
+    "bound": (500, 2, {"volumes": {"whole": "at least 110%"}}),
+    "free": (500, 1, {"preserve_volume": False}),
+    "regions": (500, 2, {"preserve_region_volumes": True}),
+    "centroid": (500, 2, {"volumes": {"whole": "keep", "centroid z": "keep"}}),
+    "slide": (500, 2, {"slides": [sd.Slide(np.arange(5), "plane", (0.0, 0.0, 1.0))]}),
 }
 
 
@@ -65,6 +71,8 @@ def posed(name: str) -> tuple[sd.Deformer, dict, np.ndarray, sd.Solution]:
 @pytest.mark.parametrize("name", HELD)
 def test_remainders_are_of_second_order(name, rng):
     deformer, _, targets, solution = posed(name)
+    surface = deformer._constraints.preserved.volumes.surface
+    assert (surface.n_vertices < deformer.mesh.n_vertices) == ("coarse" in name)
     tangent = rng.normal(size=3) + 0.05 * rng.normal(size=targets.shape)
     tangent *= deformer.mesh.diagonal
     first = deformer.jvp(solution, tangent)
@@ -231,5 +239,5 @@ def test_torch_differentiates_poses():
     deformer = bound().hold(fixed=bound().fixed, handle=bound().handle[:2])
     rest = deformer.mesh.vertices[deformer.handle]
     targets = torch.tensor(rest + 0.1, dtype=torch.float64, requires_grad=True)
-    some = [3, 200, 700]
+    some = [3, 200, 400]
     assert torch.autograd.gradcheck(lambda u: deformed(deformer, u)[some], (targets,))

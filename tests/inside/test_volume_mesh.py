@@ -17,6 +17,7 @@ from vtk_segdeform.errors import ArgumentError, MeshError
 from vtk_segdeform.inside.volume_files import write_volume_file
 
 meshio = pytest.importorskip("meshio")
+pytestmark = pytest.mark.usefixtures("bound_once")
 
 
 def with_patches():
@@ -59,7 +60,7 @@ def test_deform_and_pull_give_back_the_kind_with_its_inside_moved(kind, tmp_path
     is_meshio = kind in ("meshio", ".msh")
     before = sd.VolumeMesh.read(mesh) if kind.startswith(".") else sd.VolumeMesh(mesh)
     rest = np.array(before.grid.points, dtype=float)
-    solution = sd.deform(mesh, *ends(rest, 40.0), n_regions=2)
+    solution = sd.deform(mesh, *ends(rest, 40.0), n_regions=2, n_cage_vertices=60)
     assert isinstance(solution.mesh, meshio.Mesh if is_meshio else pv.UnstructuredGrid)
     assert not len(solution.inside.inverted)
     assert abs(solution.volume_change) < 1e-12
@@ -69,7 +70,7 @@ def test_deform_and_pull_give_back_the_kind_with_its_inside_moved(kind, tmp_path
     assert_allclose(solution.mesh.points[handle[on_surface]], targets[on_surface], atol=1e-6)
     assert_array_equal(solution.mesh.point_data["height"], rest[:, 2])
     tip = int(rest[:, 2].argmax())
-    pulled = sd.pull(mesh, tip, rest[tip] + [0.3, 0.0, 0.0], n_regions=1)
+    pulled = sd.pull(mesh, tip, rest[tip] + [0.3, 0.0, 0.0], n_regions=1, n_cage_vertices=40)
     assert pulled.inside.smallest > 0.0
     assert sd.segment(mesh, 2).n_regions == 2
 
@@ -77,7 +78,7 @@ def test_deform_and_pull_give_back_the_kind_with_its_inside_moved(kind, tmp_path
 def test_what_was_given_is_not_changed():
     mesh = with_patches()
     before = copy.deepcopy(mesh)
-    sd.deform(mesh, *ends(mesh.points, 20.0), n_regions=1)
+    sd.deform(mesh, *ends(mesh.points, 20.0), n_regions=1, n_cage_vertices=40)
     assert_array_equal(mesh.points, before.points)
     assert mesh.cell_sets.keys() == before.cell_sets.keys()
     assert mesh.cell_data.keys() == before.cell_data.keys()

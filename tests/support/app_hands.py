@@ -11,7 +11,6 @@ from qt_hands import Qt, QtCore, QtHand, QtTest, QtWidgets, application, until
 from qtpy import QtGui
 from scenes import sausage
 
-import pyvistaqt  # isort: skip
 from vtk_segdeform import Session
 from vtk_segdeform.widgets import Mode
 from vtk_segdeform.widgets.app.window import Window
@@ -208,14 +207,8 @@ def settings_in(folder: Path):
 
 
 def delete(window) -> None:
-    """Close a window and release everything that Qt deletes with it.
-
-    PySide would take what is new in the same place for what the views remember; of a test that
-    failed they live on.
-    """
+    """Close a window and release everything that Qt deletes with it."""
     window.close()
-    for view in window.findChildren(pyvistaqt.QtInteractor):
-        view._ctx = view._surface = None
     window.deleteLater()
     for _ in range(2):
         application().sendPostedEvents(None, QtCore.QEvent.DeferredDelete)

@@ -33,7 +33,7 @@ def main() -> None:
         sd.save_session(path, session)
         whole.append(path.read_bytes())
     found: Counter[str] = Counter()
-    n_drafts = 0
+    n_drafts, lasts = 0, 0.01  # seconds that a save takes now, on a busy machine as well
     for number in range(count):
         before = whole.index(path.read_bytes())
         ready, begin = os.pipe()
@@ -43,7 +43,7 @@ def main() -> None:
                 os.write(begin, b".")
                 sd.save_session(path, sessions[turn % 2])
         os.read(ready, 1)
-        time.sleep(rng.uniform(0.0, 0.02))
+        time.sleep(rng.uniform(0.0, 2.0 * lasts))
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         os.close(ready)
@@ -53,7 +53,9 @@ def main() -> None:
         found["old" if after == before else "new"] += 1
         found["killed while writing"] += len([*folder.glob(".segdeform-*")]) > n_drafts
         n_drafts = len([*folder.glob(".segdeform-*")])
+        began = time.perf_counter()
         sd.save_session(path, sessions[number % 2])
+        lasts = time.perf_counter() - began
     print(*(f"{number} {what}" for what, number in sorted(found.items())), sep=", ")
 
 

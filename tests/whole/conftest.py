@@ -1,40 +1,13 @@
-"""Settings for the tests of the whole package: equal meshes are segmented once."""
+"""Settings for the tests of the whole package."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 
 from vtk_segdeform.deformer import problem
-from vtk_segdeform.regions import segmentation
-
-
-@pytest.fixture(scope="package", autouse=True)
-def segmented_once() -> Iterator[None]:
-    """Find the parts of equal coarse surfaces once, unless with reports of progress."""
-    known: dict[Any, Any] = {}
-    find = segmentation._parts
-
-    def found(surface: Any, n_regions: int | None, progress: Any) -> Any:
-        if progress is not None:
-            return find(surface, n_regions, progress)
-        inputs = hashlib.blake2b()
-        tables = (surface.graph, surface.contact)
-        arrays = [array for t in tables for array in (t.data, t.indices, t.indptr)]
-        for array in (surface.vertices, surface.faces, surface.areas, *arrays):
-            inputs.update(np.ascontiguousarray(array))
-        key = inputs.digest(), n_regions
-        if key not in known:
-            known[key] = find(surface, n_regions, None)
-        return known[key].copy()
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(segmentation, "_parts", found)
-        yield
 
 
 @pytest.fixture(scope="module")

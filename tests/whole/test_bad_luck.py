@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+from collections import Counter
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -36,7 +37,8 @@ def killed(folder, count, seed):
         env={**os.environ, "PYTHONPATH": f"{SUPPORT}:{ROOT}:{Path(__file__).parent}"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return {what: int(number) for number, what in re.findall(r"(\d+) ([a-z ]+)", done.stdout)}
+    counts = re.findall(r"(\d+) ([a-z ]+)", done.stdout)
+    return Counter({what: int(number) for number, what in counts})
 
 
 @posix

@@ -12,6 +12,7 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.mesh_repair import Repair
 from vtk_segdeform.pictures import BODY, COLOURS, PAPER, rgb
 
+from ..qt import close_view
 from ..scene import Highlights, View
 
 _NEW = COLOURS[0]  # of faces that fill holes
@@ -76,7 +77,7 @@ class Preview:
         """Release the view."""
         self._marks.hide()
         self._marks.view.remove_foreground()
-        self.plotter.close()
+        close_view(self.plotter)
 
     def _outline(self) -> None:
         if self._is_after:

@@ -15,13 +15,14 @@ The files, in reading order:
 from .controls import check_box, shortcut, stopper
 from .keys_dialog import menu_keys
 from .view_menu import add_entry, add_view_entries, name_keys
-from .widget import DeformWidget, deform_dock
+from .widget import DeformWidget, close_view, deform_dock
 
 __all__ = [
     "DeformWidget",
     "add_entry",
     "add_view_entries",
     "check_box",
+    "close_view",
     "deform_dock",
     "menu_keys",
     "name_keys",

@@ -70,7 +70,7 @@ class DeformWidget(QtWidgets.QWidget):
         set_lights(self.plotter.renderer)
         self._set_background()
         self.editor: DeformEditor = self.plotter.segdeform.edit(session)
-        self.destroyed.connect(_switch_off(self.editor))
+        self.destroyed.connect(_switch_off(self.editor, self.plotter))
         self.taken_keys: Callable[[], Mapping[str, str]] = dict
         self.editor.controller.show_keys = self.show_keys
         self._camera_position: tuple[float, ...] | None = tuple(self.plotter.camera.position)
@@ -143,11 +143,25 @@ class DeformWidget(QtWidgets.QWidget):
         if not self._is_closed:
             self._is_closed = True
             self.panel.stop()
-            self.plotter.close()  # which removes the editor first
+            close_view(self.plotter)  # which removes the editor first
         super().closeEvent(event)
 
 
-def _switch_off(editor: DeformEditor) -> Callable[[], None]:
+def close_view(plotter: Any) -> None:
+    """Close a `pyvistaqt.QtInteractor`, which then forgets its OpenGL context.
+
+    Qt deletes the surface of the context with the view, and PySide does not notice: as long as the
+    surface is remembered, a new object at its address would be taken for it, which may crash.
+    """
+    plotter.close()
+    _forget_context(plotter)
+
+
+def _forget_context(plotter: Any) -> None:
+    plotter._ctx = plotter._surface = None
+
+
+def _switch_off(editor: DeformEditor, plotter: Any) -> Callable[[], None]:
     """Return a function that switches *editor* off after Qt has deleted its widget.
 
     Its actors stay: OpenGL would release them in the context of another window.
@@ -156,6 +170,7 @@ def _switch_off(editor: DeformEditor) -> Callable[[], None]:
     def switch_off() -> None:
         with suppress(RuntimeError):  # from objects that Qt has deleted
             editor.Off()
+        _forget_context(plotter)
 
     return switch_off
 

@@ -19,7 +19,7 @@ from vtk_segdeform.io import read_polydata
 from vtk_segdeform.widgets.app.repair_dialog import RepairDialog
 from vtk_segdeform.widgets.editor import Autosaves
 
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 BLANK = pytest.mark.usefixtures("unpainted")
 
 

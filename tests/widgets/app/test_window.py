@@ -39,7 +39,7 @@ from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
 
 BALL = models.sphere(300)
 PREPARED = preparing.lacking
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 BLANK = pytest.mark.usefixtures("unpainted")
 
 
@@ -704,7 +704,7 @@ def test_the_installed_qt_binding_keeps_the_reference_count_of_none():
 @pytest.mark.parametrize("missing", ["qtpy", "pyvistaqt"])
 def test_without_qt_one_sentence_says_how_to_get_it(missing, monkeypatch, capsys):
     qt = "vtk_segdeform.widgets.app", "vtk_segdeform.widgets.qt"
-    for name in [name for name in sys.modules if name.startswith(qt)]:
+    for name in [name for name in [*sys.modules] if name.startswith(qt)]:  # threads import
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, missing, None)
     assert main(["app"]) == 1

@@ -19,6 +19,7 @@ from vtk_segdeform.widgets.panel.panel import press
 from vtk_segdeform.widgets.scene.view import View
 
 HAND, SHOULDER, BODY = [1.5, -0.1, 0.0], [0.5, 0.0, 0.0], [0.0, -0.5, 0.0]
+pytestmark = pytest.mark.usefixtures("bound_once")
 
 
 @functools.cache

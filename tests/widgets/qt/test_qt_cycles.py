@@ -33,7 +33,7 @@ import pyvistaqt  # isort: skip
 from vtk_segdeform.kernels import compiled_kernels
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.widgets import Mode
-from vtk_segdeform.widgets.qt.widget import DeformWidget, deform_dock
+from vtk_segdeform.widgets.qt.widget import DeformWidget, close_view, deform_dock
 
 WARM = 1  # cycles until caches, fonts and shaders are loaded
 # Memory is stable after a dozen cycles.  A leak per cycle would be 0.45 MiB for a bound session,
@@ -66,7 +66,7 @@ class Dock:
         self.editor, self.panel, self.drawn_on = dock.editor, dock.panel, self.plotter.interactor
 
     def end(self):
-        self.plotter.close()
+        close_view(self.plotter)
         self.window.close()
 
 

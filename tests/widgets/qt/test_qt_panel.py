@@ -20,7 +20,7 @@ from vtk_segdeform.widgets.qt import icons
 from vtk_segdeform.widgets.qt.tables import TableView
 from vtk_segdeform.widgets.qt.widget import DeformWidget
 
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 
 
 @pytest.fixture(scope="module")

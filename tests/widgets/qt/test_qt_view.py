@@ -21,7 +21,7 @@ from vtk_segdeform import Regions, models
 from vtk_segdeform.widgets.editor import actions
 from vtk_segdeform.widgets.editor.editor import Mode
 
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 MESH = models.cactus(700)
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "qt_application.py"
 

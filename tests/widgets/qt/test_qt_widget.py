@@ -34,10 +34,10 @@ from vtk_segdeform.widgets.editor import keys_of
 from vtk_segdeform.widgets.panel.panel import all_sections
 from vtk_segdeform.widgets.panel.toolbar import toolbar
 from vtk_segdeform.widgets.qt.keys_dialog import KeysDialog
-from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, deform_dock
+from vtk_segdeform.widgets.qt.widget import DeformDock, DeformWidget, close_view, deform_dock
 
 MESH = models.cactus(500)
-pytestmark = pytest.mark.usefixtures("unprepared")
+pytestmark = pytest.mark.usefixtures("unprepared", "bound_once")
 
 
 @pytest.fixture
@@ -664,7 +664,7 @@ def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     hands[2].mode(Mode.DEFORM)
     assert not first.editor.GetEnabled()
     assert second.editor.GetEnabled()
-    plotter.close()  # this removes the dock's editor
+    close_view(plotter)  # this removes the dock's editor
     assert not dock.editor.GetEnabled()
     until(lambda: not dock.panel.isEnabled(), "the panel")
     second.close()
@@ -688,6 +688,28 @@ def test_a_window_deleted_by_qt_releases_everything(state):
     application().processEvents()
 
 
+@pytest.mark.parametrize("is_closed", [True, False])
+def test_a_view_forgets_what_qt_deletes_with_it(state, is_closed):
+    """PySide took a new menu for the surface of a view that had been closed, or crashed."""
+    application()
+    mesh, now = state
+    window = QtWidgets.QMainWindow()
+    widget = DeformWidget(Session(mesh, state=now), window)
+    window.setCentralWidget(widget)
+    Seen(widget, window)
+    plotter = widget.plotter
+    until(lambda: plotter._surface is not None, "the context")
+    if is_closed:
+        widget.close()
+    else:
+        window.deleteLater()
+        delete_now()
+    assert plotter._surface is plotter._ctx is None
+    if is_closed:
+        window.deleteLater()
+        delete_now()
+
+
 def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     application()
     mesh, now = state
@@ -705,7 +727,7 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     application().processEvents()
     assert editor.GetEnabled()
     assert failures == []
-    plotter.close()
+    close_view(plotter)
     window.close()
     window.deleteLater()
     delete_now()

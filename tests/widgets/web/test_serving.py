@@ -21,6 +21,7 @@ pytest.importorskip("trame")
 pytest.importorskip("aiohttp")
 from aiohttp import ClientSession, WSServerHandshakeError
 from chromium import CTRL, Chromium, Page, needs_chromium
+from limbed import torso
 from web_hands import call, connected, line, only_file, pull, rested
 from yarl import URL
 
@@ -70,7 +71,7 @@ class Program:
 @contextmanager
 def serving(folder: Path, *options: str) -> Iterator[Program]:
     if not (folder / "cactus.ply").exists():
-        write_mesh(folder / "cactus.ply", models.cactus(700))
+        write_mesh(folder / "cactus.ply", torso(2))  # small: each program prepares it
     program = Program(folder, *options)
     try:
         yield program
