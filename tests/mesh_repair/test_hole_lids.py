@@ -117,7 +117,7 @@ def test_a_random_border_is_closed_without_a_crossing(seed):
     closed(*tube(loop, 6.0), least=0.2)
 
 
-def test_ears_are_clipped_in_any_projection_in_which_the_loop_is_simple():
+def test_ears_are_clipped_along_the_mean_normal_unless_the_loop_crosses_itself_there():
     loop = spiral() @ np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     triangles, view = clip_ears(loop)
     assert_allclose(view @ view.T, np.eye(3), atol=1e-14)
