@@ -124,7 +124,7 @@ def _independent(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: i
     return np.asarray(some[(highest[one[some]] == rank) & (highest[other[some]] == rank)])
 
 
-def _among(keys: IntArray, known: IntArray) -> BoolArray:
+def among(keys: IntArray, known: IntArray) -> BoolArray:
     """Return which *keys* are in the sorted *known*."""
     if not len(known):
         return np.zeros(len(keys), dtype=bool)
@@ -136,7 +136,7 @@ def _joins_neighbours(
 ) -> BoolArray:
     """Return which pairs of lid vertices are joined by an edge of the surrounding surface."""
     one, other = lids.origin[a], lids.origin[b]
-    return _among(edge_keys(one, other, n_vertices), taken) & (one >= 0) & (other >= 0)
+    return among(edge_keys(one, other, n_vertices), taken) & (one >= 0) & (other >= 0)
 
 
 def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
@@ -149,7 +149,7 @@ def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
     ordered = keys[order]
     double = np.zeros(len(a), dtype=bool)
     double[old[order[1:][ordered[1:] == ordered[:-1]]]] = True
-    double[old[_among(keys, known)]] = True
+    double[old[among(keys, known)]] = True
     return double
 
 
@@ -207,7 +207,7 @@ def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
         gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
         keys = edge_keys(c, d, k)
         existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
-        bad = (c == d) | _among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
+        bad = (c == d) | among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
         gain[bad] = 0.0
         some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
         some = some[np.unique(keys[some], return_index=True)[1]]
