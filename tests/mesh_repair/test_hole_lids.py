@@ -171,6 +171,6 @@ def test_touching_holes_are_separated():
     other = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
     left = np.delete(faces, [at[0], other[0]], axis=0)
     half_edges = HalfEdges(left, len(vertices))
-    loops = border_loops(vertices, half_edges, 100)
+    loops = border_loops(half_edges, 100)
     found = sorted(sorted(half_edges.head[loop].tolist()) for loop in loops)
     assert found == sorted(sorted(faces[f].tolist()) for f in (at[0], other[0]))

@@ -92,7 +92,7 @@ def close_holes(
     progress : callable, optional
         Called with the fraction done and a text; may raise to cancel.
     """
-    borders = border_loops(vertices, half_edges, largest)
+    borders = border_loops(half_edges, largest)
     if not borders:
         none = np.empty((0, 3))
         return Closing([], none, none.astype(int), np.empty((0, _NEAREST), int), none, 0)
@@ -170,7 +170,7 @@ def _best_lids(holes: _Holes, progress: Progress | None) -> tuple[Lids, _Scores]
 
 
 def _least_area(holes: _Holes, progress: Progress | None) -> Lids:
-    """Return lids of least area over the corners; where none is allowed, a fan with a new vertex."""
+    """Return lids of least area over the corners; a fan with a new vertex if none is allowed."""
     faces: list[IntArray] = [np.empty((0, 3), int)] * len(holes.length)
     centred: list[int] = []
     for n in np.unique(holes.length):

@@ -41,7 +41,6 @@ _FLAT = 1e-9  # radians
 _LEAST_WEIGHT = 1e-3  # replaces negative cotangents, since the weights of a mean must be positive
 _ROUNDS = 50
 _FLIPS = 5
-_SETTLE = 4
 
 
 @dataclass(frozen=True)
@@ -88,12 +87,10 @@ def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     for _ in range(_ROUNDS):
         split = _split(lids, taken, n_vertices)
         done = split is lids
-        lids = _flip(split, taken, n_vertices, _FLIPS)
+        lids = _flip(split, taken, n_vertices)
         if done:
             break
         lids = _relax(lids)
-    for _ in range(_SETTLE):
-        lids = _relax(_flip(_settle(lids), taken, n_vertices, _FLIPS))
     return _settle(lids)
 
 
@@ -186,10 +183,10 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     return split_edges(lids, np.where(ratio > 1.0, ratio, double.astype(float)))
 
 
-def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
+def _flip(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     """Flip edges where that increases the least angle of both triangles and inverts none."""
     k = len(lids.points)
-    for _ in range(times):
+    for _ in range(_FLIPS):
         edges = np.stack(_interior(lids))
         wide = np.pi - corner_angles(lids.points[lids.faces])
         beyond = [
