@@ -17,8 +17,8 @@ def border_loops(half_edges: HalfEdges, largest: int) -> list[IntArray]:
     """Return the border half-edges of each hole of up to *largest* edges, in the order of the loop.
 
     A loop that passes a vertex twice is cut into two.  As loops run backwards, the corner at which
-    an edge of the loop begins is the head of its half-edge.  A face that shares fewer than two of
-    its vertices with others has no loop: its only lid would be the same face again.
+    an edge of the loop begins is the head of its half-edge.  A loop around a single face is left
+    out: its only lid would be the same face again.
 
     Parameters
     ----------
