@@ -40,7 +40,6 @@ _GAIN = 1.01  # factor by which a flip must increase the least angle
 _FLAT = 1e-9  # radians
 _LEAST_WEIGHT = 1e-3  # replaces negative cotangents, since the weights of a mean must be positive
 _ROUNDS = 50
-_FLIPS = 5
 
 
 @dataclass(frozen=True)
@@ -186,35 +185,33 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
 def _flip(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     """Flip edges where that increases the least angle of both triangles and inverts none."""
     k = len(lids.points)
-    for _ in range(_FLIPS):
-        edges = np.stack(_interior(lids))
-        wide = np.pi - corner_angles(lids.points[lids.faces])
-        beyond = [
-            (wide[face] * (lids.faces[face] == corner[:, None])).sum(axis=1)
-            for corner, face in ((edges[2], edges[4]), (edges[3], edges[5]))
-        ]
-        edges = edges[:, beyond[0] + beyond[1] < np.pi - _FLAT]  # not Delaunay
-        a, b, c, d, f, g = edges
-        before, after = (
-            lids.points[np.stack([np.stack(x, axis=1), np.stack(y, axis=1)], axis=1)]
-            for x, y in (((a, b, c), (b, a, d)), ((a, d, c), (d, b, c)))
-        )  # (e, 2, 3, 3)
-        gain = least_angle(after).min(axis=1) - _GAIN * least_angle(before).min(axis=1) - _FLAT
-        up = normals(before).sum(axis=1)
-        gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
-        keys = edge_keys(c, d, k)
-        existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
-        bad = (c == d) | among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
-        gain[bad] = 0.0
-        some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
-        some = some[np.unique(keys[some], return_index=True)[1]]
-        if not len(some):
-            break
-        a, b, c, d, f, g = edges[:, some]
-        faces = lids.faces.copy()
-        faces[f], faces[g] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
-        lids = replace(lids, faces=faces)
-    return lids
+    edges = np.stack(_interior(lids))
+    wide = np.pi - corner_angles(lids.points[lids.faces])
+    beyond = [
+        (wide[face] * (lids.faces[face] == corner[:, None])).sum(axis=1)
+        for corner, face in ((edges[2], edges[4]), (edges[3], edges[5]))
+    ]
+    edges = edges[:, beyond[0] + beyond[1] < np.pi - _FLAT]  # not Delaunay
+    a, b, c, d, f, g = edges
+    before, after = (
+        lids.points[np.stack([np.stack(x, axis=1), np.stack(y, axis=1)], axis=1)]
+        for x, y in (((a, b, c), (b, a, d)), ((a, d, c), (d, b, c)))
+    )  # (e, 2, 3, 3)
+    gain = least_angle(after).min(axis=1) - _GAIN * least_angle(before).min(axis=1) - _FLAT
+    up = normals(before).sum(axis=1)
+    gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
+    keys = edge_keys(c, d, k)
+    existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
+    bad = (c == d) | among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
+    gain[bad] = 0.0
+    some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
+    some = some[np.unique(keys[some], return_index=True)[1]]
+    if not len(some):
+        return lids
+    a, b, c, d, f, g = edges[:, some]
+    faces = lids.faces.copy()
+    faces[f], faces[g] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
+    return replace(lids, faces=faces)
 
 
 def _relax(lids: Lids) -> Lids:
