@@ -58,8 +58,9 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     pivot = 0.5 * (low + high)
     pivot[2] = low[2] + _PIVOT_HEIGHT * (high[2] - low[2])
     targets = transform(mesh.vertices[handle], rotation([0, 1, 0], math.radians(60.0), pivot))
-    ends, binding = {"fixed": fixed, "handle": handle}, part(progress, 0.5, 0.7)
-    deformer = Deformer(mesh, regions, cages, **ends, progress=binding)
+    deformer = Deformer(
+        mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.5, 0.7)
+    )
     say(f"set-up          {time.perf_counter() - start:.1f} s")
     start = time.perf_counter()
     solved = deformer.solve(targets)
@@ -92,7 +93,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
         moved = [Mesh(p, cage.faces) for p, cage in zip(solution.cage_vertices, cages, strict=True)]
         try:
             picture_regions_and_cages(at_rest, mesh, regions.membership, cages)
-            picture_before_after(before_after, mesh, after.vertices, **ends)
+            picture_before_after(before_after, mesh, after.vertices, fixed=fixed, handle=handle)
             picture_regions_and_cages(cages_bent, after, regions.membership, moved)
             picture_volume_change(volume, mesh, after.vertices, change)
             say(f"written         {', '.join(names)}")
