@@ -15,7 +15,6 @@ from vtk_segdeform.benchmarks import (
     drags,
     felt,
     mechanisms,
-    morphs,
     paper,
     peers,
     report,
@@ -179,7 +178,6 @@ def test_a_bend_in_other_units_is_a_task_of_the_same_shape(task):
 def test_batches_are_measured(monkeypatch):
     monkeypatch.setenv("SEGDEFORM_CACHE", "")  # restored, since it changes
     monkeypatch.setattr(batching, "_LARGE", 700)
-    monkeypatch.setattr(batching, "_TASKS", 3)
     monkeypatch.setattr(batching, "in_own_process", lambda work, *given: work(*given))
     (table,) = batching.run(TINY).tables
     found = dict(table.rows)
@@ -189,20 +187,6 @@ def test_batches_are_measured(monkeypatch):
     assert found["bytes of a pose"] % 24 == 0
     assert found["bytes of the file for each pose"] > found["bytes of a pose"]
     assert found["one process / two"] == found["one process, s"] / found["two processes, s"]
-
-
-@pytest.mark.campaign
-def test_motions_are_measured(monkeypatch):
-    monkeypatch.setattr(morphs, "in_own_process", lambda work, *given: work(*given))
-    (table,) = morphs.run(TINY).tables
-    columns = np.array(table.rows).T
-    tolerance, targets, off, volume, size, _ = columns
-    assert (off <= tolerance).all()
-    for falls in (tolerance, off, volume):
-        assert (np.diff(falls) < 0.0).all()
-    for rises in (targets, size):
-        assert (np.diff(rises) > 0.0).all()
-    assert targets[-1] < 36
 
 
 def test_iterations_end_near_their_limit_and_not_where_they_are_slow():

@@ -117,7 +117,7 @@ def test_a_random_border_is_closed_without_a_crossing(seed):
     closed(*tube(loop, 6.0), least=0.2)
 
 
-def test_ears_are_clipped_in_any_projection_in_which_the_loop_is_simple():
+def test_ears_are_clipped_along_the_mean_normal_unless_the_loop_crosses_itself_there():
     loop = spiral() @ np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     triangles, view = clip_ears(loop)
     assert_allclose(view @ view.T, np.eye(3), atol=1e-14)
@@ -171,6 +171,6 @@ def test_touching_holes_are_separated():
     other = [f for f in at if len(np.intersect1d(faces[f], faces[at[0]])) == 1]
     left = np.delete(faces, [at[0], other[0]], axis=0)
     half_edges = HalfEdges(left, len(vertices))
-    loops = border_loops(vertices, half_edges, 100)
+    loops = border_loops(half_edges, 100)
     found = sorted(sorted(half_edges.head[loop].tolist()) for loop in loops)
     assert found == sorted(sorted(faces[f].tolist()) for f in (at[0], other[0]))

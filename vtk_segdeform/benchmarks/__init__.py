@@ -13,7 +13,6 @@ The files, in reading order:
     atlas         bodies fitted to landmarks, beside a thin-plate spline
     mechanisms    what each mechanism of the solver buys
     batching      batches by one process and by two
-    morphs        motions as morph targets
     paper         tables 1 and 2 of the paper
     peers         the same poses by libigl
     solids        volume meshes, beside radial basis functions and linear elasticity

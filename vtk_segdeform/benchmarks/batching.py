@@ -1,4 +1,4 @@
-"""Batches: two processes against one, what a task costs beside its poses, and bytes.
+"""Batches: two processes against one, and bytes.
 
 The times are those of the clock, since processes side by side are the point: on a machine that
 does other work they say little.
@@ -10,27 +10,23 @@ import os
 import statistics
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ..batches import Row, batch
-from ..interpreter import spawning
+from ..batches import batch
 from ..models import random_limbs
 from ..progress import Progress, tell
 from .measuring import in_own_process
 from .results import Cell, Scale, Section, Table
 
-_SLEEP, _TASKS = 0.05, 100  # seconds of a task that computes nothing, and their number
 _LARGE = 20_000  # vertices of the mesh whose poses are read
 _COLUMNS = ("quantity", "value")
 _TEXT = """\
 Random poses of random bodies that have not been bound before, by one process and by two, with \
-their start. *Overhead*: tasks of one pose that sleep for 50 ms instead; everything around them, \
-from the mesh on its way to a process to the row in the file. *Reading a pose*: its vertices, not \
-counting the first one of the mesh. All times are of the clock."""
+their start. *Reading a pose*: its vertices, not counting the first one of the mesh. All times are \
+of the clock."""
 
 
 def run(scale: Scale, progress: Progress | None = None) -> Section:
@@ -70,49 +66,10 @@ def measured(n_meshes: int, n_poses: int, size: int) -> list[tuple[Cell, ...]]:
             ("largest volume change", max(abs(v) for v in table["volume_change"] if v is not None)),
             ("seconds of a pose", statistics.mean(table["seconds"])),
             ("seconds of one process for a mesh", seconds[0] / n_meshes),
-            ("overhead of a task, %", 100.0 * _overhead(plan, folder / "tasks")),
             ("bytes of a pose", sum(len(each.tobytes()) for each in stores[0].cage_vertices(0))),
             ("bytes of the file for each pose", stores[0].path.stat().st_size / poses),
             (f"reading a pose of {_LARGE} vertices, ms", 1e3 * statistics.median(reads)),
         ]
-
-
-class _Sleeping(Executor):
-    """Sends tasks to one process, which sleeps instead of computing poses."""
-
-    def __init__(self, pool: ProcessPoolExecutor) -> None:
-        self._pool, self.began, self.ended = pool, 0.0, 0.0
-
-    def submit(self, fn: Callable[..., Any], /, *task: Any, **_: Any) -> Future[Any]:
-        """Submit a task; meshes are prepared as always, and the clock starts after the last."""
-        if not task[1]:
-            done = self._pool.submit(fn, *task)
-            done.result()
-            self.began = time.perf_counter()
-            return done
-        future = self._pool.submit(_slept, *task)
-        future.add_done_callback(self._ended)
-        return future
-
-    def _ended(self, _: Future[Any]) -> None:
-        self.ended = time.perf_counter()
-
-
-def _slept(data: bytes, poses: list[Any], _: Any) -> tuple[bytes, list[Row]]:
-    time.sleep(_SLEEP * len(poses))
-    return data, [Row("slept", data=bytes(3720)) for _ in poses]
-
-
-def _overhead(plan: dict[str, Any], folder: Path) -> float:
-    """Return the share by which sleeping tasks take longer than their sleep."""
-    tasks = {"meshes": plan["meshes"][:1], "poses": [{"random": _TASKS}], "block": 1}
-    with spawning() as context:
-        pool = ProcessPoolExecutor(1, context)
-        pool.submit(_slept, b"", [], None).result()  # imports this module
-    with pool:
-        executor = _Sleeping(pool)
-        batch(tasks, folder, executor=executor, n_workers=1)
-    return (executor.ended - executor.began) / (_TASKS * _SLEEP) - 1.0
 
 
 def _timed(work: Callable[[], Any]) -> tuple[Any, float]:

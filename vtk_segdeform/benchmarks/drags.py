@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..geometry import distortion, triangle_distortion
 from ..kernels import one_blas_thread
-from ..mesh import Mesh, SurfacePoint
+from ..mesh import HalfEdges, Mesh, SurfacePoint
 from ..session import Preparation, Session
 from ..solver import Solution
 from ..widgets.handle_dragger import STEPS
@@ -44,7 +44,8 @@ class Shape:
     @classmethod
     def of(cls, mesh: Mesh, solution: Solution, away: float = np.nan) -> Shape:
         """Measure *solution*, a pose of *mesh*."""
-        x, (first, second) = solution.vertices, _adjacent_faces(mesh.faces)
+        x = solution.vertices
+        first, second = HalfEdges(mesh.faces, mesh.n_vertices).pairs.T // 3
         turned = [_angles(p[mesh.faces], first, second) for p in (mesh.vertices, x)]
         weights = mesh.face_areas[first] + mesh.face_areas[second]
         change = (turned[1] - turned[0] + np.pi) % (2.0 * np.pi) - np.pi
@@ -171,14 +172,6 @@ def converged(session: Session, preparation: Preparation) -> FloatArray:
     other = Session(session.mesh, state=session.state)
     other.accept(preparation)
     return other.refine(max_steps=_MOST_STEPS).vertices
-
-
-def _adjacent_faces(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the faces (e,) on both sides of each edge that has two."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    owner, order = np.repeat(np.arange(len(faces)), 3), np.lexsort(edges.T)
-    twice = np.flatnonzero((edges[order][1:] == edges[order][:-1]).all(axis=1))
-    return owner[order[twice]], owner[order[twice + 1]]
 
 
 def _angles(corners: FloatArray, first: IntArray, second: IntArray) -> FloatArray:

@@ -42,11 +42,6 @@ class Table:
     title: str
     mixed: bool = False
 
-    def column(self, name: str) -> list[Cell]:
-        """Return the cells of a column."""
-        place = self.columns.index(name)
-        return [row[place] for row in self.rows]
-
     def markdown(self) -> str:
         """Return the table in Markdown; text is aligned left, numbers right."""
         cells = list(zip(*self.rows, strict=True)) or [()] * len(self.columns)

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import sparse
 from scipy.sparse import csgraph
 from scipy.spatial.transform import Rotation
 
@@ -146,16 +145,11 @@ class Hand:
     def on(cls, mesh: Mesh) -> Hand:
         """Return the hand on the limb of *mesh* whose tip is farthest along the surface."""
         x = mesh.vertices
-        i, j = np.concatenate(
-            [mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]
-        ).T
-        lengths = np.linalg.norm(x[i] - x[j], axis=1)
-        graph = sparse.coo_array((lengths, (i, j)), shape=(len(x),) * 2).tocsr()
         largest = mesh.components == np.bincount(mesh.components).argmax()
         middle = np.where(largest, np.linalg.norm(x - x.mean(axis=0), axis=1), np.inf).argmin()
 
         def distances(start: int) -> FloatArray:
-            found = csgraph.dijkstra(graph, directed=False, indices=np.array(start))
+            found = csgraph.dijkstra(mesh.adjacency, indices=np.array(start))
             return np.asarray(np.where(np.isfinite(found), found, -1.0))
 
         tip = int(distances(int(middle)).argmax())

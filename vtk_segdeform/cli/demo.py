@@ -9,12 +9,10 @@ from __future__ import annotations
 import math
 import time
 from argparse import Namespace
-from dataclasses import dataclass
 
 import numpy as np
 
 from .. import io
-from ..arrays import FloatArray, IntArray
 from ..cages import fit_cages
 from ..deformer import Deformer, finished
 from ..errors import ConstraintError, MissingDependencyError
@@ -39,45 +37,7 @@ from .outputs import (
     report_solution,
 )
 
-FIXED, HANDLE = "z<8%", "z>92%"
 _PIVOT_HEIGHT = 0.4  # as a fraction of the height
-
-
-@dataclass(frozen=True, eq=False)
-class Pose:
-    """Fixed vertices, handle and targets."""
-
-    fixed: IntArray  # (f,) vertex ids
-    handle: IntArray  # (k,) vertex ids
-    targets: FloatArray  # (k, 3)
-
-
-def bent_top(mesh: Mesh, angle: float, *, pivot_height: float = _PIVOT_HEIGHT) -> Pose:
-    """Return the pose that bends the top of *mesh* towards +x.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Upright along z.
-    angle : float
-        In radians, about the y direction.
-    pivot_height : float
-        Height of the axis, as a fraction of the height of the mesh.
-
-    Examples
-    --------
-    >>> import math
-    >>> from vtk_segdeform.models import bar
-    >>> pose = bent_top(bar(), math.radians(90), pivot_height=0.0)
-    >>> float(pose.targets[:, 0].max().round(12))  # the height is now the width
-    1.0
-    """
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    pivot = 0.5 * (low + high)
-    pivot[2] = low[2] + pivot_height * (high[2] - low[2])
-    handle = parse_selection(HANDLE, mesh.vertices)
-    turned = transform(mesh.vertices[handle], rotation([0, 1, 0], angle, pivot))
-    return Pose(parse_selection(FIXED, mesh.vertices), handle, turned)
 
 
 def demo(options: Namespace, say: Say, progress: Progress) -> bool:
@@ -93,14 +53,17 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
     report_regions(regions, say)
     cages = fit_cages(mesh, regions, n_vertices=155, progress=part(progress, 0.2, 0.5))
     report_cages(cages, say)
-    pose = bent_top(mesh, math.radians(60.0))
+    fixed, handle = (parse_selection(text, mesh.vertices) for text in ("z<8%", "z>92%"))
+    low, high = mesh.bounds
+    pivot = 0.5 * (low + high)
+    pivot[2] = low[2] + _PIVOT_HEIGHT * (high[2] - low[2])
+    targets = transform(mesh.vertices[handle], rotation([0, 1, 0], math.radians(60.0), pivot))
     deformer = Deformer(
-        mesh, regions, cages, fixed=pose.fixed, handle=pose.handle,
-        progress=part(progress, 0.5, 0.7),
-    )  # fmt: skip
+        mesh, regions, cages, fixed=fixed, handle=handle, progress=part(progress, 0.5, 0.7)
+    )
     say(f"set-up          {time.perf_counter() - start:.1f} s")
     start = time.perf_counter()
-    solved = deformer.solve(pose.targets)
+    solved = deformer.solve(targets)
     report_solution(solved, time.perf_counter() - start, say)
     start = time.perf_counter()
     solution = finished(deformer, solved, None, progress=part(progress, 0.7, 0.8))
@@ -130,9 +93,7 @@ def demo(options: Namespace, say: Say, progress: Progress) -> bool:
         moved = [Mesh(p, cage.faces) for p, cage in zip(solution.cage_vertices, cages, strict=True)]
         try:
             picture_regions_and_cages(at_rest, mesh, regions.membership, cages)
-            picture_before_after(
-                before_after, mesh, after.vertices, fixed=pose.fixed, handle=pose.handle
-            )
+            picture_before_after(before_after, mesh, after.vertices, fixed=fixed, handle=handle)
             picture_regions_and_cages(cages_bent, after, regions.membership, moved)
             picture_volume_change(volume, mesh, after.vertices, change)
             say(f"written         {', '.join(names)}")

@@ -59,8 +59,7 @@ COMMANDS = {
 }
 # The keys of `benchmarks.EXPERIMENTS`, which is not imported for the help.
 EXPERIMENTS = (
-    "drag", "constraints", "open", "landmarks", "mechanisms", "batch", "motion",
-    "paper", "peers", "solids",
+    "drag", "constraints", "open", "landmarks", "mechanisms", "batch", "paper", "peers", "solids",
 )  # fmt: skip
 
 _SELECTION = """\

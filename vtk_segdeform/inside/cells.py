@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..io import means_at
 
 
 class Kind(NamedTuple):
@@ -150,17 +151,8 @@ class Corners(NamedTuple):
         each = np.swapaxes(
             np.linalg.solve(edges(rest, ids), edges(points, ids)), 1, 2
         )  # F_ij = d x_i / d X_j
-        at = _mean(np.repeat(each, 4, axis=0), np.repeat(volumes, 4), ids.ravel(), len(rest))
-        return at, _mean(each, volumes, cell, n_cells)
-
-
-def _mean(values: FloatArray, weights: FloatArray, at: IntArray, count: int) -> FloatArray:
-    """Return the means (count, 3, 3) of *values* (k, 3, 3) by where they are *at* (k,)."""
-    total = np.bincount(at, weights, count)
-    sums = [np.bincount(at, weights * each, count) for each in values.reshape(-1, 9).T]
-    found = np.stack(sums, axis=1) / np.where(total > 0.0, total, 1.0)[:, None]
-    found[total <= 0.0] = np.eye(3).ravel()
-    return np.asarray(found.reshape(-1, 3, 3))
+        at = means_at(np.repeat(each, 4, axis=0), np.repeat(volumes, 4), ids.ravel(), len(rest))
+        return at, means_at(each, volumes, cell, n_cells)
 
 
 def edges(points: FloatArray, corners: IntArray) -> FloatArray:

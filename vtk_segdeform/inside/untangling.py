@@ -32,6 +32,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arrays import BoolArray, FloatArray, IntArray
 from ..kernels import ROWS_AT_ONCE, compiled_kernels, in_parallel, inputs
@@ -297,24 +299,12 @@ def _inverted(diagonal: FloatArray) -> FloatArray:
 def _conjugate_gradients(
     matrix: _Linear, scale: FloatArray, right: FloatArray, tolerance: float
 ) -> FloatArray:
-    """Return x with matrix(x) = *right*, up to a *tolerance* relative to the first residual.
+    """Return x with matrix(x) = *right* (k, 3), up to a *tolerance* relative to *right*.
 
-    *scale* is the inverse of the diagonal of the matrix.
+    *scale* (k, 3) is the inverse of the diagonal of the matrix.
     """
-    x, residual = np.zeros_like(right), right
-    search = scaled = scale * residual
-    size = float(np.vdot(residual, scaled))
-    goal = tolerance**2 * size
-    for _ in range(_ROUNDS):
-        if size <= goal:
-            break
-        image = matrix(search)
-        curvature = float(np.vdot(search, image))
-        if curvature <= 0.0:
-            break
-        x = x + size / curvature * search
-        residual = residual - size / curvature * image
-        scaled = scale * residual
-        before, size = size, float(np.vdot(residual, scaled))
-        search = scaled + size / before * search
-    return x
+    shape, square = right.shape, (right.size, right.size)
+    given = LinearOperator(square, lambda x: matrix(x.reshape(shape)).ravel(), dtype=np.float64)
+    diagonal = sparse.diags_array(scale.ravel())
+    found, _ = cg(given, right.ravel(), rtol=tolerance, maxiter=_ROUNDS, M=diagonal)
+    return np.asarray(found.reshape(shape))

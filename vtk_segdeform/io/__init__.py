@@ -42,7 +42,7 @@ from .convert import (
     write_mesh,
     write_points,
 )
-from .fields import follow
+from .fields import follow, means_at
 from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
@@ -62,6 +62,7 @@ __all__ = [
     "from_polydata",
     "is_mesh_file",
     "loss_of",
+    "means_at",
     "of_its_kind",
     "polydata_of",
     "read_data_set",

@@ -102,12 +102,12 @@ class _Change(NamedTuple):
         cells = cells_of(rest)[polygon]
         corner, at = np.repeat(each, 3, axis=0), triangles.ravel()
         return cls(
-            _mean(corner, np.repeat(weights, 3), at, len(x)),
-            _mean(each, weights, cells, rest.n_cells),
+            means_at(corner, np.repeat(weights, 3), at, len(x)),
+            means_at(each, weights, cells, rest.n_cells),
         )
 
 
-def _mean(values: FloatArray, weights: FloatArray, at: IntArray, count: int) -> FloatArray:
+def means_at(values: FloatArray, weights: FloatArray, at: IntArray, count: int) -> FloatArray:
     """Return the means (count, 3, 3) of *values* (k, 3, 3) by where they are *at* (k,)."""
     total = np.bincount(at, weights, count)
     sums = [np.bincount(at, weights * each, count) for each in values.reshape(-1, 9).T]

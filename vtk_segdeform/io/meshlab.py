@@ -163,15 +163,6 @@ def read_faces(path: str | Path) -> tuple[FloatArray, IntArray]:
         raise MeshError(f"{path}: PyMeshLab cannot read it: {error}") from None
 
 
-def read(path: str | Path) -> Mesh:
-    """Read a mesh from a file in any format of PyMeshLab."""
-    vertices, faces = read_faces(path)
-    try:
-        return Mesh(vertices, faces)
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
-
-
 def write(path: str | Path, mesh: Mesh) -> None:
     """Write *mesh* in the PyMeshLab format of the suffix of *path*."""
     path = as_path(path)

@@ -44,7 +44,6 @@ _CAGE = re.compile(r"cage \d+")  # the name of the layer of a cage
 _WIRES = "-wires.ply"  # the end of the name of a file that only shows the edges of another layer
 _HEAD = "<!DOCTYPE MeshLabDocument>\n"
 _LARGEST = 10_000_000  # bytes of the .mlp
-_DEEPEST = 32  # nesting levels; MeshLab's projects have four
 _MOST_LAYERS, _MOST_BYTES = 1000, 4 << 30  # in total, also if a file is listed several times
 _IDENTITY = "\n1 0 0 0 \n0 1 0 0 \n0 0 1 0 \n0 0 0 1 \n"
 # The colours of regions in pictures and in the editor.
@@ -198,24 +197,6 @@ def _printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-class _Builder(ElementTree.TreeBuilder):
-    """Tree builder that rejects deep nesting, which is slow to build and to delete."""
-
-    _depth = 0
-
-    def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
-        """Start an element; ValueError if it is nested too deeply."""
-        self._depth += 1
-        if self._depth > _DEEPEST:
-            raise ValueError(f"elements are nested more than {_DEEPEST} deep")
-        return super().start(tag, attributes)
-
-    def end(self, tag: str) -> ElementTree.Element:
-        """End an element."""
-        self._depth -= 1
-        return super().end(tag)
-
-
 def _parsed(path: Path) -> ElementTree.Element:
     try:
         with open_regular(path) as file:
@@ -227,9 +208,7 @@ def _parsed(path: Path) -> ElementTree.Element:
     if b"<!ENTITY" in data.upper() or b"\0" in data:
         raise MeshError(f"{path}: is not a MeshLab project: it declares entities or is not text")
     try:
-        parser = ElementTree.XMLParser(target=_Builder())
-        parser.feed(data)
-        root = parser.close()
+        root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise MeshError(f"{path}: is not a MeshLab project ({error})") from None
     if root.tag != "MeshLabProject":

@@ -171,21 +171,21 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
             f"declares {element.count} rows of {element.name!r}, which the rest of the file cannot "
             "hold; it is truncated or damaged, copy or export it again"
         )
-    first, _ = _row(data, start, element, order)
+    (first,) = _walk(data, start, element, order, 1)[1].tolist()
     parts: list[Any] = []  # the layout of a row, if all rows are as long as the first
     for k, each in enumerate(element.properties):
         if each.length:
             parts.append((f"length {k}", order + each.length))
-        parts.append((f"value {k}", order + each.kind, (len(first[k]),)))
+        parts.append((f"value {k}", order + each.kind, (first[k],)))
     layout = np.dtype(parts)
     if start + element.count * layout.itemsize <= len(data):
         table = np.frombuffer(data, layout, element.count, start)
         listed = [k for k, each in enumerate(element.properties) if each.length]
-        if all((table[f"length {k}"] == len(first[k])).all() for k in listed):
+        if all((table[f"length {k}"] == first[k]).all() for k in listed):
             columns: Table = {}
             for k, each in enumerate(element.properties):
                 values = table[f"value {k}"].ravel()
-                lengths = np.full(element.count, len(first[k]))
+                lengths = np.full(element.count, first[k])
                 columns[each.name] = Lists(lengths, values) if each.length else values
             return columns, start + element.count * layout.itemsize
     return _table_of_lists(data, start, element, order)
@@ -193,12 +193,7 @@ def _table(data: bytes, start: int, element: _Element, order: str) -> tuple[Tabl
 
 def _table_of_lists(data: bytes, start: int, element: _Element, order: str) -> tuple[Table, int]:
     """Return the columns of an element with lists of several lengths, and the position after it."""
-    begins, lengths = np.empty((2, element.count, len(element.properties)), dtype=np.int64)
-    end = _walk(data, start, element, order, begins, lengths)
-    if end < 0:  # a row is wrong: say how
-        for _ in range(element.count):
-            _, start = _row(data, start, element, order)
-        raise MeshError(f"the rows of {element.name!r} cannot be read; export the file again")
+    begins, lengths, end = _walk(data, start, element, order, element.count)
     columns: Table = {}
     letters = np.frombuffer(data, np.uint8)[start:end]
     for k, each in enumerate(element.properties):
@@ -212,11 +207,16 @@ def _table_of_lists(data: bytes, start: int, element: _Element, order: str) -> t
 
 
 def _walk(
-    data: bytes, start: int, element: _Element, order: str, begins: IntArray, lengths: IntArray
-) -> int:
-    """Put where the values of each property begin, and how many they are, into (n, p) arrays.
+    data: bytes, start: int, element: _Element, order: str, count: int
+) -> tuple[IntArray, IntArray, int]:
+    """Return where the values of each property begin, and how many they are, (count, p) each.
 
-    Return the position after the rows; -1 if a row is wrong or exceeds the data.
+    Also the position after these rows.
+
+    Raises
+    ------
+    MeshError
+        If a row is wrong or exceeds the data.
     """
     sizes = [np.dtype(each.kind).itemsize for each in element.properties]
     words = [
@@ -224,53 +224,36 @@ def _walk(
         for each in element.properties
     ]
     at, places, counts = start, list[int](), list[int]()
-    for _ in range(element.count):
+    for _ in range(count):
         for size, word in zip(sizes, words, strict=True):
             n = 1
             if word is not None:
                 if at + word.size > len(data):
-                    return -1
+                    raise MeshError(_cut_off(element))
                 (length,) = word.unpack_from(data, at)
                 n = _whole(length)
                 at += word.size
-            if n < 0 or at + size * n > len(data):
-                return -1
+                if n < 0:
+                    raise MeshError(
+                        f"a list of {element.name!r} has the length {length:g}; export the file "
+                        "again"
+                    )
+            if at + size * n > len(data):
+                raise MeshError(_cut_off(element))
             places.append(at)
             counts.append(n)
             at += size * n
-    begins[:], lengths[:] = (np.reshape(each, begins.shape) for each in (places, counts))
-    return at
+    shape = count, len(sizes)
+    return np.reshape(places, shape), np.reshape(counts, shape), at
 
 
-def _row(data: bytes, start: int, element: _Element, order: str) -> tuple[list[Any], int]:
-    """Return the values of one row, each as an array, and the position after it."""
-    row = []
-    for each in element.properties:
-        n = 1
-        if each.length:
-            length = _numbers(data, start, element, (order + each.length, 1))
-            n, start = _whole(length[0]), start + length.itemsize
-            if n < 0:
-                raise MeshError(
-                    f"a list of {element.name!r} has the length {length[0]:g}; export the file "
-                    "again"
-                )
-        row.append(_numbers(data, start, element, (order + each.kind, n)))
-        start += row[-1].nbytes
-    return row, start
+def _cut_off(element: _Element) -> str:
+    return (
+        f"ends in the middle of a row of {element.name!r}; the file is truncated or damaged, copy "
+        "or export it again"
+    )
 
 
 def _whole(length: Any) -> int:
     """Return *length* as an int; -1 if it is not whole, as a damaged text may have it."""
     return int(length) if math.isfinite(length) and length == int(length) else -1
-
-
-def _numbers(data: bytes, start: int, element: _Element, what: tuple[str, int]) -> Any:
-    """Return so many numbers of a type: *what* is both."""
-    kind, n = what
-    if n * np.dtype(kind).itemsize > len(data) - start:
-        raise MeshError(
-            f"ends in the middle of a row of {element.name!r}; the file is truncated or damaged, "
-            "copy or export it again"
-        )
-    return np.frombuffer(data, kind, n, start)

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray
-from ..geometry import lids_of, signed_volume
+from ..geometry import lids_of
 from ..mesh import Mesh
+from ..solver import total_volume
 from .array_names import rounding_text
 from .convert import read_polydata
 from .polygons import triangles_of
@@ -41,14 +42,9 @@ def stored_vertices(surface: Surface, vertices: FloatArray, path: Path) -> Float
 
 def volume_change(mesh: Mesh, vertices: FloatArray, lids: bool | None) -> float:
     """Return (V - V0) / V0 of *mesh* at *vertices* (n, 3), with its lids; 0 without a volume."""
-    used = lids_of(mesh, lids)
-    if not used.has_volume:
-        return 0.0
-    faces, middle = used.closed(mesh), mesh.vertices.mean(axis=0)
-    before, after = (
-        signed_volume(used.extension @ (x - middle), faces) for x in (mesh.vertices, vertices)
-    )
-    return (after - before) / before
+    middle = mesh.vertices.mean(axis=0)  # digits are few far from the origin
+    rest = mesh.with_vertices(mesh.vertices - middle)
+    return total_volume(rest, lids_of(mesh, lids)).relative(vertices - middle)
 
 
 def loss_of(surface: Surface, vertices: FloatArray, path: Path, lids: bool | None) -> str:

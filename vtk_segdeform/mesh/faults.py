@@ -21,7 +21,7 @@ from ..errors import ArgumentError
 from .edges import repeats_vertex
 from .grouping import connected, first_equal_row, first_members
 from .report import Fault, Id, Kind, MeshReport, counted
-from .shells import ShellSums, closed_shells, shell_depths, shell_faults, shell_volumes
+from .shells import closed_shells, shell_depths, shell_faults
 from .topology import HalfEdges
 from .triangles import flat_faces
 
@@ -80,19 +80,15 @@ class Search:
         cls,
         points: FloatArray,
         half_edges: HalfEdges,
-        sums: ShellSums | None = None,
         depth: IntArray | None = None,
     ) -> Search:
         """Return the search of the faces of *half_edges*, none degenerate or duplicate.
 
-        All *points* are in faces; *sums* are those of the shells, and *depth* the number of shells
-        around each closed one, if known.
+        All *points* are in faces; *depth* is the number of shells around each closed one, if known.
         """
         search, none = cls(points, half_edges.faces), np.zeros(len(half_edges.faces), dtype=bool)
         search.__dict__["_corners"] = np.ones(len(points), dtype=bool), 0
         search.__dict__["_distinct"] = none, none, half_edges
-        if sums is not None:
-            search.__dict__["shell_sums"] = sums
         if depth is not None:
             search.__dict__["depth"] = depth
         return search
@@ -102,11 +98,6 @@ class Search:
         search = Search(points, self.triangles)
         search.__dict__["_corners"] = self._corners
         return search
-
-    @cached_property
-    def shell_sums(self) -> ShellSums:
-        """`shell_volumes` of `half_edges`."""
-        return shell_volumes(self.points, self.half_edges.faces, self.half_edges.shells)
 
     @cached_property
     def depth(self) -> IntArray:
@@ -397,8 +388,8 @@ def _inward_and_flat_shells(search: Search, finite: BoolArray | None) -> tuple[I
     closed = closed_shells(half_edges)
     if not closed.any():
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    sums, depth = (search.shell_sums, search.depth) if finite is None else (None, None)
-    wrong, flat = shell_faults(search.points, half_edges, closed, sums=sums, depth=depth)
+    depth = search.depth if finite is None else None
+    wrong, flat = shell_faults(search.points, half_edges, closed, depth)
     first = half_edges.faces[first_members(half_edges.shells), 0]
     return first[wrong & ~flat], first[flat]
 

@@ -28,14 +28,11 @@ from .topology import HalfEdges
 _MOST_LIDS = 0.6  # area of the lids of a unit that has an outside, relative to its own
 
 
-def faces_to_flip(
-    points: FloatArray, half_edges: HalfEdges, sums: ShellSums | None = None
-) -> tuple[BoolArray, ShellSums | None, IntArray]:
+def faces_to_flip(points: FloatArray, half_edges: HalfEdges) -> tuple[BoolArray, IntArray]:
     """Return which faces (m,) to flip; those of a second call are none.
 
     Afterwards all pairs agree, except on one-sided patches, and no closed shell is inside-out.
-    *sums* are those of the shells, if known and if all pairs agree before.  Those after the flips
-    are returned, too, unless shells branch, and the number of shells around each closed shell.
+    The number of shells around each closed shell is returned, too.
     """
     patch, flip, two_sided = _patches(half_edges)
     unit = patch
@@ -50,13 +47,11 @@ def faces_to_flip(
     if not two_sided.all():
         one_sided[unit[~two_sided[patch]]] = True
     faces = flipped_faces(half_edges.faces, flip) if flip.any() else half_edges.faces
-    sums = sums or shell_volumes(points, faces, unit)
+    sums = shell_volumes(points, faces, unit)
     wrong, depth = _inside_out(points, half_edges, flip, unit, one_sided, sums)
     if wrong.any():
         flip = flip ^ wrong[unit]
-        sums = np.where(wrong, -sums[0], sums[0]), *sums[1:]
-    of_shells = None if len(half_edges.crowded) else sums  # shells are units then
-    return flip, of_shells, depth
+    return flip, depth
 
 
 def _patches(half_edges: HalfEdges) -> tuple[IntArray, BoolArray, BoolArray]:

@@ -53,12 +53,7 @@ def misoriented_shells(vertices: FloatArray, half_edges: HalfEdges) -> BoolArray
 
 
 def shell_faults(
-    vertices: FloatArray,
-    half_edges: HalfEdges,
-    closed: BoolArray,
-    *,
-    sums: ShellSums | None = None,
-    depth: IntArray | None = None,
+    vertices: FloatArray, half_edges: HalfEdges, closed: BoolArray, depth: IntArray | None = None
 ) -> tuple[BoolArray, BoolArray]:
     """Return which shells are inside-out or enclose no volume.
 
@@ -70,8 +65,6 @@ def shell_faults(
         Of all shells.
     closed : (k,) bool
         The shells to test, those of `closed_shells`.  Others may be around them.
-    sums : ShellSums, optional
-        Those of `shell_volumes`, if they are known.
     depth : (k,) int, optional
         `shell_depths`, if it is known.
 
@@ -82,7 +75,7 @@ def shell_faults(
     flat : (k,) bool
         Whether it encloses no volume, up to rounding.
     """
-    volume, area, size = sums or shell_volumes(vertices, half_edges.faces, half_edges.shells)
+    volume, area, size = shell_volumes(vertices, half_edges.faces, half_edges.shells)
     tiny = NO_VOLUME * (area * size)
     depth = shell_depths(vertices, half_edges, closed) if depth is None else depth
     outward = outward_signs(volume, depth, closed)

@@ -168,22 +168,18 @@ def mesh_of(vertices: ArrayLike, faces: ArrayLike) -> Soup:
     if len(flat):
         kept[flat] = False
         half_edges = HalfEdges(half_edges.faces[~without_area], len(valid))
-    sums = None
-    is_found = half_edges is found.half_edges
-    if is_found and half_edges.is_oriented and not len(half_edges.crowded):
-        sums = found.shell_sums
-    flip, sums, depth = faces_to_flip(valid, half_edges, sums)
+    flip, depth = faces_to_flip(valid, half_edges)
     left = found.used
-    if not (is_found and found.n_repeating == 0 and kept.all()):
+    if not (half_edges is found.half_edges and found.n_repeating == 0 and kept.all()):
         left = np.zeros(len(valid), dtype=bool)
         left[half_edges.faces] = True
     vertex_of, loose, flipped = target, _NONE, half_edges.flipped(flip)
     if left.all():
-        mesh = Mesh.of(Search.known(valid, flipped, sums, depth))
+        mesh = Mesh.of(Search.known(valid, flipped, depth))
     else:
         number = np.cumsum(left) - 1
         flipped = HalfEdges(number[flipped.faces], int(left.sum()))
-        mesh = Mesh.of(Search.known(valid[left], flipped, sums, depth))
+        mesh = Mesh.of(Search.known(valid[left], flipped, depth))
         loose = np.flatnonzero(~left[target])
         vertex_of = number[target]
         vertex_of[loose] = _nearest(points[loose], mesh.vertices)

@@ -41,8 +41,8 @@ from .grouping import (
 
 _MOST = 2**31 // 6  # faces, for numbers of 32 bits in the kernels
 _LARGEST = 2**63  # of 64-bit integers
-_NONE: IntArray = np.empty(0, dtype=np.int64)
 _ROUNDS = 10_000  # steps around a vertex; with more faces at a vertex, `fans` are counted
+_NONE: IntArray = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +74,11 @@ class HalfEdges:
 
     @cached_property
     def _alone(self) -> IntArray | None:
-        """`boundary` if every vertex has one fan, and no face is repeated; else None.
-
-        None without compiled kernels.
-        """
+        """`boundary` if every vertex has one fan, and no face is repeated; else maybe None."""
         m, n = len(self.faces), self.n_vertices
         kernels = compiled_checks(m) if m < _MOST else None
         if kernels is None:
-            return None
+            return self._walked()
         (faces,) = inputs(self.faces)
         links, narrow = np.empty(3 * m, dtype=np.int64), np.empty(4 * n + 2, dtype=np.int32)
         border, starts, *after = np.split(narrow, np.cumsum([n, n + 2, n]))
@@ -93,56 +90,58 @@ class HalfEdges:
             kernels.border_half_edges(alone, border, faces)
         return self._by_edge(alone)
 
-    @cached_property
-    def _paired(self) -> tuple[IntArray, tuple[int, int, int]] | None:
-        """`opposite`, and the counts of `pair_half_edges`; None without compiled kernels."""
-        m, n = len(self.faces), self.n_vertices
-        kernels = compiled_checks(m) if m < _MOST else None
-        if kernels is None:
+    def _walked(self) -> IntArray | None:
+        """Return `_alone`, in numpy.
+
+        Crossing the half-edge that ends at a corner leads to the next corner of its fan.  The
+        walk goes around all vertices at once, each from one of its corners, at a border from the
+        first, until it returns or ends; if every vertex has one fan, it visits every corner.
+        """
+        opposite, (n_alone, *others) = self._paired
+        if any(others):
             return None
-        opposite, *others = (np.empty(size, dtype=np.int64) for size in (3 * m, n + 2, n, 3 * m))
-        return opposite, kernels.pair_half_edges(opposite, *others, *inputs(self.faces))
+        alone = np.flatnonzero(opposite == -1) if n_alone else _NONE
+        step = opposite.reshape(-1, 3)[:, [2, 0, 1]].ravel()
+        start = np.full(self.n_vertices, -1)
+        start[self.tail] = np.arange(len(step))
+        start[self.tail[alone]] = alone
+        start = at = start[start >= 0]
+        visited = 0
+        for k in range(_ROUNDS):
+            if not len(at):
+                break
+            visited += len(at)
+            at = step[at]
+            going = (at != start) & (at >= 0)
+            if k == 1 and (at[~going] >= 0).any():  # two faces with the same vertices
+                return None
+            start, at = start[going], at[going]
+        return self._by_edge(alone) if visited == len(step) else None
 
     @cached_property
-    def twin(self) -> IntArray | None:
-        """(3m,) int: the twin of each half-edge; None unless every half-edge has one."""
-        if self._paired is not None:
-            return None if any(self._paired[1]) else self._paired[0]
-        one, other = self.order[: len(self.order) // 2 * 2].reshape(-1, 2).T
-        tail, head = self.tail[one], self.head[one]
-        if not (
-            len(self.order) % 2 == 0
-            and (tail == self.head[other]).all()
-            and (head == self.tail[other]).all()
-            and np.diff(edge_keys(tail, head, self.n_vertices)).all()
-        ):
-            return None
-        twin = np.empty_like(self.order)
-        twin[one], twin[other] = other, one
-        return twin
+    def _paired(self) -> tuple[IntArray, tuple[int, int, int]]:
+        """`opposite`, and the counts of `pair_half_edges`."""
+        m, n = len(self.faces), self.n_vertices
+        if m < _MOST and (kernels := compiled_checks(m)):
+            opposite, *others = (
+                np.empty(size, dtype=np.int64) for size in (3 * m, n + 2, n, 3 * m)
+            )
+            return opposite, kernels.pair_half_edges(opposite, *others, *inputs(self.faces))
+        opposite = np.full(3 * m, -2)
+        alone, (one, other) = self.order[self.first[self.counts == 1]], self.pairs.T
+        opposite[alone], opposite[one], opposite[other] = -1, other, one
+        n_crowded = 3 * m - len(alone) - 2 * len(one)
+        return opposite, (len(alone), n_crowded, 2 * int(self.inconsistent.sum()))
 
     @property
     def all_twins(self) -> bool:
         """Whether every half-edge has a twin, so that all shells are closed and oriented."""
-        return self.twin is not None if self._alone is None else not len(self._alone)
+        return not (any(self._paired[1]) if self._alone is None else len(self._alone))
 
     @property
-    def _only_alone(self) -> bool:
-        """Whether every half-edge is known to have a twin or to be alone."""
-        return self._alone is not None or self.twin is not None
-
-    @cached_property
     def opposite(self) -> IntArray:
         """(3m,) int: the other half-edge of a pair; -1 if there is none, -2 if several."""
-        if self._paired is not None:
-            return self._paired[0]
-        if self.twin is not None:
-            return self.twin
-        opposite = np.full(3 * len(self.faces), -2)
-        opposite[self.boundary] = -1
-        one, other = self.pairs.T
-        opposite[one], opposite[other] = other, one
-        return opposite
+        return self._paired[0]
 
     @cached_property
     def across(self) -> IntArray:
@@ -166,35 +165,24 @@ class HalfEdges:
         """(b,) int: the half-edges that are alone on their edge, in the order of edges."""
         if self._alone is not None:
             return self._alone
-        if self.twin is not None:
-            return _NONE
-        if self._paired is not None:
-            return self._by_edge(np.flatnonzero(self.opposite == -1))
-        boundary: IntArray = self.order[self.first[self.counts == 1]]
-        return boundary
+        return self._by_edge(np.flatnonzero(self.opposite == -1)) if self._paired[1][0] else _NONE
 
     @cached_property
     def crowded(self) -> IntArray:
         """(c,) int: the half-edges on edges of three or more, in the order of edges."""
-        if self._only_alone:
+        if self._alone is not None or not self._paired[1][1]:
             return _NONE
-        if self._paired is not None:
-            n_crowded = self._paired[1][1]
-            return self._by_edge(np.flatnonzero(self.opposite == -2)) if n_crowded else _NONE
-        crowded: IntArray = self.order[np.repeat(self.counts > 2, self.counts)]
-        return crowded
+        return self._by_edge(np.flatnonzero(self.opposite == -2))
 
     @property
     def branching(self) -> IntArray:
         """(k,) int: the first half-edge of every edge of three or more, in the order of edges."""
         return self.crowded[begins(self.keys_of(self.crowded))]
 
-    @cached_property
+    @property
     def is_oriented(self) -> bool:
         """Whether the half-edges of all pairs have opposite directions."""
-        if self._only_alone:
-            return True
-        return not (self._parallel.any() if self._paired is None else self._paired[1][2])
+        return self._alone is not None or not self._paired[1][2]
 
     @cached_property
     def turned(self) -> IntArray:
@@ -239,8 +227,6 @@ class HalfEdges:
     @cached_property
     def neighbours(self) -> IntArray:
         """(p, 2) int: `pairs`, in any order."""
-        if self._paired is None:
-            return self.pairs
         one = np.flatnonzero(self.opposite > np.arange(len(self.opposite)))
         return np.stack([one, self.opposite[one]]).T
 
@@ -345,34 +331,9 @@ class HalfEdges:
     @cached_property
     def pinched(self) -> IntArray:
         """Vertices with several fans, except the ends of non-manifold edges."""
-        if self._alone is not None or (self._paired is None and self._has_one_fan_each()):
+        if self._alone is not None:
             return _NONE
         corner = first_members(self.fans(self.neighbours))
         several = np.bincount(self.tail[corner], minlength=self.n_vertices) > 1
         several[self.tail[self.crowded]] = several[self.head[self.crowded]] = False
         return np.flatnonzero(several)
-
-    def _has_one_fan_each(self) -> bool:
-        """Return whether every vertex has one fan; may be False for a valid mesh.
-
-        Crossing the half-edge that ends at a corner leads to the next corner of its fan.  The
-        walk goes around all vertices at once, each from one of its corners, at a border from the
-        first, until it returns or ends; if every vertex has one fan, it visits every corner.
-        """
-        if self.twin is None and (self.inconsistent.any() or (self.counts > 2).any()):
-            return False
-        step = np.roll(self.opposite.reshape(-1, 3), 1, axis=1).ravel()
-        start = np.full(self.n_vertices, -1)
-        start[self.tail] = np.arange(len(step))
-        if self.twin is None:
-            start[self.tail[self.boundary]] = self.boundary
-        start = at = start[start >= 0]
-        visited = 0
-        for _ in range(_ROUNDS):
-            if not len(at):
-                break
-            visited += len(at)
-            at = step[at]
-            going = (at != start) & (at >= 0)
-            start, at = start[going], at[going]
-        return visited == len(step)

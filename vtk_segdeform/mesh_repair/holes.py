@@ -22,7 +22,7 @@ from ..arrays import BoolArray, FloatArray, IntArray
 from ..mesh import HalfEdges, counted, edge_keys, intersections_of, least_angle
 from ..progress import Progress, part, tell
 from .hole_borders import border_loops
-from .lid_refining import Lids, harmonic, joined_twice, refine, split_edges
+from .lid_refining import Lids, among, harmonic, joined_twice, refine, split_edges
 from .lids import clip_ears, triangulate_long_loop, triangulate_loops
 
 _CUBIC = 64  # most corners of a loop for dynamic programming
@@ -92,7 +92,7 @@ def close_holes(
     progress : callable, optional
         Called with the fraction done and a text; may raise to cancel.
     """
-    borders = border_loops(vertices, half_edges, largest)
+    borders = border_loops(half_edges, largest)
     if not borders:
         none = np.empty((0, 3))
         return Closing([], none, none.astype(int), np.empty((0, _NEAREST), int), none, 0)
@@ -170,35 +170,26 @@ def _best_lids(holes: _Holes, progress: Progress | None) -> tuple[Lids, _Scores]
 
 
 def _least_area(holes: _Holes, progress: Progress | None) -> Lids:
-    """Return lids of least area over the corners; fans around a new vertex where none is allowed.
-
-    Loops that would share a new edge with an earlier one are triangulated again without it.
-    """
+    """Return lids of least area over the corners; a fan with a new vertex if none is allowed."""
     faces: list[IntArray] = [np.empty((0, 3), int)] * len(holes.length)
-    known, todo = holes.known, np.arange(len(holes.length))
     centred: list[int] = []
-    done = 0.0
-    while len(todo):
-        for n in np.unique(holes.length[todo]):
-            some = todo[holes.length[todo] == n]
-            done = max(done, np.count_nonzero(holes.length[todo] < n) / len(todo))
-            message = f"Filling {counted(len(some), 'hole', 'holes')} of {n} edges"
-            tell(progress, done, message)
-            triangles, allowed = _over_corners(holes, some, known)
-            for loop, lid, good in zip(some.tolist(), triangles, allowed.tolist(), strict=True):
-                faces[loop] = lid + holes.start[loop]
-                if not good:
-                    at = np.arange(n)
-                    rim = holes.start[loop] + np.stack([at, np.roll(at, -1)], axis=1)
-                    middle = len(holes.corners) + len(centred)
-                    faces[loop] = np.insert(rim, 2, middle, axis=1)
-                    centred.append(loop)
-        lids = holes.lids(np.concatenate(faces), np.array(centred, dtype=np.int64))
-        todo, known = _in_conflict(holes, lids)
-    return lids
+    for n in np.unique(holes.length):
+        some = np.flatnonzero(holes.length == n)
+        message = f"Filling {counted(len(some), 'hole', 'holes')} of {n} edges"
+        tell(progress, np.count_nonzero(holes.length < n) / len(holes.length), message)
+        triangles, allowed = _over_corners(holes, some)
+        for loop, lid, good in zip(some.tolist(), triangles, allowed.tolist(), strict=True):
+            faces[loop] = lid + holes.start[loop]
+            if not good:
+                at = np.arange(n)
+                rim = holes.start[loop] + np.stack([at, np.roll(at, -1)], axis=1)
+                middle = len(holes.corners) + len(centred)
+                faces[loop] = np.insert(rim, 2, middle, axis=1)
+                centred.append(loop)
+    return holes.lids(np.concatenate(faces), np.array(centred, dtype=np.int64))
 
 
-def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntArray, BoolArray]:
+def _over_corners(holes: _Holes, some: IntArray) -> tuple[IntArray, BoolArray]:
     """Return triangles (l, n - 2, 3) for loops of one length, and whether they are allowed."""
     n = int(holes.length[some[0]])
     at = holes.start[some][:, None] + np.arange(n)
@@ -212,21 +203,7 @@ def _over_corners(holes: _Holes, some: IntArray, known: IntArray) -> tuple[IntAr
         return np.stack(lids), np.ones(len(some), dtype=bool)
     ids = holes.corners[at]
     keys = edge_keys(ids[:, :, None], ids[:, None, :], len(holes.vertices))
-    taken = known[np.searchsorted(known, keys).clip(max=len(known) - 1)] == keys
-    return triangulate_loops(holes.points[at], taken)
-
-
-def _in_conflict(holes: _Holes, lids: Lids) -> tuple[IntArray, IntArray]:
-    """Return the loops whose lids share an edge with an earlier lid, and all existing edges."""
-    one, other = lids.faces.ravel(), lids.faces[:, [1, 2, 0]].ravel()
-    old = (lids.origin[one] >= 0) & (lids.origin[other] >= 0)
-    keys = edge_keys(lids.origin[one[old]], lids.origin[other[old]], len(holes.vertices))
-    owner = lids.owner[one[old]]
-    inner = np.isin(keys, holes.known, invert=True)
-    keys, owner = np.unique(np.stack([keys[inner], owner[inner]], axis=1), axis=0).T
-    later = owner[1:][keys[1:] == keys[:-1]]
-    short = np.unique(later[holes.length[later] <= _CUBIC])
-    return short, np.sort(np.append(holes.known, keys))
+    return triangulate_loops(holes.points[at], among(keys, holes.known))
 
 
 def _refined(holes: _Holes, lids: Lids, some: IntArray) -> Lids:

@@ -40,8 +40,6 @@ _GAIN = 1.01  # factor by which a flip must increase the least angle
 _FLAT = 1e-9  # radians
 _LEAST_WEIGHT = 1e-3  # replaces negative cotangents, since the weights of a mean must be positive
 _ROUNDS = 50
-_FLIPS = 5
-_SETTLE = 4
 
 
 @dataclass(frozen=True)
@@ -88,12 +86,10 @@ def refine(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     for _ in range(_ROUNDS):
         split = _split(lids, taken, n_vertices)
         done = split is lids
-        lids = _flip(split, taken, n_vertices, _FLIPS)
+        lids = _flip(split, taken, n_vertices)
         if done:
             break
         lids = _relax(lids)
-    for _ in range(_SETTLE):
-        lids = _relax(_flip(_settle(lids), taken, n_vertices, _FLIPS))
     return _settle(lids)
 
 
@@ -124,7 +120,7 @@ def _independent(urgency: FloatArray, one: IntArray, other: IntArray, n_faces: i
     return np.asarray(some[(highest[one[some]] == rank) & (highest[other[some]] == rank)])
 
 
-def _among(keys: IntArray, known: IntArray) -> BoolArray:
+def among(keys: IntArray, known: IntArray) -> BoolArray:
     """Return which *keys* are in the sorted *known*."""
     if not len(known):
         return np.zeros(len(keys), dtype=bool)
@@ -136,7 +132,7 @@ def _joins_neighbours(
 ) -> BoolArray:
     """Return which pairs of lid vertices are joined by an edge of the surrounding surface."""
     one, other = lids.origin[a], lids.origin[b]
-    return _among(edge_keys(one, other, n_vertices), taken) & (one >= 0) & (other >= 0)
+    return among(edge_keys(one, other, n_vertices), taken) & (one >= 0) & (other >= 0)
 
 
 def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
@@ -149,7 +145,7 @@ def joined_twice(lids: Lids, known: IntArray, n_vertices: int) -> BoolArray:
     ordered = keys[order]
     double = np.zeros(len(a), dtype=bool)
     double[old[order[1:][ordered[1:] == ordered[:-1]]]] = True
-    double[old[_among(keys, known)]] = True
+    double[old[among(keys, known)]] = True
     return double
 
 
@@ -186,38 +182,36 @@ def _split(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     return split_edges(lids, np.where(ratio > 1.0, ratio, double.astype(float)))
 
 
-def _flip(lids: Lids, taken: IntArray, n_vertices: int, times: int) -> Lids:
+def _flip(lids: Lids, taken: IntArray, n_vertices: int) -> Lids:
     """Flip edges where that increases the least angle of both triangles and inverts none."""
     k = len(lids.points)
-    for _ in range(times):
-        edges = np.stack(_interior(lids))
-        wide = np.pi - corner_angles(lids.points[lids.faces])
-        beyond = [
-            (wide[face] * (lids.faces[face] == corner[:, None])).sum(axis=1)
-            for corner, face in ((edges[2], edges[4]), (edges[3], edges[5]))
-        ]
-        edges = edges[:, beyond[0] + beyond[1] < np.pi - _FLAT]  # not Delaunay
-        a, b, c, d, f, g = edges
-        before, after = (
-            lids.points[np.stack([np.stack(x, axis=1), np.stack(y, axis=1)], axis=1)]
-            for x, y in (((a, b, c), (b, a, d)), ((a, d, c), (d, b, c)))
-        )  # (e, 2, 3, 3)
-        gain = least_angle(after).min(axis=1) - _GAIN * least_angle(before).min(axis=1) - _FLAT
-        up = normals(before).sum(axis=1)
-        gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
-        keys = edge_keys(c, d, k)
-        existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
-        bad = (c == d) | _among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
-        gain[bad] = 0.0
-        some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
-        some = some[np.unique(keys[some], return_index=True)[1]]
-        if not len(some):
-            break
-        a, b, c, d, f, g = edges[:, some]
-        faces = lids.faces.copy()
-        faces[f], faces[g] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
-        lids = replace(lids, faces=faces)
-    return lids
+    edges = np.stack(_interior(lids))
+    wide = np.pi - corner_angles(lids.points[lids.faces])
+    beyond = [
+        (wide[face] * (lids.faces[face] == corner[:, None])).sum(axis=1)
+        for corner, face in ((edges[2], edges[4]), (edges[3], edges[5]))
+    ]
+    edges = edges[:, beyond[0] + beyond[1] < np.pi - _FLAT]  # not Delaunay
+    a, b, c, d, f, g = edges
+    before, after = (
+        lids.points[np.stack([np.stack(x, axis=1), np.stack(y, axis=1)], axis=1)]
+        for x, y in (((a, b, c), (b, a, d)), ((a, d, c), (d, b, c)))
+    )  # (e, 2, 3, 3)
+    gain = least_angle(after).min(axis=1) - _GAIN * least_angle(before).min(axis=1) - _FLAT
+    up = normals(before).sum(axis=1)
+    gain[((normals(after) * up[:, None]).sum(axis=2) <= 0.0).any(axis=1)] = 0.0
+    keys = edge_keys(c, d, k)
+    existing = np.sort(edge_keys(lids.faces, lids.faces[:, [1, 2, 0]], k).ravel())
+    bad = (c == d) | among(keys, existing) | _joins_neighbours(lids, c, d, taken, n_vertices)
+    gain[bad] = 0.0
+    some = _independent((gain > 0.0).astype(float), f, g, len(lids.faces))
+    some = some[np.unique(keys[some], return_index=True)[1]]
+    if not len(some):
+        return lids
+    a, b, c, d, f, g = edges[:, some]
+    faces = lids.faces.copy()
+    faces[f], faces[g] = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
+    return replace(lids, faces=faces)
 
 
 def _relax(lids: Lids) -> Lids:

@@ -32,7 +32,6 @@ _FLAT, _FLAT_CHARGE = 1e-4, 0.05  # twice the area, and the penalty, over the lo
 _BRANCHES = 48  # corners that approximate a longer loop
 _AT_ONCE = 2_000_000  # triangles compared at once
 _STRAIGHT = 1e-9  # sine of an angle
-_VIEWS = 60  # projection directions that are tried
 _AREA = 1e-3  # least projected area per corner, over the squared extent
 
 
@@ -129,20 +128,22 @@ def clip_ears(points: FloatArray) -> tuple[IntArray, FloatArray] | None:
     """Return n - 2 triangles over the loop *points* (n, 3), and the view of the projection.
 
     The *view* (3, 3) is a rotation: ``points @ view.T`` are coordinates to the right, upwards and
-    towards the viewer.  The mean normal of the loop is tried first, then directions in order of
-    their angle to it.  None if the loop crosses itself in all of these projections.
+    towards the viewer, along the mean normal of the loop.  None if the loop crosses itself there.
 
     Examples
     --------
     >>> clip_ears(np.array([[0.0, 0, 0], [2, 0, 1], [2, 2, 0], [1, 0.5, 1]]))[0].tolist()
     [[1, 2, 3], [3, 0, 1]]
     """
-    for up in _directions(points):
-        view = _view(up)
-        flat = (points - points[0]) @ view[:2].T
-        if _is_simple(flat) and (triangles := _clipped(flat)) is not None:
-            return triangles, view
-    return None
+    x = points - points.mean(axis=0)
+    up = np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
+    size = np.linalg.norm(up)
+    if size == 0.0:
+        return None
+    view = _view(up / size)
+    flat = (points - points[0]) @ view[:2].T
+    triangles = _clipped(flat) if _is_simple(flat) else None
+    return None if triangles is None else (triangles, view)
 
 
 def _clipped(flat: FloatArray) -> IntArray | None:
@@ -176,20 +177,6 @@ def _clipped(flat: FloatArray) -> IntArray | None:
         sharp[both] = _roundness(flat[before[both]], flat[both], flat[after[both]])
         candidate[both] = sharp[both]
     return np.array(triangles, dtype=np.int64)
-
-
-def _directions(points: FloatArray) -> FloatArray:
-    """Return unit vectors (v, 3): the mean normal of the loop, then others of its hemisphere."""
-    x = points - points.mean(axis=0)
-    area = np.cross(x, np.roll(x, -1, axis=0)).sum(axis=0)
-    k = np.arange(_VIEWS) + 0.5  # spread evenly over the sphere
-    z, turn = 1.0 - 2.0 * k / _VIEWS, np.pi * (1.0 + np.sqrt(5.0)) * k
-    r = np.sqrt(1.0 - z * z)
-    around = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
-    along = around @ area
-    around = around[np.argsort(-along, kind="stable")][: np.count_nonzero(along > 0.0)]
-    size = np.linalg.norm(area)
-    return np.concatenate([[area / size], around]) if size > 0.0 else around
 
 
 def _view(up: FloatArray) -> FloatArray:

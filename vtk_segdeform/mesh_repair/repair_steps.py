@@ -288,7 +288,7 @@ def remaining_holes(draft: Draft, largest: int) -> tuple[int, ...]:
     """Return the number of edges of each hole that `fill` leaves open only because of its size."""
     if not draft.is_oriented:
         return ()
-    loops = border_loops(draft.vertices, draft.half_edges, len(draft.half_edges.boundary))
+    loops = border_loops(draft.half_edges, len(draft.half_edges.boundary))
     return tuple(sorted(len(loop) for loop in loops if len(loop) > largest))
 
 

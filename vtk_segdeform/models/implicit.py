@@ -22,9 +22,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 from scipy.interpolate import PchipInterpolator, make_interp_spline
-from scipy.sparse import csgraph
 from scipy.spatial import cKDTree
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkImageData
@@ -32,7 +30,7 @@ from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from ..arrays import FloatArray, IntArray
 from ..errors import ArgumentError
-from ..mesh import Mesh
+from ..mesh import Mesh, components
 from .remeshing import Field, flip, refine, relax, split_to, vertex_normals
 
 _FAR = 0.1  # upper limit of a limb's distance, which saves computing larger ones
@@ -196,9 +194,7 @@ def _contour(field: Field, box: FloatArray, spacing: float) -> tuple[FloatArray,
 
 def _largest_component(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Remove small components, which a coarse grid leaves beside thin parts."""
-    links = np.ones(faces.size), (faces.ravel(), np.roll(faces, 1, axis=1).ravel())
-    graph = sparse.coo_array(links, shape=(len(vertices),) * 2)
-    part = csgraph.connected_components(graph, directed=False)[1]
+    part = components(len(vertices), faces)
     kept = part == np.bincount(part).argmax()
     number = np.cumsum(kept) - 1
     return vertices[kept], number[faces[kept[faces[:, 0]]]]
