@@ -44,7 +44,7 @@ from ..scene import Phase, SurfaceStyle
 from ..volume_overlay import signed
 from .controller import Controller
 from .finishing import measured
-from .session_file import pose_remark, write_posed
+from .session_file import is_mesh, pose_remark, write_posed
 from .widget_set import Mode, Spot
 
 _GROWTH = 20  # per cent of the volume of a part at rest, at each press
@@ -153,7 +153,14 @@ def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         controller.save()
         then()
 
-    return once_settled(save)
+    def save_session(controller: Controller) -> None:
+        if is_mesh(path):
+            raise SessionError(
+                f"{path.name} is the name of a mesh. Choose Save mesh as, or a name in .segdeform"
+            )
+        once_settled(save)(controller)
+
+    return save_session
 
 
 def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
