@@ -71,8 +71,7 @@ def attached(
     after = _with_regions(poses, after, _carried(regions, carrier), part(progress, 0.0, 0.9))
     if after.pose is None:
         return after
-    targets, rest = after.pose.targets, part(progress, 0.9, 1.0)
-    return replace(after, pose=solving.solve(poses, after, targets, progress=rest)[0])
+    return solving.settled(poses, after, part(progress, 0.9, 1.0))
 
 
 def apart(poses: Poses, state: State, goals: Goals, progress: Progress | None = None) -> State:
@@ -85,6 +84,16 @@ def apart(poses: Poses, state: State, goals: Goals, progress: Progress | None = 
     if changed is None or regions is None:
         return state
     return _with_regions(poses, state, _carried(regions, *changed), progress)
+
+
+def with_goals(poses: Poses, state: State, goals: Goals, progress: Progress | None = None) -> State:
+    """Return *state* with other *goals* of volumes, `apart`; `solving.settled` has them.
+
+    After a pull nothing moves but what the volumes move.
+    """
+    state = apart(poses, state, goals, progress)
+    state = pulls.kept(state, poses.vertices(state))
+    return replace(state, options=replace(state.options, volumes=tuple(goals.items())))
 
 
 def separated_by(

@@ -67,7 +67,7 @@ from .painting import Painting
 from .poses import Poses
 from .preparing import Preparation
 from .saved_poses import SavedPoses
-from .separating import apart, with_fixed
+from .separating import apart, with_fixed, with_goals
 from .state import (
     Cages,
     Options,
@@ -714,10 +714,7 @@ class Session(Described):
         """
         goals = {**dict(self.options.volumes), as_text(name, "name"): goal}
         goals = dict(replace(self.options, volumes=tuple(goals.items())).volumes)  # checked
-        state = apart(self.poses, self.state, goals)
-        state = pulls.kept(state, self.poses.vertices(state))
-        options = replace(state.options, volumes=tuple(goals.items()))
-        state = replace(state, options=options)
+        state = with_goals(self.poses, self.state, goals)
         places = handles.targets_of(self.mesh, state)
         moved = f"the volume of {naming.volume_label(self.state.region_names, name)}"
         return self._drag(state, places, [moved], max_steps)

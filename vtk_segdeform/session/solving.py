@@ -21,7 +21,7 @@ from ..progress import Progress
 from ..solver import Solution
 from . import pulls
 from .finishing import errors, moved_on
-from .handles import is_near, require_near, stacked, targets_at
+from .handles import is_near, require_near, stacked, targets_at, targets_of
 from .poses import Aim, Path, Poses, Shown
 from .state import Cages, Pose, State
 
@@ -94,6 +94,12 @@ def solve(
     if shift is not None:
         solution = replace(solution, errors=errors(poses, state, deformer, wanted))
     return pose, solution
+
+
+def settled(poses: Poses, state: State, progress: Progress | None = None) -> State:
+    """Return *state* in the pose for its targets, as `solve` finds it; also in another thread."""
+    pose, _ = solve(poses, state, targets_of(poses.mesh, state), progress=progress)
+    return replace(state, pose=pose)
 
 
 def with_region_at_rest(

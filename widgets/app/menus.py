@@ -73,7 +73,7 @@ class Menus:
         copy = self._add(
             menu,
             "&Copy poses of a session ...",
-            lambda: window.editor_widget.panel.toolbar.ask_and_copy_poses(),
+            lambda: window.editor_widget.panel.controls["poses.copy"].click(),
         )
         self._need_mesh.append(copy)
         menu.addSeparator()

@@ -38,17 +38,20 @@ from vtk_segdeform.session import (
     volume_label,
 )
 
-from ..handle_dragger import STEPS
+from ..handle_dragger import STEPS, locked_components
 from ..region_selector import Paint, RegionSelector
 from ..scene import Phase, SurfaceStyle
+from ..volume_overlay import signed
 from .controller import Controller
 from .finishing import measured
-from .session_file import pose_remark, write_posed
+from .session_file import is_mesh, pose_remark, write_posed
 from .widget_set import Mode, Spot
 
 _GROWTH = 20  # per cent of the volume of a part at rest, at each press
+_NOTICED = 0.005  # relative change of a volume that a whole number of per cent shows
 
 Action = Callable[[Controller], None]
+Then = Callable[[], str | None]
 
 
 def to_mode(mode: Mode) -> Action:
@@ -150,7 +153,14 @@ def saving(path: Path, then: Callable[[], object] = lambda: None) -> Action:
         controller.save()
         then()
 
-    return once_settled(save)
+    def save_session(controller: Controller) -> None:
+        if is_mesh(path):
+            raise SessionError(
+                f"{path.name} is the name of a mesh. Choose Save mesh as, or a name in .segdeform"
+            )
+        once_settled(save)(controller)
+
+    return save_session
 
 
 def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
@@ -258,15 +268,24 @@ def _start_step(
     name: str,
     work: Callable[[Progress], State],
     label: str,
-    then: Callable[[], str | None] = lambda: None,
+    then: Then = lambda: None,
+    *,
+    join: bool = False,
 ) -> None:
-    """Start the job *name*, whose result is the state of a step called *label*; *then* follows."""
+    """Start the job *name*, whose result is the state of a step called *label*; *then* follows.
+
+    If it is to *join*, it becomes part of the step before it with the same label.
+    """
     session, before = controller.session, controller.session.state
 
     def show(after: State) -> str | None:
         if session.state is not before:  # changed in another view of the same session
             raise SessionError("The session changed meanwhile. Try again")
-        session.history.step(label, after)
+        if join:
+            session.history.move(after)
+            session.commit(label, join=True)
+        else:
+            session.history.step(label, after)
         return then()
 
     controller.start(name, work, show)
@@ -404,12 +423,19 @@ def unpin_all(controller: Controller) -> None:
     controller.say(f"Removed {_count(len(names), 'point')}")
 
 
-# The volume of the part under the hand: the region of the last pulled point or active handle.
+# The volume of the part under the hand: of the region under the pointer, or else of the last pulled
+# point or active handle.
+
+
+def _part_under_hand(controller: Controller) -> str | None:
+    spot = controller.widgets.spot_at(controller.view.pointer(Phase.HOVER))
+    is_over = spot is not None and spot.region is not None
+    return f"region {spot.region}" if spot and is_over else controller.widgets.part
 
 
 def keep_part(controller: Controller) -> None:
     """Keep the volume of the part under the hand as at rest; if it has a goal, no longer."""
-    keeping(controller.widgets.part)(controller)
+    keeping(_part_under_hand(controller))(controller)
 
 
 def keeping(part: str | None) -> Action:
@@ -417,68 +443,79 @@ def keeping(part: str | None) -> Action:
 
     def keep(controller: Controller) -> None:
         name, session = _checked_part(controller, part), controller.session
+        goal: str | None = "free" if session.options.preserve_region_volumes else "keep"
         if name in dict(session.options.volumes):
-            forgetting_volume(name)(controller)
-        else:
-            is_kept = session.options.preserve_region_volumes
-            setting_volume(name, "free" if is_kept else "keep")(controller)
-        is_kept = controller.widgets.keeps(name)
-        label = volume_label(session.state.region_names, name)
-        controller.say(f"Volume of {label} {'kept' if is_kept else 'free'}")
+            goal = None
+
+        def told() -> str:
+            is_kept = controller.widgets.keeps(name)
+            label = volume_label(session.state.region_names, name)
+            return f"Volume of {label} {'kept' if is_kept else 'free'}"
+
+        setting_volume(name, goal, then=told)(controller)
 
     return keep
 
 
 def grow_part(controller: Controller) -> None:
     """Let the part under the hand have 20 % more of its volume at rest than now, in whole %."""
-    growing(controller.widgets.part)(controller)
+    growing(_part_under_hand(controller))(controller)
 
 
 def growing(part: str | None) -> Action:
     """Return the action that lets *part* have 20 % more of its volume at rest than now."""
 
     def grow(controller: Controller) -> None:
-        name = _checked_part(controller, part)
-        goal = round(100.0 * controller.session.volume(name)[1]) + _GROWTH
-        setting_volume(name, f"{goal:+}%")(controller)
+        name, session = _checked_part(controller, part), controller.session
+        goal = round(100.0 * session.volume(name)[1]) + _GROWTH
+        then = partial(_change_of_rest, session, name)
+        setting_volume(name, f"{goal:+}%", then=then)(controller)
 
     return grow
 
 
-def setting_volume(name: str, goal: str, *, join: bool = False) -> Action:
-    """Return the action that sets the goal of a volume; with *join*, moves are one undo step."""
+def _change_of_rest(session: Session, name: str) -> str | None:
+    """Return how the rest of the mesh pays for a part with more volume, and how to avoid that."""
+    (whole, change), (own, own_change) = session.volume("whole"), session.volume(name)
+    rest = (whole - own) / (whole / (1.0 + change) - own / (1.0 + own_change)) - 1.0
+    if abs(change) > _NOTICED or abs(rest) < _NOTICED:
+        return None
+    free = "To let the whole grow: Volumes, Whole, goal Free"
+    return f"The rest has changed by {signed(100.0 * rest, 0)} %: the whole is kept. {free}"
+
+
+def setting_volume(
+    name: str, goal: str | None, *, join: bool = False, then: Then = lambda: None
+) -> Action:
+    """Return the action that sets the goal of a volume in the background, or with None has none.
+
+    With *join*, successive changes are one undo step.  *then* returns what to say.
+    """
 
     def change(controller: Controller) -> None:
-        session, before = controller.session, controller.session.state
-        goals: dict[str, str | float] = dict(before.options.volumes)
+        session, state = controller.session, controller.session.state
+        goals: dict[str, str | float] = dict(state.options.volumes)
         if goals.get(name) == goal:
             return
-        goals[name] = goal
-        label = f"set the volume of {volume_label(session.state.region_names, name)}"
+        goals = {each: own for each, own in goals.items() if each != name}
+        if goal is not None:
+            goals[name] = goal
 
-        def finish(*, joins: bool = join) -> None:
-            session.set_volume(name, goal, max_steps=STEPS)
-            session.commit(label, join=joins)
+        def work(progress: Progress) -> State:
+            first, last = part(progress, 0.0, 0.5), part(progress, 0.5, 1.0)
+            after = separating.with_goals(session.poses, state, goals, first)
+            return solving.settled(session.poses, after, last)
+
+        def finish() -> str | None:
+            session.refine(max_steps=STEPS)  # and with it, whether it has settled is known
             _settle(controller)
+            return then()
 
-        if separating.separated_by(session.poses, before, goals) is not None:
-            work = partial(separating.apart, session.poses, before, goals)
-            _start_step(controller, "Fitting cages", work, label, partial(finish, joins=True))
-        else:
-            finish()
+        label = volume_label(state.region_names, name)
+        step = f"{'forget' if goal is None else 'set'} the volume of {label}"
+        _start_step(controller, f"Volume of {label}", work, step, finish, join=join)
 
     return change
-
-
-def forgetting_volume(name: str) -> Action:
-    """Return the action that lets a volume have no goal of its own."""
-
-    def forget(controller: Controller) -> None:
-        controller.session.forget_volume(name)
-        controller.session.refine(max_steps=STEPS)
-        _settle(controller)
-
-    return forget
 
 
 def _settle(controller: Controller) -> None:
@@ -494,7 +531,7 @@ def _checked_part(controller: Controller, part: str | None) -> str:
     if not session.is_bound:
         raise SessionError("The mesh is not ready yet. Wait until it is prepared")
     if part is None:
-        raise ConstraintError("Pull the surface first, or select a handle")
+        raise ConstraintError("Point at a part of the surface, or select a handle")
     if part not in session.deformer.volume_names:
         raise ConstraintError(
             f"{volume_label(session.state.region_names, part)} encloses no volume"
@@ -617,25 +654,18 @@ def locking(body: BoolArray, name: str, *, locked: bool) -> Action:
         if locked:
             fixed = np.union1d(state.fixed, np.setdiff1d(ids, state.handle))
 
-        def show() -> str:
-            for handle, vertices in session.handles.items():
-                if own[vertices].all():
-                    controller.widgets.dragger.set_locked(handle, locked)
-            return f"{name} is {'locked' if locked else 'unlocked'}"
-
         work = partial(separating.with_fixed, session.poses, state, fixed)
+        outcome = f"{name} is {'locked' if locked else 'unlocked'}"
         verb = "lock" if locked else "unlock"
         label = f"{verb} {name[:1].lower()}{name[1:]}"
-        _start_step(controller, f"{_sentence(verb)}ing {name}", work, label, show)
+        _start_step(controller, f"{_sentence(verb)}ing {name}", work, label, lambda: outcome)
 
     return lock
 
 
 def is_locked(session: Session, body: BoolArray) -> bool:
-    """Return whether all vertices of a *body* are fixed, but for those in handles."""
-    fixed, free = session.fixed, body.copy()
-    free[fixed] = free[session.state.handle] = False
-    return not free.any() and bool(body[fixed].any())
+    """Return whether all vertices of a *body*, a mask (n,), are fixed, but for those in handles."""
+    return bool(locked_components(session)[session.mesh.components[body]].all())
 
 
 def _body_under_pointer(controller: Controller, verb: str) -> tuple[BoolArray, str]:
@@ -677,7 +707,7 @@ def copying_poses(path: Path) -> Action:
             names = session.saved_poses.add(after)
             return f"Copied {_count(len(names), 'pose')}. Select one in the list of poses"
 
-        controller.start(f"Copying poses of {path.name}", work, show)
+        controller.start("Copying poses", work, show)
 
     return copy
 
@@ -757,6 +787,16 @@ def loading_landmarks(path: Path, *, targets: bool) -> Action:
             controller.say(f"{what}; without a point or a target: {lacking[0]}{more}")
 
     return load
+
+
+def saving_landmarks(path: Path, *, targets: bool) -> Action:
+    """Return the action that writes the landmarks, at rest, or their targets, to a file."""
+
+    def save(controller: Controller) -> None:
+        controller.session.landmarks.write(path, targets=targets)
+        controller.say(f"Saved to {path}")
+
+    return save
 
 
 # Painting.

@@ -168,6 +168,7 @@ class WidgetSet:
             regions=mode is Mode.REGIONS,
             handles=mode in (Mode.PULL, Mode.HANDLES, Mode.DEFORM),
             hidden=self.dragger.hidden,
+            pulled=mode is not Mode.PULL,
             stiffness=mode is Mode.REGIONS and self.selector.paints is Paint.STIFFNESS,
         )
         self.outlines.show(

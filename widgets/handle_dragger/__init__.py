@@ -7,6 +7,7 @@ The files, in reading order:
     number_entry      a number typed during a drag
     live_solve        solving within the time of an event, refining between events
     handle_marks      the vertices of handles as dots
+    locked_bodies     which bodies do not move
     gizmo             the gizmo: arrows, squares, rings and a ball
     gizmo_shapes      the lines of its parts
     gizmo_solids      its parts as solids
@@ -18,6 +19,7 @@ from .gizmo_shapes import FREE, LIMB, TURN, Kind, Part
 from .handle_dragger import HandleDragger
 from .handle_motion import Grip, Motion, axes_along, next_constraint, step_of
 from .live_solve import STEPS, LiveSolve
+from .locked_bodies import locked_components
 from .number_entry import NumberEntry
 
 __all__ = [
@@ -35,6 +37,7 @@ __all__ = [
     "NumberEntry",
     "Part",
     "axes_along",
+    "locked_components",
     "next_constraint",
     "step_of",
 ]

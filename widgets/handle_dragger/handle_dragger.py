@@ -36,7 +36,7 @@ from scipy.spatial.transform import Rotation
 
 from vtk_segdeform.arrays import FloatArray, IntArray, is_number, is_whole
 from vtk_segdeform.checks import as_flag, require, shown
-from vtk_segdeform.errors import ArgumentError
+from vtk_segdeform.errors import ArgumentError, ConstraintError
 from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.session import Change, Session, pulls, require_handle
 from vtk_segdeform.solver import Solution
@@ -48,6 +48,7 @@ from .gizmo_shapes import FREE, LIMB, TURN, Kind, Part
 from .handle_marks import HandleMarks
 from .handle_motion import Grip, Motion, axes_along, next_constraint, step_of
 from .live_solve import LiveSolve
+from .locked_bodies import locked_components
 from .number_entry import NumberEntry
 
 _LEAST_FACTOR = 1e-3
@@ -123,8 +124,8 @@ class HandleDragger(Widget):
 
     @property
     def locked(self) -> frozenset[str]:
-        """The handles that are shown, but not dragged."""
-        return self._locked
+        """The handles that are shown, but not dragged: those on locked bodies as well."""
+        return self._locked | self._on_locked_bodies
 
     def set_hidden(self, name: str, hidden: bool) -> None:
         """Hide or show a handle."""
@@ -141,12 +142,27 @@ class HandleDragger(Widget):
         self._update_gizmo()
 
     def set_locked(self, name: str, locked: bool) -> None:
-        """Lock or unlock a handle."""
+        """Lock or unlock a handle.
+
+        Raises
+        ------
+        ConstraintError
+            If there is no such handle, or the one to be unlocked is on a locked body.
+        """
         require_handle(self.session.handles, name)
         self.finish()
         is_locked = as_flag(locked, "locked")
-        self._locked = self.locked | {name} if is_locked else self.locked - {name}
+        if name not in self._on_locked_bodies:
+            self._locked = self._locked | {name} if is_locked else self._locked - {name}
+        elif not is_locked:
+            raise ConstraintError(f"The body of {name} is locked. Unlock it in the list of bodies")
         self._update_gizmo()
+
+    @property
+    def _on_locked_bodies(self) -> frozenset[str]:
+        components, locked = self.session.mesh.components, locked_components(self.session)
+        handles = self.session.handles.items() if locked.any() else ()
+        return frozenset(name for name, ids in handles if locked[components[ids]].all())
 
     @property
     def local(self) -> bool:

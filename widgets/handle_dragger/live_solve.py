@@ -9,6 +9,7 @@ While targets move, pictures are drafts; see `Draft`.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 
 from vtk_segdeform.session import Session
@@ -21,6 +22,7 @@ STEPS = 8
 
 With 5, a pull has frames that are 1 % of the diagonal away from their poses, and takes as long."""
 _PERIOD = 40  # milliseconds between two refinements
+_LONGEST = 0.1  # seconds of the processor in one refinement, nearly: with contacts, of two steps
 
 
 class LiveSolve:
@@ -47,6 +49,7 @@ class LiveSolve:
         self._stop: Stop | None = None
         self._halted: Solution | None = None  # of the pose that is not to be refined
         self._draft = Draft.of(view)
+        self._steps = STEPS  # of the next refinement, at most
 
     @property
     def is_refining(self) -> bool:
@@ -110,9 +113,11 @@ class LiveSolve:
         self.resume()  # the pose may have changed since the last tick
         if self._stop is None:
             return
-        is_done = False
+        is_done, began = False, time.thread_time()
         try:
-            self._session.refine(max_steps=STEPS)
+            self._session.refine(max_steps=self._steps)
+            took = max(time.thread_time() - began, 1e-3)
+            self._steps = min(max(int(self._steps * _LONGEST / took), 1), STEPS)
             is_done = True
         finally:
             if not is_done:

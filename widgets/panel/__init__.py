@@ -6,7 +6,8 @@
     status(editor)                    the message, the next step, progress
     history(editor)                   the states by name
     press(editor, name, value)        use a control: one entry for every skin
-    use_file(editor, name, path)      the same of one that asks for a file
+    file_field(editor, name)          one that asks for a file
+    use_file(editor, name, path)      use it
 
 Qt and the web page draw these models and call `press`; nothing of a control is written twice.
 
@@ -37,7 +38,7 @@ from .fields import (
     tooltip,
 )
 from .menu import menu
-from .panel import all_sections, press, sections, use_file
+from .panel import all_sections, file_field, press, sections, use_file
 from .status import history, status
 from .toolbar import toolbar, view_entries
 
@@ -54,6 +55,7 @@ __all__ = [
     "Value",
     "Word",
     "all_sections",
+    "file_field",
     "history",
     "menu",
     "press",

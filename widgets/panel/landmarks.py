@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -13,7 +14,7 @@ from vtk_segdeform.pictures import COLOURS, rgb
 from vtk_segdeform.session import SessionLandmarks
 
 from ..editor import Action, Controller, DeformEditor, actions
-from .fields import Act, Cell, Column, Field, Row, Section, Table, as_rgb
+from .fields import Cell, Column, Field, Row, Section, Table, as_rgb
 
 _AXES = "xyz"
 _MOST_LISTED = 100  # rows
@@ -76,25 +77,27 @@ def landmarks_section(editor: DeformEditor) -> Section:
                     act=lambda on: lambda c: setattr(c.widgets.landmarks, "is_hidden", not on),
                 ),
             ),
-            (
-                _file("source", "Load ...", "Loads landmarks of this mesh", _loading),
-                _file("target", "Load targets ...", "Loads targets by name", _loading_targets),
+            _files(
+                Field(
+                    "landmarks.{}",
+                    "file",
+                    "Load{} ...",
+                    "Reads them from a file: {} by their names",
+                    suffixes=tuple(sorted(SessionLandmarks.SUFFIXES)),
+                ),
+                actions.loading_landmarks,
             ),
-            (
-                _file(
-                    "save_source",
-                    "Save ...",
-                    "Saves the landmarks, at rest, as .csv",
-                    lambda path: lambda c: _save(c, path, targets=False),
+            _files(
+                Field(
+                    "landmarks.save_{}",
+                    "file",
+                    "Save{} ...",
+                    "Writes {} as .csv",
                     visible=len(marks) > 0,
+                    suffixes=(".csv",),
+                    saves=True,
                 ),
-                _file(
-                    "save_target",
-                    "Save targets ...",
-                    "Saves the targets as .csv",
-                    lambda path: lambda c: _save(c, path, targets=True),
-                    visible=len(marks) > 0,
-                ),
+                actions.saving_landmarks,
             ),
             Field(
                 "landmarks.keep",
@@ -185,32 +188,23 @@ def _decimals(size: float) -> int:
     return int(np.clip(np.ceil(3.0 - np.log10(size)), 0, 12))
 
 
-def _file(name: str, label: str, tip: str, act: Act, *, visible: bool = True) -> Field:
-    saves = name.startswith("save")
-    suffixes = (".csv",) if saves else tuple(sorted(SessionLandmarks.SUFFIXES))
-    return Field(
-        f"landmarks.{name}",
-        "file",
-        label,
-        tip,
-        visible=visible,
-        suffixes=suffixes,
-        saves=saves,
-        act=act,
+def _files(field: Field, action: Callable[..., Action]) -> tuple[Field, Field]:
+    """Return *field* for the landmarks, and for their targets, with *action* for the path."""
+    own = replace(
+        field,
+        name=field.name.format("source"),
+        label=field.label.format(""),
+        tip=field.tip.format("landmarks, at rest,"),
+        act=partial(action, targets=False),
     )
-
-
-def _loading(path: Path) -> Action:
-    return actions.loading_landmarks(path, targets=False)
-
-
-def _loading_targets(path: Path) -> Action:
-    return actions.loading_landmarks(path, targets=True)
-
-
-def _save(controller: Controller, path: Path, *, targets: bool) -> None:
-    controller.session.landmarks.write(path, targets=targets)
-    controller.say(f"Saved to {path}")
+    targets = replace(
+        field,
+        name=field.name.format("target"),
+        label=field.label.format(" targets"),
+        tip=field.tip.format("targets"),
+        act=partial(action, targets=True),
+    )
+    return own, targets
 
 
 def _choosing(name: str) -> Action:

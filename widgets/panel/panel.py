@@ -125,8 +125,10 @@ def press(editor: DeformEditor, name: str, value: Any = None) -> Exception | Non
     raise ArgumentError(f"name: there is no control {shown(name)} in the panel")
 
 
-def use_file(editor: DeformEditor, name: str, path: Path) -> Exception | None:
-    """Use a control of the kind "file" of a section with the file that the skin has asked for.
+def file_field(editor: DeformEditor, name: str) -> Field:
+    """Return a control of the kind "file" of a section, disabled where it is not shown.
+
+    Not during a job, which owns the session.
 
     Raises
     ------
@@ -136,9 +138,16 @@ def use_file(editor: DeformEditor, name: str, path: Path) -> Exception | None:
     for section in _one_by_one(editor):
         for field in section.fields:
             if field.name == name and field.kind == "file" and field.act is not None:
-                works = section.visible and field.visible and field.enabled
-                return editor.do(field.act(path)) if works else None
+                is_shown = section.visible and field.visible
+                return field if is_shown else replace(field, enabled=False)
     raise ArgumentError(f"name: there is no control {shown(name)} that asks for a file")
+
+
+def use_file(editor: DeformEditor, name: str, path: Path) -> Exception | None:
+    """Use the control `file_field` with the file that the skin has asked for."""
+    field = file_field(editor, name)
+    assert field.act is not None
+    return editor.do(field.act(path)) if field.enabled else None
 
 
 def checked(field: Field, value: Any) -> Any:

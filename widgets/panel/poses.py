@@ -62,6 +62,7 @@ def poses_section(editor: DeformEditor) -> Section:
                     "Save pose",
                     "Keeps the current pose by a name, in the session file as well",
                     enabled=session.is_bound,
+                    visible=bool(saved) or pose is not None,
                     act=lambda _: actions.once_settled(actions.save_pose),
                 ),
                 Field(
@@ -72,6 +73,14 @@ def poses_section(editor: DeformEditor) -> Section:
                     enabled=chosen is not None,
                     visible=bool(saved),
                     act=lambda _: lambda c: c.session.saved_poses.remove(str(chosen)),
+                ),
+                Field(
+                    "poses.copy",
+                    "file",
+                    "Copy poses ...",
+                    "Takes the poses of a session of a mesh with the same faces",
+                    suffixes=(".segdeform",),
+                    act=actions.copying_poses,
                 ),
             ),
             Field(
@@ -108,7 +117,6 @@ def poses_section(editor: DeformEditor) -> Section:
                 act=lambda share: _blending(first, second, share),
             ),
         ),
-        visible=bool(saved) or pose is not None,
     )
 
 

@@ -50,7 +50,6 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
                     value=controller.displacement is not None,
                     act=lambda on: actions.saving_displacement("displacement" if on else None),
                 ),
-                Field("poses.copy", "file", "Copy poses of a session ..."),
             ),
         ),
         _step("undo", controller.history.undo_label, is_free=is_free),
@@ -70,13 +69,15 @@ def toolbar(editor: DeformEditor) -> tuple[Field, ...]:
         for mode in Mode
     ]
     has_part = is_free and editor.mode in (Mode.PULL, Mode.DEFORM) and editor.session.is_bound
+    part = editor.widgets.part if has_part else None
     others = [
         key_button(
             keys,
             "keep_part",
             "keep_part",
             "Keep part",
-            enabled=has_part and editor.widgets.part is not None,
+            enabled=part is not None,
+            act=lambda _: actions.keeping(part),
         ),
         Field(
             "compare",

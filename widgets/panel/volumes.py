@@ -19,7 +19,6 @@ from ..volume_overlay import brief, in_tenths, percent
 from .fields import Cell, Column, Field, Row, Section, Table, as_rgb, key_button, option
 
 _LEAST, _MOST = -80.0, 200.0  # per cent, of the slider
-_LIVE = 20_000  # vertices up to which a volume follows the slider; of more, when it is released
 _DEFAULT, _KEEP, _FREE, _SET = "default", "keep", "free", "set"
 _GOALS = (("As by default", _DEFAULT), ("Kept", _KEEP), ("Free", _FREE), ("Set", _SET))
 _OTHERS = ("area", "centroid x", "centroid y", "centroid z")  # of the whole
@@ -81,7 +80,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                 minimum=_LEAST,
                 maximum=_MOST,
                 unit="%",
-                on_release=session.mesh.n_vertices > _LIVE,
+                on_release=True,
                 act=lambda share: actions.setting_volume(name, f"{share:+g}%", join=True),
             ),
             Field(
@@ -103,7 +102,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                     "keep_part",
                     value=has_part and editor.widgets.keeps(part),
                     enabled=has_part,
-                    act=lambda _: actions.keep_part,
+                    act=lambda _: actions.keeping(part),
                 ),
                 key_button(
                     editor.keys,
@@ -111,6 +110,7 @@ def volumes_section(editor: DeformEditor) -> Section:
                     "grow_part",
                     "Enlarge by 20 %",
                     enabled=has_part,
+                    act=lambda _: actions.growing(part),
                 ),
             ),
             Field(
@@ -264,6 +264,5 @@ def _choosing(name: str) -> Action:
 
 
 def _with_goal(name: str, kind: str, change: float) -> Action:
-    if kind == _DEFAULT:
-        return actions.forgetting_volume(name)
-    return actions.setting_volume(name, f"{100.0 * change:+.6g}%" if kind == _SET else kind)
+    goal = f"{100.0 * change:+.6g}%" if kind == _SET else kind
+    return actions.setting_volume(name, None if kind == _DEFAULT else goal)

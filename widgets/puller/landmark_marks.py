@@ -17,13 +17,11 @@ from vtk_segdeform.session import Session, SurfacePoint
 
 from ..picking import Picker
 from ..scene import Gesture, Phase, Pointer, SurfaceDisplay, Widget, Wireframe
-from .markers import Dots
+from .markers import THROUGH, Dots, RimmedDots, nearest_seen
 
 BLUE = COLOURS[5]
 _HIGHLIGHT = COLOURS[4]
-_SIZE, _RIM, _LINE = 9.0, 4.0, 2.0  # pixels: dots, both sides of their rims together, lines
-_THROUGH = 0.25  # opacity of what the body hides
-_REACH = 10.0  # pixels from the pointer
+_SIZE, _LINE = 9.0, 2.0  # pixels: dots without their rims, and lines
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less places a landmark that stays
 
 
@@ -45,13 +43,8 @@ class LandmarkMarks(Widget):
         self._picker = Picker(surface)
         self._adds, self._is_hidden = False, False
         self._chosen = self._hovered = ""
-        front, behind = self.view.renderer, self.view.foreground
-        self._dots = {
-            (what, part): Dots(behind if part == "through" else front)
-            for part in ("rim", "fill", "through")
-            for what in ("source", "target")
-        }
-        self._bright = Dots(front)
+        self._sources, self._targets = RimmedDots(self.view), RimmedDots(self.view)
+        self._bright = Dots(self.view.renderer)
         self._lines: tuple[Wireframe, ...] = ()
         self._n_ends = 0  # of the lines
         self._stops_showing = [
@@ -104,7 +97,7 @@ class LandmarkMarks(Widget):
         self.Off()
         for stop in self._stops_showing:
             stop()
-        for dots in (*self._dots.values(), self._bright):
+        for dots in (self._sources, self._targets, self._bright):
             dots.remove()
         self._draw_lines(np.empty((0, 3)))
 
@@ -142,15 +135,8 @@ class LandmarkMarks(Widget):
         marks = self.session.state.landmarks
         if self._is_hidden or not marks.names:
             return ""
-        targets = marks.target
-        away = np.linalg.norm(self.view.to_display(targets)[:, :2] - pointer.position, axis=1)
-        away[np.isnan(away)] = np.inf
-        for k in np.argsort(away):
-            if not away[k] <= _REACH * self.view.scale:
-                break
-            if self._picker.sees(targets[k], within=_REACH * self.view.pixel_at(targets[k])):
-                return marks.names[int(k)]
-        return ""
+        nearest = nearest_seen(self.view, self._picker, pointer, marks.target)
+        return "" if nearest is None else marks.names[nearest]
 
     def _drag(
         self, name: str, press: Pointer, target: FloatArray, *, place: SurfacePoint | None = None
@@ -190,8 +176,9 @@ class LandmarkMarks(Widget):
         names = tuple(self.session.landmarks) if is_shown else ()
         source = self.session.landmarks.places if names else nothing
         target = self.session.state.landmarks.target if names else nothing
-        for what, places in (("source", source), ("target", target)):
-            self._draw_dots(what, places[np.isfinite(places).all(axis=1)])
+        sources, targets = (each[np.isfinite(each).all(axis=1)] for each in (source, target))
+        self._sources.draw(sources, _SIZE, rim=PAPER, fill=BLUE, through=BLUE)
+        self._targets.draw(targets, _SIZE, rim=BLUE, fill=PAPER, through=BLUE)
         complete = np.isfinite(source + target).all(axis=1)
         self._draw_lines(np.stack([source, target], axis=1)[complete].reshape(-1, 3))
         name = self._hovered or self._chosen
@@ -200,17 +187,6 @@ class LandmarkMarks(Widget):
         scale = self.view.scale
         lifted = self.view.lifted(bright, 2.0 * scale * _SIZE) if len(bright) else bright
         self._bright.draw(lifted, _HIGHLIGHT, scale * _SIZE)
-
-    def _draw_dots(self, what: str, places: FloatArray) -> None:
-        scale, colours = self.view.scale, (PAPER, BLUE) if what == "source" else (BLUE, PAPER)
-        rim = scale * (_SIZE + _RIM)
-        for part, lift, width, colour, opacity in (
-            ("rim", rim, rim, colours[0], 1.0),
-            ("fill", 1.2 * rim, scale * _SIZE, colours[1], 1.0),
-            ("through", 0.0, scale * _SIZE, BLUE, _THROUGH),
-        ):
-            lifted = self.view.lifted(places, lift) if len(places) else places
-            self._dots[what, part].draw(lifted, colour, width, opacity)
 
     def _draw_lines(self, ends: FloatArray) -> None:
         """Draw lines between each two of *ends* (2 k, 3): before the body, and faintly through."""
@@ -224,7 +200,7 @@ class LandmarkMarks(Widget):
             self._lines = tuple(Wireframe(ends, edges, edges[:0, 0]) for _ in layers)
             for renderer, line in zip(layers, self._lines, strict=True):
                 renderer.AddActor(line.actor)
-        for line, opacity in zip(self._lines, (1.0, _THROUGH), strict=False):
+        for line, opacity in zip(self._lines, (1.0, THROUGH), strict=False):
             line.move(ends)
             line.set_style(rgb(BLUE), line_width=_LINE * self.view.scale, sphere_size=1.0)
             line.actor.GetProperty().SetOpacity(opacity)

@@ -6,6 +6,7 @@ Dots that the body hides are drawn faintly through it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,11 @@ from vtk_segdeform.pictures import COLOURS, PAPER, rgb
 from vtk_segdeform.session import Session, pulls
 
 from ..picking import Picker
-from ..scene import Pointer, SurfaceDisplay, cells_of, points_of
+from ..scene import Pointer, SurfaceDisplay, View, cells_of, points_of
 
 _BLACK, _HIGHLIGHT = "#101010", COLOURS[4]
-_PIN, _PULLED, _RIM = 11.0, 7.0, 4.0  # pixels: the dots, and both sides of the rim together
-_THROUGH = 0.25  # opacity of dots that the body hides
+_PIN, _PULLED, RIM = 11.0, 7.0, 4.0  # pixels: the dots, and both sides of the rim together
+THROUGH = 0.25  # opacity of dots that the body hides
 _REACH = 10.0  # pixels from the pointer
 
 
@@ -46,13 +47,8 @@ class Markers:
         self._vertices: dict[str, int] = {}
         self._highlighted: str | None = None
         self._is_shown = False
-        front, behind = self._view.renderer, self._view.foreground
-        self._dots = {
-            (is_pin, part): Dots(behind if part == "through" else front)
-            for part in ("rim", "fill", "through")
-            for is_pin in (True, False)
-        }
-        self._bright = Dots(front)
+        self._pins, self._pulled = RimmedDots(self._view), RimmedDots(self._view)
+        self._bright = Dots(self._view.renderer)
         self._stop = self._view.before_render(self._lay_out)
 
     def show(self, shown: bool) -> None:
@@ -72,16 +68,10 @@ class Markers:
         shown = self._shown
         if not shown:
             return None
-        places = self._surface.points[list(shown.values())]
-        away = np.linalg.norm(self._view.to_display(places)[:, :2] - pointer.position, axis=1)
-        names = list(shown)
-        for k in np.argsort(away):
-            if not away[k] <= _REACH * self._view.scale:
-                break
-            place = places[k]
-            if self._picker.sees(place, within=_REACH * self._view.pixel_at(place)):
-                return names[int(k)]
-        return None
+        nearest = nearest_seen(
+            self._view, self._picker, pointer, self._surface.points[list(shown.values())]
+        )
+        return None if nearest is None else list(shown)[nearest]
 
     def reaches(self, rectangle: tuple[float, float, float, float]) -> bool:
         """Return whether a marker is in a *rectangle*: left, bottom, right, top in the window."""
@@ -99,7 +89,7 @@ class Markers:
     def remove(self) -> None:
         """Remove the dots from the view permanently."""
         self._stop()
-        for dots in (*self._dots.values(), self._bright):
+        for dots in (self._pins, self._pulled, self._bright):
             dots.remove()
 
     @property
@@ -114,17 +104,10 @@ class Markers:
     def _lay_out(self) -> None:
         """Place the dots in front of the surface, as seen from the camera."""
         scale, pulls, shown = self._view.scale, self._surface.session.state.pulls, self._shown
-        for is_pin, size in ((True, _PIN), (False, _PULLED)):
+        for dots, is_pin, size in ((self._pins, True, _PIN), (self._pulled, False, _PULLED)):
             ids = [v for name, v in shown.items() if (name in pulls) is not is_pin]
             places = self._surface.points[np.array(ids, dtype=np.int64)]
-            rim = scale * (size + _RIM)
-            for part, lift, width, colour, opacity in (
-                ("rim", rim, rim, PAPER, 1.0),
-                ("fill", 1.2 * rim, scale * size, _BLACK, 1.0),
-                ("through", 0.0, scale * size, _BLACK, _THROUGH),
-            ):
-                lifted = self._view.lifted(places, lift) if ids else places
-                self._dots[is_pin, part].draw(lifted, colour, width, opacity)
+            dots.draw(places, size, rim=PAPER, fill=_BLACK, through=_BLACK)
         place, size = np.empty((0, 3)), _PULLED if self._highlighted in pulls else _PIN
         if self._highlighted is not None:
             vertex = self._surface.points[[self._vertices[self._highlighted]]]
@@ -139,6 +122,44 @@ def marked_vertices(session: Session) -> dict[str, int]:
         if len(ids) == 1 or name in session.state.pulls:
             found[name] = pulls.middle_vertex(session.mesh, ids)
     return found
+
+
+def nearest_seen(view: View, picker: Picker, pointer: Pointer, places: FloatArray) -> int | None:
+    """Return which of *places* (k, 3) is nearest to *pointer*, near it and visible; or None."""
+    away = np.linalg.norm(view.to_display(places)[:, :2] - pointer.position, axis=1)
+    away[np.isnan(away)] = np.inf
+    for k in np.argsort(away):
+        if not away[k] <= _REACH * view.scale:
+            break
+        if picker.sees(places[k], within=_REACH * view.pixel_at(places[k])):
+            return int(k)
+    return None
+
+
+class RimmedDots:
+    """Dots with a rim in front of the surface, drawn faintly where the body hides them."""
+
+    def __init__(self, view: View) -> None:
+        self._view = view
+        self._rim, self._fill = Dots(view.renderer), Dots(view.renderer)
+        self._through = Dots(view.foreground)
+
+    def draw(self, places: FloatArray, size: float, *, rim: str, fill: str, through: str) -> None:
+        """Show dots of *size* pixels of 96 an inch at *places* (k, 3), in these colours."""
+        scale, lifted = self._view.scale, partial(_lifted, self._view, places)
+        wide = scale * (size + RIM)
+        self._rim.draw(lifted(wide), rim, wide)
+        self._fill.draw(lifted(1.2 * wide), fill, scale * size)
+        self._through.draw(places, through, scale * size, THROUGH)
+
+    def remove(self) -> None:
+        """Remove them from the view permanently."""
+        for dots in (self._rim, self._fill, self._through):
+            dots.remove()
+
+
+def _lifted(view: View, places: FloatArray, pixels: float) -> FloatArray:
+    return view.lifted(places, pixels) if len(places) else places
 
 
 class Dots:

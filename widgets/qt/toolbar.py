@@ -50,7 +50,6 @@ class Toolbar(QtWidgets.QWidget):
             "save.session": self.save_session,
             "save.session_as": self.ask_and_save,
             "save.mesh_as": self.ask_and_export,
-            "poses.copy": self.ask_and_copy_poses,
         }
         self._modes = QtWidgets.QButtonGroup(self)
         self._toggles: dict[str, Any] = {}  # entries of menus, by name
@@ -175,14 +174,6 @@ class Toolbar(QtWidgets.QWidget):
         )
         if path and self.may_discard():
             self._editor.do(actions.opening(Path(path)))
-
-    def ask_and_copy_poses(self) -> None:
-        """Ask for a session of a mesh with the same faces, and copy its poses."""
-        path, _ = QtWidgets.QFileDialog.getOpenFileName(
-            self, "Copy poses of a session", str(self._editor.path.parent), _SESSIONS
-        )
-        if path:
-            self._editor.do(actions.copying_poses(Path(path)))
 
     def may_discard(self) -> bool:
         """Return whether the session may be closed; ask if it has unsaved changes."""

@@ -29,9 +29,8 @@ class RegionColours:
     def __init__(self, surface: SurfaceDisplay) -> None:
         self._surface = surface
         self._session = surface.session
-        self._shown = self._fills_regions = self._marks_handles = True
-        self._shows_stiffness = False
-        self._hidden: frozenset[str] = frozenset()
+        self._shown = True
+        self._filled = True, True, frozenset[str](), True, False  # see `fill`
         self._preview: tuple[BoolArray, NDArray[np.uint8]] | None = None
         self._base = self._base_colours()
         self._stop = self._session.on_change(self._changed)
@@ -58,16 +57,17 @@ class RegionColours:
         regions: bool,
         handles: bool,
         hidden: frozenset[str] = frozenset(),
+        pulled: bool = True,
         stiffness: bool = False,
     ) -> None:
         """Choose whether regions, and handles except *hidden* ones, are coloured.
 
-        Fixed vertices always are, unless *stiffness* is shown instead of all.
+        Handles that pulls have made, such as a turned limb, only if *pulled*.  Fixed vertices
+        always are, unless *stiffness* is shown instead of all.
         """
-        before = self._fills_regions, self._marks_handles, self._hidden, self._shows_stiffness
-        if (regions, handles, hidden, stiffness) != before:
-            self._fills_regions, self._marks_handles, self._hidden = regions, handles, hidden
-            self._shows_stiffness = stiffness
+        filled = regions, handles, hidden, pulled, stiffness
+        if filled != self._filled:
+            self._filled = filled
             self._base = self._base_colours()
             self._draw()
 
@@ -99,11 +99,12 @@ class RegionColours:
     def _base_colours(self) -> NDArray[np.uint8]:
         """Return the (n, 3) colours without the preview."""
         session, regions = self._session, self._session.regions
-        if self._shows_stiffness:
+        fills_regions, marks_handles, hidden, marks_pulled, shows_stiffness = self._filled
+        if shows_stiffness:
             stiffness = session.state.stiffness
             given = np.ones(session.mesh.n_vertices) if stiffness is None else stiffness
             return stiffness_colours(given)
-        if regions is None or not self._fills_regions:
+        if regions is None or not fills_regions:
             colours = np.tile(rgb(BODY).astype(np.uint8), (session.mesh.n_vertices, 1))
         else:
             palette = [of_region(r) for r in range(regions.n_regions)]
@@ -111,9 +112,10 @@ class RegionColours:
             mixed = (belongs / belongs.sum(axis=0)).T @ np.array(palette, dtype=float)
             colours = np.rint(mixed).astype(np.uint8)
         colours[session.fixed] = rgb(FIXED)
-        if self._marks_handles:
+        if marks_handles:
+            unmarked = hidden if marks_pulled else hidden.union(session.state.pulls)
             for name, vertices in session.handles.items():
-                if name not in self._hidden:
+                if name not in unmarked:
                     colours[vertices] = handle_colour(session, name)
         return colours
 

@@ -1,7 +1,9 @@
 """Files of a page: uploads that the editor opens, and downloads of what it edits.
 
-    POST upload?name=NAME      the body is a mesh or a session
-    GET  download/SUFFIX       the session, or the surface in its pose
+    POST upload?name=NAME&field=FIELD    the body is for a control of the panel that asks for a
+                                         file; without FIELD a mesh or a session to open
+    GET  download/SUFFIX?field=FIELD     what such a control saves; without FIELD the session, or
+                                         the surface in its pose
     POST paraview/             null: trame's page asks for a launcher first, and there is none
 
 The first two need the header ``X-Segdeform``, which a page of another origin cannot send.  A page
@@ -22,13 +24,14 @@ from typing import Any
 from aiohttp import web
 from aiohttp.http import HttpProcessingError
 
-from vtk_segdeform.errors import SegDeformError, SessionError
+from vtk_segdeform.errors import ArgumentError, SegDeformError, SessionError
 from vtk_segdeform.files import replacing
 from vtk_segdeform.io import is_mesh_file, writable_suffixes
 from vtk_segdeform.kernels import quick_turns
 from vtk_segdeform.session import save_session
 
 from ..editor import DeformEditor, WrittenMesh, opening, write_posed
+from ..panel import file_field, use_file
 
 _SESSION = ".segdeform"
 _HEADER = "X-Segdeform"
@@ -96,7 +99,8 @@ class Transfer:
         suffix = Path(name).suffix.lower()
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may upload files.")
-        if suffix != _SESSION and not is_mesh_file(f"mesh{suffix}"):
+        field = request.query.get("field", "")
+        if not field and suffix != _SESSION and not is_mesh_file(f"mesh{suffix}"):
             return _refusal(415, f"{name or 'This file'} is no mesh or session that can be opened.")
         if (request.content_length or 0) > self.limit:
             return self._too_large(name)
@@ -110,8 +114,13 @@ class Transfer:
             if not await self._store(request, place):
                 return self._too_large(name)
             self._names.update(dict.fromkeys(map(str, (place, place.with_suffix(_SESSION))), name))
-            error = self._editor.do(opening(place))
+            if field:
+                error = use_file(self._editor, field, place)
+            else:
+                error = self._editor.do(opening(place))
             is_open = error is None
+        except ArgumentError as fault:
+            return _refusal(404, str(fault))
         except asyncio.TimeoutError:
             return _refusal(408, "The upload stopped. Try it again.")
         except (web.RequestPayloadError, HttpProcessingError):
@@ -121,7 +130,9 @@ class Transfer:
         finally:
             self._is_uploading = False
             self._remove_folders(all_but=folder if is_open else None)
-        return web.Response() if error is None else _refusal(409, str(error))
+        return (
+            web.Response() if error is None else _refusal(409, str(error).replace(str(place), name))
+        )
 
     async def _store(self, request: web.Request, place: Path) -> bool:
         """Write the body to *place*; return False if it is larger than the limit."""
@@ -139,14 +150,15 @@ class Transfer:
         suffix = f".{request.match_info['suffix']}"
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may download files.")
-        if suffix != _SESSION and suffix not in writable_suffixes():
+        field = request.query.get("field", "")
+        if suffix not in ((".csv",) if field else (_SESSION, *writable_suffixes())):
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:
             await asyncio.sleep(_POLL)
         place = self._new_folder() / f"download{suffix}"
         self._downloads.add(place.parent)
         try:
-            written = self._write(place)
+            written = self._write(place, field)
             data = place.read_bytes()
             if written is not None:
                 self._tell(await asyncio.to_thread(quick_turns()(written.loss)), *written.remarks)
@@ -168,12 +180,20 @@ class Transfer:
         if text := ". ".join(filter(None, remarks)):
             self._editor.controller.say(text)
 
-    def _write(self, place: Path) -> WrittenMesh | None:
-        """Write the session, or the surface in its pose, which is returned."""
+    def _write(self, place: Path, field: str) -> WrittenMesh | None:
+        """Write what *field* saves, the session, or the surface in its pose, which is returned."""
         editor, session = self._editor, self._editor.session
         if editor.is_busy or session.is_dragging:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
+        if field:
+            if not file_field(editor, field).saves:
+                raise SessionError("This control saves nothing.")
+            error = use_file(editor, field, place)
+            if error or not place.exists():
+                raise SessionError(str(error or "There is nothing to save."))
+            editor.controller.say("Downloaded")  # instead of the place
+            return None
         if place.suffix != _SESSION:
             return write_posed(session, place, displacement=editor.controller.displacement)
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))

@@ -257,7 +257,7 @@ def test_recent_files_are_listed_once_behind_an_error(start, ball_file, tmp_path
 
 @BLANK
 def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
-    start, ball_file, tmp_path, monkeypatch
+    start, ball_file, tmp_path, monkeypatch, boxes
 ):
     hand = start(ball_file)
     change(hand)
@@ -271,6 +271,11 @@ def test_the_title_has_a_star_exactly_while_changes_are_unsaved(
     hand.choose("Edit", "Redo set knob")
     hand.settle()
     assert hand.title == "ball.vtp* - segdeform"
+    choose_file(monkeypatch, tmp_path / "knob.ply")
+    boxes.answers.append("OK")
+    hand.choose("File", "Save session as")
+    assert "knob.ply is the name of a mesh. Choose Save mesh as" in boxes.seen[-1]
+    assert not (tmp_path / "knob.ply").exists()
     choose_file(monkeypatch, tmp_path / "knob")
     hand.choose("File", "Save session as")
     hand.settle()

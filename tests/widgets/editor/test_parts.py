@@ -16,7 +16,6 @@ from vtk_segdeform.mesh import Mesh
 from vtk_segdeform.session import Session
 from vtk_segdeform.solver.volume_constraints import volumes_by_label
 from vtk_segdeform.widgets.editor.editor import DeformEditor
-from vtk_segdeform.widgets.editor.queue import Kind
 from vtk_segdeform.widgets.editor.widget_set import Mode
 from vtk_segdeform.widgets.panel.panel import press, sections
 from vtk_segdeform.widgets.panel.status import status
@@ -107,6 +106,7 @@ def test_a_part_is_kept_by_a_key_through_later_pulls_and_set_free_again(bench):
     before, change = bench.session.vertices, bench.change()
     assert abs(change) > 0.02
     bench.hand.types("shift+p")
+    bench.editor.wait()
     bench.settle()
     assert abs(bench.change()) < EXACT
     assert bench.editor.status.startswith("Volume of arm kept")
@@ -116,6 +116,7 @@ def test_a_part_is_kept_by_a_key_through_later_pulls_and_set_free_again(bench):
     assert abs(bench.change()) < EXACT
     bench.session.undo()
     bench.hand.types("shift+p")
+    bench.editor.wait()
     bench.settle()
     assert bench.session.options.volumes == ()
     assert not bench.field("keep_part").value
@@ -130,16 +131,40 @@ def test_a_part_grows_by_a_fifth_of_its_volume_at_rest_at_each_press(bench):
     assert change < -0.02
     for count in (1, 2):
         bench.hand.types("e")
+        bench.editor.wait()
         assert_allclose(bench.change(), change + 0.2 * count, atol=EXACT)
         assert abs(bench.session.volume_change) < EXACT
     assert bench.session.history.labels[steps:] == ("set the volume of arm",) * 2
     bench.hand.types("ctrl+z")
     assert_allclose(bench.change(), change + 0.2, atol=EXACT)
     assert press(bench.editor, "volumes.grow_part") is None
+    bench.editor.wait()
     assert_allclose(bench.change(), change + 0.4, atol=EXACT)
     for expected in ((), (("region 1", "keep"),)):
         assert press(bench.editor, "keep_part") is None  # in the toolbar
+        bench.editor.wait()
         assert bench.session.options.volumes == expected
+
+
+def test_the_part_under_the_pointer_grows_and_the_line_tells_what_the_rest_loses(bench):
+    front = SCENE.mesh.vertices[:, 1] < 0.0
+    away = np.linalg.norm(SCENE.mesh.vertices[:, ::2] - [-1.8, 0.0], axis=1)
+    bench.pull()  # of the arm
+    bench.hand.move(
+        np.round(bench.hand.at(bench.session.vertices[np.where(front, away, 9.0).argmin()]))
+    )
+    bench.hand.types("e")
+    bench.editor.wait()
+    assert bench.session.history.undo_label == "set the volume of region 1"
+    assert_allclose(
+        bench.session.volume("region 0")[1], round(bench.session.volume("region 0")[1], 2)
+    )
+    told = re.search(r"The rest has changed by (-\d+) %", bench.editor.status)
+    assert int(told[1]) == round(100.0 * bench.change())
+    press(bench.editor, "volumes.name", "whole")
+    press(bench.editor, "volumes.goal", "free")
+    bench.editor.wait()
+    assert abs(bench.change()) < 0.05 < bench.session.volume_change
 
 
 def test_with_volumes_kept_per_region_the_key_sets_the_part_free(bench):
@@ -148,6 +173,7 @@ def test_with_volumes_kept_per_region_the_key_sets_the_part_free(bench):
     assert abs(bench.change()) < EXACT
     assert bench.field("keep_part").value
     press(bench.editor, "volumes.keep_part", False)
+    bench.editor.wait()
     assert bench.editor.status.startswith("Volume of arm free")
     bench.pull(2.2)
     assert abs(bench.change()) > 0.02
@@ -157,7 +183,7 @@ def test_without_a_part_under_the_hand_nothing_changes_and_the_line_says_why(ben
     state = bench.session.state
     for key in ("shift+p", "e"):
         bench.hand.types(key)
-        assert "Pull the surface first" in bench.editor.status
+        assert "Point at a part of the surface" in bench.editor.status
         bench.hand.failures.pop()
     assert not {f.name: f for f in toolbar(bench.editor)}["keep_part"].enabled
     assert not bench.field("keep_part").enabled
@@ -192,12 +218,10 @@ def test_the_slider_of_a_cavity_fits_cages_in_the_background_and_is_one_step():
     draw_seldom(editor.view)
     editor.On()
     press(editor, "volumes.name", "cavity")
-    press(editor, "volumes.change", -10)
-    assert editor.is_busy
-    editor.controller.queue.wait(Kind.JOB)
-    for share in (-15, -20):
+    for share in (-10, -15, -20):
         press(editor, "volumes.change", share)
-        assert not editor.is_busy
+        assert editor.is_busy
+        editor.wait()
     assert session.history.labels[-2:] == ("fit cages", "set the volume of cavity")
     assert session.volume("cavity")[1] == pytest.approx(-0.2, abs=EXACT)
     assert not len(session.solution.crossings())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -755,6 +756,24 @@ def test_a_pose_that_must_be_bound_first_is_not_refined(bench):
     bench.hand.tick(60)
     assert bench.session.solution.status is Status.CONVERGED
     assert bench.session.state.pose is not pose
+
+
+@pytest.mark.usefixtures("roughly")
+def test_slow_steps_are_taken_one_by_one_so_that_the_window_answers_in_between(bench, monkeypatch):
+    place, session, took = bench.aim(FREE), bench.session, [0.0]
+    bench.hand.drag([place, place + [-40.0, 60.0]])
+    clock = SimpleNamespace(thread_time=lambda: sum(took))
+    monkeypatch.setattr(live_solve, "time", clock)
+    monkeypatch.setattr(live_solve, "STEPS", 8)
+    seconds, counts = iter([0.01, 0.9, 0.04, 0.01, 0.01]), []
+
+    def refine(max_steps):
+        counts.append(max_steps)
+        took.append(next(seconds))
+
+    monkeypatch.setattr(session, "refine", refine)
+    bench.hand.tick(5)
+    assert counts == [1, 8, 1, 2, 8]
 
 
 @pytest.mark.parametrize("fails", ["move_handle", "refine"])

@@ -12,6 +12,7 @@ from hands import Hand, draw_seldom, look_from, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
 
+from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.session import Session
 from vtk_segdeform.widgets.editor.editor import DeformEditor
 from vtk_segdeform.widgets.editor.widget_set import Mode
@@ -118,6 +119,7 @@ def test_what_a_body_follows_is_changed_at_once_in_one_step(editor):
 def test_the_selected_body_is_the_volume_that_the_slider_changes(editor):
     press(editor, "bodies.list.select", ["body 2"])
     press(editor, "volumes.change", -20)
+    editor.wait()
     assert abs(editor.session.volume("body 2")[1] + 0.2) < 1e-12
     press(editor, "volumes.name", "whole")
     (table,) = bodies(editor).tables
@@ -222,7 +224,7 @@ def test_a_hidden_body_is_not_drawn_picked_or_painted_until_everything_is_shown(
 
 
 def test_a_locked_body_stays_where_it_is_until_it_is_unlocked(editor):
-    session, locked = editor.session, editor.widgets.dragger.locked
+    session, dragger = editor.session, editor.widgets.dragger
     editor.controller.finishing.is_wanted = False
     ids = vertices_of(editor, 2)
     session.pull(int(ids[0]), session.vertices[ids[0]] + [0.0, 0.3, 0.0])
@@ -235,7 +237,10 @@ def test_a_locked_body_stays_where_it_is_until_it_is_unlocked(editor):
     assert boxes(editor, "lock") == [False, False, True]
     assert_array_equal(np.union1d(session.fixed, session.state.handle), ids)
     assert session.history.undo_label == "lock body 3"
-    assert editor.widgets.dragger.locked == {pulled}
+    assert dragger.locked == {pulled}
+    with pytest.raises(ConstraintError, match="Unlock it in the list of bodies"):
+        dragger.set_locked(pulled, False)
+    view = editor.controller.camera.settings(editor.mode)
     rod_end = int(vertices_of(editor, 0)[-1])
     session.pull(rod_end, session.vertices[rod_end] + [0.5, 0.0, 0.0])
     session.commit()
@@ -244,10 +249,15 @@ def test_a_locked_body_stays_where_it_is_until_it_is_unlocked(editor):
     session.undo()
     session.undo()
     assert boxes(editor, "lock") == [False, False, False]
+    assert dragger.locked == frozenset()
+    session.redo()
+    editor.controller.camera.restore(view)  # as with the session from a file
+    session.undo()
+    assert dragger.locked == frozenset()
     hand = point_at(editor, 2)
     for is_locked in (True, False):
         hand.types("shift+l", None)
         editor.wait()
         assert boxes(editor, "lock") == [False, False, is_locked]
-    assert editor.widgets.dragger.locked == locked == frozenset()
+    assert dragger.locked == frozenset()
     assert session.history.labels[-2:] == ("lock body 3", "unlock body 3")

@@ -369,6 +369,7 @@ def test_a_handle_is_a_part_whose_volume_is_listed_and_set():
         assert ("Handle 1", "handle 1") in of(editor, "volumes.name").choices
         press(editor, "volumes.name", "handle 1")
         press(editor, "volumes.change", 25)
+        editor.wait()
         assert abs(editor.session.volume("handle 1")[1] - 0.25) < 1e-12
         select("handle:handle 1", False)
         assert editor.session.options.volumes == ()
@@ -386,6 +387,7 @@ def test_an_area_is_set_and_a_centroid_is_kept_while_a_handle_moves():
         assert abs(session.volume("area")[1] - 0.05) < 1e-12
         assert of(editor, "volumes.value").value.endswith("(+5 %)")
         press(editor, "volumes.goal", "default")
+        editor.wait()
         press(editor, "volumes.name", "centroid z")
         assert not of(editor, "volumes.change").enabled
         assert [goal for _, goal in of(editor, "volumes.goal").choices] == [

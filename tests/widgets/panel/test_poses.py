@@ -25,11 +25,11 @@ def settle(editor):
 
 def test_poses_are_saved_selected_renamed_and_blended(editor):
     session = editor.session
-    assert shown(editor)[0] is None  # nothing to save yet
+    assert list(shown(editor)[1]) == ["copy"]  # nothing to save yet
     press(editor, "motion.move_z", 0.5)
     settle(editor)
     up = session.vertices
-    assert list(shown(editor)[1]) == ["save"]
+    assert list(shown(editor)[1]) == ["save", "copy"]
     press(editor, "poses.save")
     press(editor, "motion.move_z", -2.5)
     assert editor.widgets.is_settling

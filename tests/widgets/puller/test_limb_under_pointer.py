@@ -204,6 +204,7 @@ def test_r_turns_the_limb_about_its_axis_then_in_the_view_then_moves(bench):
     assert (bench.session.vertices[vertex] - turned)[2] > 0.1
     bench.hand.release()
     assert bench.session.history.undo_label == "pull"
+    assert bench.tinted.sum() < 10  # not the whole limb, which is a handle now
     bench.session.undo()
     bench.hand.press(bench.at(BODY))  # without a limb, as before
     bench.hand.key("r")

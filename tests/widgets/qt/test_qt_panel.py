@@ -96,7 +96,7 @@ def test_the_visible_controls_are_those_of_the_models_and_say_the_same(widget, m
     assert all(seen == said for seen, said in titles.items())
     fields = [field for section in shown for field in section.fields]
     known = {field.name for field in fields if field.visible}
-    known |= {table.name for section in shown for table in section.tables}
+    known |= {table.name for section in shown for table in section.tables if table.visible}
     boxes = [panel.boxes[section.name] for section in shown]
     visible = {
         name for box in boxes for name, each in box.controls.items() if each.isVisibleTo(box)

@@ -606,13 +606,14 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert len(seen.session.fixed) == int(rows(seen.panel.controls["handles.list"])[0][1]) > 0
 
 
-def test_poses_of_another_session_are_copied_from_the_toolbar(seen, tmp_path, monkeypatch):
+def test_poses_of_another_session_are_copied_from_the_panel(seen, tmp_path, monkeypatch):
     other = Session(seen.session.mesh, state=seen.session.state)
     other.saved_poses.save("wave")
     save_session(tmp_path / "other.segdeform", other)
     answer(monkeypatch, tmp_path / "other.segdeform")
-    entries = seen.panel.toolbar.buttons["save"].menu().actions()
-    next(entry for entry in entries if entry.text().startswith("Copy poses")).trigger()
+    seen.mode(Mode.DEFORM)
+    seen.settle()
+    seen.click(seen.panel.controls["poses.copy"])
     seen.settle()
     assert list(seen.session.saved_poses) == ["wave"]
     assert "Copied 1 pose" in seen.panel.status.words.text()

@@ -123,7 +123,9 @@ def test_a_download_waits_until_the_pose_has_settled(web, tmp_path):
     assert editor.widgets.is_settling
 
     async def downloaded():
-        request = SimpleNamespace(match_info={"suffix": "segdeform"}, headers={"X-Segdeform": "1"})
+        request = SimpleNamespace(
+            match_info={"suffix": "segdeform"}, query={}, headers={"X-Segdeform": "1"}
+        )
         download = asyncio.create_task(web._transfer.download(request))
         await asyncio.sleep(0.1)
         assert not download.done()

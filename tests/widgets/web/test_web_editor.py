@@ -19,7 +19,7 @@ from web_hands import Served, line, only_file
 from vtk_segdeform import Mesh, read_mesh
 from vtk_segdeform.io import write_mesh
 from vtk_segdeform.models.implicit import Limb, standing_body
-from vtk_segdeform.session import Change, load_session
+from vtk_segdeform.session import Change, Session, load_session, save_session
 from vtk_segdeform.widgets.editor import Mode, opening
 from vtk_segdeform.widgets.editor.actions import to_mode
 
@@ -297,6 +297,28 @@ def test_one_finger_pulls_and_two_turn(
     page.close()
 
 
+def test_landmarks_and_poses_come_from_files_of_the_visitor_and_landmarks_go_to_one(
+    served: Served, page: Page, tmp_path: Path
+) -> None:
+    session, other = served.web.session, Session(served.web.session.mesh)
+    other.saved_poses.save("wave")
+    save_session(tmp_path / "other.segdeform", other)
+    page.choose_files("[data-name='poses.copy']", tmp_path / "other.segdeform")
+    served.wait(lambda: [*session.saved_poses] == ["wave"] and served.is_at_rest)
+    page.wait("document.querySelector('.sd-hint').textContent.includes('Copied 1 pose')")
+    (tmp_path / "points.csv").write_text("nose,1,0,0\n")
+    page.choose_files("[data-name='landmarks.source']", tmp_path / "points.csv")
+    served.wait(lambda: [*session.landmarks] == ["nose"])
+    (tmp_path / "damaged.csv").write_text("nose,1\n")
+    page.choose_files("[data-name='landmarks.target']", tmp_path / "damaged.csv")
+    page.wait("document.querySelector('.sd-fault span')?.textContent.startsWith('damaged.csv')")
+    page.save_downloads(tmp_path)
+    page.evaluate("[...document.querySelectorAll('.sd-asks button')]"
+                  ".find((each) => each.textContent == 'Save ...').click()")  # fmt: skip
+    assert only_file(tmp_path, "small-source.csv").read_text().splitlines()[-1].startswith("nose,1")
+    page.wait("document.querySelector('.sd-hint').textContent.startsWith('Downloaded')")
+
+
 def test_the_page_reads_and_writes_no_file_of_the_server(
     served: Served, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -318,6 +340,10 @@ def test_the_page_reads_and_writes_no_file_of_the_server(
         ("upload?name=../../a.ply", "POST", True, 413),
         ("download/ply", "GET", False, 403),
         ("download/..%2F..%2Fpasswd", "GET", True, 404),
+        ("download/ply?field=landmarks.save_source", "GET", True, 404),
+        ("download/csv?field=landmarks.source", "GET", True, 409),
+        ("download/csv?field=/etc/passwd", "GET", True, 409),
+        ("download/csv?field=landmarks.save_source", "GET", True, 409),  # there is none
     ):
         assert _status(f"http://127.0.0.1:{served.port}/{path}", method, header=header) == status
     assert [*folder.rglob("*")] == before[1]

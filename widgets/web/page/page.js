@@ -48,6 +48,8 @@ const Page = {
         this.draws = value === true;
         remembered.set(DRAWING, this.draws ? 'yes' : 'no');
       } else if (name === 'help') this.hasHelp = true;
+      else if (value?.file) this.upload(value.file, name);
+      else if (value?.saves) this.download(value.saves, name);
       else this.trame.trigger('press', [name, value]);
     },
     preview(place) {
@@ -142,12 +144,14 @@ const Page = {
       this.asked = null;
       if (yes) this.upload(file);
     },
-    upload(file) {
+    // Open a file, or give it to a control of the panel.
+    upload(file, field = '') {
       this.fault = '';
       this.sent = 0;
       const request = new XMLHttpRequest();
       const target = address('upload');
       target.searchParams.set('name', file.name);
+      target.searchParams.set('field', field);
       request.open('POST', target);
       request.setRequestHeader('X-Segdeform', 'upload');
       request.upload.onprogress = (event) => { this.sent = event.loaded / event.total; };
@@ -159,14 +163,17 @@ const Page = {
       };
       request.send(file);
     },
-    async download(suffix) {
+    async download(suffix, field = '') {
       this.fault = '';
       try {
-        const answer = await fetch(address(`download/${suffix}`), { headers: { 'X-Segdeform': 'download' } });
+        const from = address(`download/${suffix}`);
+        from.searchParams.set('field', field);
+        const answer = await fetch(from, { headers: { 'X-Segdeform': 'download' } });
         if (!answer.ok) throw new Error(await answer.text());
         const link = document.createElement('a');
         link.href = URL.createObjectURL(await answer.blob());
-        link.download = `${this.trame.state.get('document').stem}.${suffix}`;
+        const what = field && `-${field.split('_').pop()}`; // "target", of landmarks
+        link.download = `${this.trame.state.get('document').stem}${what}.${suffix}`;
         link.click();
         setTimeout(() => URL.revokeObjectURL(link.href), 10000);
       } catch (error) {

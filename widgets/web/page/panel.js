@@ -48,6 +48,15 @@ const Field = {
       this.held = null;
     },
     choose(event) { this.press(this.field.choices[event.target.selectedIndex][1]); },
+    ask() {
+      if (this.field.saves) this.press({ saves: this.field.suffixes[0].slice(1) });
+      else this.$refs.file.click();
+    },
+    give(event) {
+      const [file] = event.target.files;
+      event.target.value = '';
+      if (file) this.press({ file });
+    },
   },
   template: `
     <label v-if="field.kind === 'toggle'" class="sd-field sd-toggle" :title="field.tip">
@@ -83,7 +92,11 @@ const Field = {
     <div v-else-if="field.kind === 'label'" class="sd-field sd-label" :title="field.tip">
       <span>{{ field.label }}</span><output>{{ field.value }}</output>
     </div>
-    <span v-else-if="field.kind === 'file'" hidden></span>
+    <div v-else-if="field.kind === 'file'" class="sd-asks">
+      <button type="button" class="sd-button" :title="field.tip" :disabled="!field.enabled"
+        @click="ask">{{ field.label }}</button>
+      <input v-if="!field.saves" ref="file" type="file" hidden :data-name="field.name"
+        :aria-label="field.label" :accept="field.suffixes.join()" @change="give"></div>
     <button v-else type="button" class="sd-button" :class="{ down: isDown }" :title="field.tip"
         :disabled="!field.enabled" :aria-pressed="field.value === null ? null : isDown"
         @click="press(null)">
