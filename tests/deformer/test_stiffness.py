@@ -251,7 +251,6 @@ def test_a_rigid_part_is_placed_by_what_holds_it_then_by_tracks_then_by_the_pose
     assert_allclose(x[0], rest[0], atol=1e-12)
 
 
-def drag(**options) -> tuple[sd.Deformer, np.ndarray, list[sd.Solution]]:
 def drag(n_frames, **options) -> tuple[sd.Deformer, np.ndarray, list[sd.Solution]]:
     """Return a deformer whose arm has a bone, the bone, and frames of a drag of the hand."""
     body = torso(3)
