@@ -46,6 +46,14 @@ def test_what_is_inside_follows():
     assert_array_equal(carriers(joined(BAR, (inner[0], inner[1][:, ::-1]))), [0, 0])
 
 
+def test_a_wall_follows_the_wall_around_it_and_not_a_bubble_between_them():
+    outer, inner = ball(1.0, [0.0, 0.0, 0.0], 3), ball(0.9, [0.0, 0.0, 0.0], 3)
+    bubble = ball(0.02, [0.0, 0.0, 0.94], 1)  # nearer to both than they are to each other
+    mesh = joined(outer, (inner[0], inner[1][:, ::-1]), (bubble[0], bubble[1][:, ::-1]))
+    assert_array_equal(carriers(mesh)[:2], [0, 0])
+    assert carriers(mesh)[2] in (0, 1)
+
+
 def test_what_is_inside_follows_wherever_it_is():
     wide = ball(2.0, [0.0, 0.0, 0.0], 3)
     for place in ([0.0, 0.0, 0.0], [0.0, 0.0, -0.9], [0.7, 0.5, 0.4]):

@@ -48,9 +48,9 @@ def near_point(
     """
     constraints, p = path.constraints, path.p
     problem, before = constraints.problem, constraints.solver
-    mirror, points = constraints.mirror, [point]
-    if mirror is not None:
-        points.append(mirror.mate_of(problem.mesh, point))
+    points = [point]
+    if constraints.mirror is not None:
+        points.append(constraints.mirror.mate_of(problem.mesh, point))
     size, energy, samples = problem.frame.size, problem.energy, problem.samples
     # The finish has some room around the points, also if they are in a small limb.
     near, finished = (
@@ -66,10 +66,6 @@ def near_point(
     own_rows = own_rows.reshape(-1, problem.subspace.n_columns)
     targets = np.array([each.target for each in handles], dtype=np.int64)
     levers = (own_rows - problem.subspace.at(constraints.handle[targets])) @ p
-    if mirror is not None:
-        sources = np.concatenate([np.arange(constraints.n_given), constraints.mates])[targets]
-        for k in np.flatnonzero(sources != targets):
-            levers[k] = mirror.reflected(levers[targets == sources[k]])[0]
     pulled = PulledPoints(
         places=np.array([each.place for each in handles], dtype=np.int64),
         targets=targets,

@@ -12,7 +12,8 @@ A component *follows* another, its *carrier*, if it lies against it or is around
 
 Components that are linked so form a tree.  Its root is the largest of them, or each that has fixed
 vertices or handles.  Each other one is carried by the one of those nearer to the root to which it
-has the smallest gap: a jacket by the shirt, and the shirt by the body.
+has the smallest gap, relative to the size of that one: a jacket by the shirt, and the shirt by the
+body; but the inner wall of a hollow body by the outer one, not by a bubble between them.
 
 Values of a carrier, such as the blend weights of regions, are *carried* to its followers: each
 vertex has that of the nearest point of the carrier.  Nearest points of neighbours may be far from
@@ -134,15 +135,22 @@ def carriers(
     extent = _extents(mesh)
     carried_by = {k: int(other) for k, other in given.items() if other != FREE}
     free = given.keys() - carried_by.keys()
-    links = [link for link in _links(mesh, area, extent) if free.isdisjoint(link[1:])]
+    size, links = np.sqrt(area), _links(mesh, area, extent)
+    by_gap = sorted(
+        (gap / max(size[other], np.finfo(float).tiny), k, other)
+        for gap, *ends in links
+        for k, other in (ends, ends[::-1])
+        if free.isdisjoint(ends) and k not in carried_by
+    )
+    pairs = [*carried_by.items(), *(pair for _, *pair in by_gap)]
     own = np.arange(count)
     alone = free if roots is None else free | set(roots.tolist()) - carried_by.keys()
     found = np.where(np.isin(own, list(alone)), own, -1)
     for root in np.lexsort((own, -extent)):
-        _grow(found, links, carried_by)
+        _grow(found, pairs)
         if found[root] < 0 and root not in carried_by:
             found[root] = root
-    _grow(found, links, carried_by)
+    _grow(found, pairs)
     if (circular := np.flatnonzero(found < 0)).size:
         raise ArgumentError(f"attach must not lead back to a component; got {list(circular)}")
     return found
@@ -177,11 +185,8 @@ def checked_attach(attach: Attach | None, count: int) -> dict[int, int | str]:
     return {int(k): other if other == FREE else int(other) for k, other in given.items()}
 
 
-def _grow(found: IntArray, links: Sequence[_Link], carried_by: dict[int, int]) -> None:
-    """Let components without a carrier in *found* (c,) follow others, those of least gaps first."""
-    pairs = list(carried_by.items())
-    for _, i, j in links:
-        pairs += [(k, other) for k, other in ((i, j), (j, i)) if k not in carried_by]
+def _grow(found: IntArray, pairs: Sequence[Sequence[int]]) -> None:
+    """Let components without a carrier in *found* (c,) follow others, in the order of *pairs*."""
     while ready := next((pair for pair in pairs if found[pair[0]] < 0 <= found[pair[1]]), None):
         k, other = ready
         found[k] = other
@@ -196,7 +201,7 @@ class _Link(NamedTuple):
 
 
 def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
-    """Return the links between components, (c,) of *area* and *extent*, by increasing gap."""
+    """Return the links between components, (c,) of *area* and *extent*."""
     of_face = mesh.components[mesh.faces[:, 0]]
     order = np.lexsort((np.arange(len(extent)), -extent))
     large, small = order[:_COMPARED], order[_COMPARED:]
@@ -231,7 +236,7 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
             j = int(mesh.components[near.corners[near.gaps.argmin(), 0]])
             gap = _linked(mine, all_large, most(i, j))
             found += [] if gap is None else [_Link(gap, i, j)]
-    return sorted(found)
+    return found
 
 
 def _linked(one: _Samples, other: _Samples, most: float) -> float | None:
