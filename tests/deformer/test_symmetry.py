@@ -162,6 +162,19 @@ def test_a_nearly_symmetric_scan_is_nearly_mirrored():
     assert abs(pose.volume_change) < 1e-12
 
 
+def test_a_point_of_a_face_of_a_nearly_symmetric_scan_is_pulled():
+    """The mate of the point and that of its vertex are apart by something else than on its side."""
+    noise = np.random.default_rng(0).normal(size=X.shape) * 0.004 * BODY.diagonal
+    mesh = BODY.with_vertices(X + noise)
+    face = mesh.faces[mesh.vertices[mesh.faces].mean(axis=1)[:, 0].argmax()]
+    point = SurfacePoint.of(face, (0.6, 0.3, 0.1))
+    at = point.at(mesh.vertices)
+    pose = sd.pull(mesh, point, at + UP, symmetry="x", **FEW)
+    assert pose.status is sd.Status.CONVERGED
+    assert_allclose(point.at(pose.vertices), at + UP, atol=1e-12)
+    assert len(pose.folds()) == 0
+
+
 @functools.cache
 def unsymmetric() -> Mesh:
     return models.random_limbs(600, seed=3)
