@@ -192,18 +192,6 @@ def test_a_word_among_numbers_is_shown(tmp_path):
         read_polydata(tmp_path / "a.ply")
 
 
-def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path):
-    surface = to_polydata(Mesh(*TETRAHEDRON))
-    pairs = np.array([[0.0, 0.25], [0.5, 1.0], [1.0, 0.0], [0.25, 0.75]])
-    for name, v in (("TEXCOORD_0", 1.0 - pairs[:, 1]), ("uv", pairs[:, 1])):
-        surface.point_data.clear()
-        surface.point_data[name] = pairs
-        surface.point_data.active_texture_coordinates_name = name
-        write_mesh(tmp_path / "a.ply", surface)
-        found = read_polydata(tmp_path / "a.ply").active_texture_coordinates
-        assert_array_equal(found, np.column_stack([pairs[:, 0], v]))
-
-
 @pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("length", ["char", "ushort", "double"])
 @pytest.mark.parametrize("kind", ["ascii", "binary_little_endian", "binary_big_endian"])

@@ -7,9 +7,10 @@ import pytest
 import pyvista as pv
 from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
-from solids import rotation
+from solids import TETRAHEDRON, rotation
 
 from vtk_segdeform.errors import MeshError
+from vtk_segdeform.io import read_polydata, to_polydata, write_mesh
 from vtk_segdeform.io.polygons import (
     cells_of,
     corner_values,
@@ -21,6 +22,7 @@ from vtk_segdeform.io.polygons import (
     triangles_of,
     unstripped,
 )
+from vtk_segdeform.mesh import Mesh
 
 TURN = rotation([1.0, 2.0, 3.0], 0.7).T
 
@@ -207,3 +209,16 @@ def test_values_of_corners_are_padded_and_read_back():
         assert corner_values(np.zeros(wide.shape, dtype=int), counts, width) is None
     assert corner_values(None, counts) is None
     assert padded_corners(counts[:0], np.empty((0, 2))).shape == (0, 0)
+
+
+@pytest.mark.parametrize("kind", ["obj", "off", "ply"])
+def test_texture_coordinates_of_gltf_are_turned_upside_down(tmp_path, kind):
+    surface = to_polydata(Mesh(*TETRAHEDRON))
+    pairs = np.array([[0.0, 0.25], [0.5, 1.0], [1.0, 0.0], [0.25, 0.75]])
+    for name, v in (("TEXCOORD_0", 1.0 - pairs[:, 1]), ("uv", pairs[:, 1])):
+        surface.point_data.clear()
+        surface.point_data[name] = pairs
+        surface.point_data.active_texture_coordinates_name = name
+        write_mesh(tmp_path / f"a.{kind}", surface)
+        found = read_polydata(tmp_path / f"a.{kind}").active_texture_coordinates
+        assert_array_equal(found, np.column_stack([pairs[:, 0], v]))

@@ -30,7 +30,7 @@ import pyvista as pv
 
 from ..errors import MeshError
 from ..mesh import Mesh
-from .polygons import polydata_of
+from .polygons import polydata_of, texture_of
 
 
 @runtime_checkable
@@ -107,9 +107,9 @@ def layer_data(surface: pv.PolyData) -> LayerData:
         colour = _colour(attributes)
         if colour is not None:
             arrays[f"{sort}_color_matrix"] = colour / 255.0
-    texture = surface.active_texture_coordinates
+    texture = texture_of(surface)
     if texture is not None:
-        arrays["v_tex_coords_matrix"] = np.asarray(texture[:, :2], dtype=np.float64)
+        arrays["v_tex_coords_matrix"] = texture[1].astype(np.float64)
     if _CORNERS in cells:
         corners = np.asarray(cells[_CORNERS], dtype=np.float64)
         arrays["w_tex_coords_matrix"] = corners.reshape(-1, 2)

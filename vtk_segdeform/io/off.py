@@ -27,7 +27,7 @@ from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
 from .array_names import text_of, warn_left_out
 from .number_lines import are_numbers, colour_bytes, colour_numbers, numbers_of, words_per_line
-from .polygons import cells_of, polydata_of, polygons_of, rows
+from .polygons import cells_of, polydata_of, polygons_of, rows, texture_of
 
 _log = logging.getLogger(__name__)
 _KIND = re.compile(r"((?:ST)?C?N?|N?C?(?:ST)?)OFF\b|(?=\d)", re.IGNORECASE)
@@ -191,10 +191,10 @@ def write_off(path: Path, surface: pv.PolyData) -> None:
     if colour is not None:
         columns, kind = [*columns, colour_numbers(colour)], f"C{kind}"
         kept["point"].append(name)
-    texture = surface.active_texture_coordinates
-    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
-        columns, kind = [*columns, np.asarray(texture, dtype=float)[:, :2]], f"ST{kind}"
-        kept["point"].append(str(data.active_texture_coordinates_name))
+    texture = texture_of(surface)
+    if texture is not None:
+        columns, kind = [*columns, texture[1].astype(float)], f"ST{kind}"
+        kept["point"].append(texture[0])
     name, of_faces = _colour(surface.cell_data)
     tails = [""] * len(polygons)
     if of_faces is not None:

@@ -35,7 +35,15 @@ from .array_names import (
     warn_renamed,
 )
 from .ply_tables import Lists, Table, comments_of, tables_of
-from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, unstripped
+from .polygons import (
+    cells_of,
+    corner_values,
+    padded_corners,
+    polydata_of,
+    polygons_of,
+    texture_of,
+    unstripped,
+)
 
 _log = logging.getLogger(__name__)
 _WORDS = {
@@ -158,15 +166,11 @@ def write_ply(path: Path, surface: pv.PolyData) -> None:
     counts, corners = polygons_of(surface)
     points, columns = surface.points, dict[str, Any]()
     kept: dict[str, list[str]] = {"point": [], "cell": [], "field": []}
-    texture, texture_name = surface.active_texture_coordinates, ""
-    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
+    texture, texture_name = texture_of(surface), ""
+    if texture is not None:
         # In single precision by the names that Blender reads too, else by those of MeshLab
-        single = texture.dtype == np.float32
-        pairs = np.array(texture, dtype="f4" if single else "f8")
-        texture_name = str(surface.point_data.active_texture_coordinates_name)
-        if texture_name.startswith("TEXCOORD_"):  # v of glTF begins at the top
-            pairs[:, 1] = 1.0 - pairs[:, 1]
-        columns |= dict(zip(_TEXTURE[0 if single else -1], pairs.T, strict=False))
+        texture_name, pairs = texture
+        columns |= dict(zip(_TEXTURE[0 if pairs.dtype == "f4" else -1], pairs.T, strict=True))
     arrays = {name: v for name, v in surface.point_data.items() if name != texture_name}
     normals = arrays.get("Normals")
     if normals is not None and normals.shape[1:] == (3,) and normals.dtype.str[1:] in ("f4", "f8"):

@@ -109,6 +109,21 @@ def cells_of(polydata: pv.PolyData) -> IntArray:
     return cells
 
 
+def texture_of(surface: pv.PolyData) -> tuple[str, FloatArray] | None:
+    """Return the name of the active texture coordinates and these (n, 2), or None.
+
+    v begins at the bottom, as in all formats but glTF, of which arrays keep their names.
+    """
+    values = surface.active_texture_coordinates
+    if values is None or values.ndim != 2 or values.shape[1] < 2:
+        return None
+    name = str(surface.point_data.active_texture_coordinates_name)
+    pairs = np.array(values[:, :2], dtype="f4" if values.dtype == np.float32 else "f8")
+    if name.startswith("TEXCOORD_"):
+        pairs[:, 1] = 1.0 - pairs[:, 1]
+    return name, pairs
+
+
 def padded_corners(counts: IntArray, values: FloatArray) -> FloatArray:
     """Return *values* (k, w) per corner as rows (m, w * most corners), padded with NaN."""
     most, width = int(counts.max(initial=0)), values.shape[1]

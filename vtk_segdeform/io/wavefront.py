@@ -47,7 +47,7 @@ from .array_names import (
 from .groups import GROUP, MATERIAL, OBJECT, groups_of, names_key, set_groups, whole_numbers
 from .moving import CORNER_NORMALS
 from .number_lines import Lines, are_numbers, colour_bytes
-from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of
+from .polygons import cells_of, corner_values, padded_corners, polydata_of, polygons_of, texture_of
 
 _log = logging.getLogger(__name__)
 _CORNER_TEXTURE = "TextureCorners"
@@ -353,14 +353,12 @@ def _texture(
     if each is not None:
         kept["cell"].append(_CORNER_TEXTURE)
         return _unique(each)
-    texture = surface.active_texture_coordinates
-    if texture is None or texture.ndim != 2 or texture.shape[1] < 2:
+    texture = texture_of(surface)
+    if texture is None:
         return np.empty((0, 2)), []
-    kept["point"].append(surface.point_data.active_texture_coordinates_name)
-    pairs = np.asarray(texture, dtype=float)[:, :2]
-    if str(surface.point_data.active_texture_coordinates_name).startswith("TEXCOORD_"):
-        pairs = np.stack([pairs[:, 0], 1.0 - pairs[:, 1]], axis=1)  # v of glTF begins at the top
-    return pairs, (corners + 1).tolist()
+    name, pairs = texture
+    kept["point"].append(name)
+    return pairs.astype(float), (corners + 1).tolist()
 
 
 def _tags(surface: pv.PolyData, cells: IntArray, kept: dict[str, list[str]]) -> dict[int, str]:

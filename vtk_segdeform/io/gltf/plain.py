@@ -22,7 +22,7 @@ from ...errors import MeshError
 from ..array_names import warn_left_out, warn_of_rounding, warn_renamed
 from ..groups import MATERIAL, groups_of, names_key
 from ..moving import CORNER_NORMALS
-from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of
+from ..polygons import cells_of, corner_values, cut_into_triangles, polygons_of, texture_of
 from .reading import DOCUMENT
 
 _log = logging.getLogger(__name__)
@@ -118,13 +118,11 @@ def _point_arrays(surface: pv.PolyData, kept: list[str]) -> dict[str, Any]:
             if np.isfinite(lengths).all() and (lengths > 0).all():  # as glTF requires
                 found["NORMAL"] = (np.asarray(values) / lengths[:, None]).astype("f4")
                 kept.append(str(name))
-    texture = surface.active_texture_coordinates
-    if texture is not None and texture.ndim == 2 and texture.shape[1] >= 2:
-        name = str(data.active_texture_coordinates_name)
-        pairs = np.nan_to_num(np.asarray(texture, dtype=float)[:, :2])
-        if not name.startswith("TEXCOORD_"):  # of which v begins at the top
-            pairs = np.stack([pairs[:, 0], 1.0 - pairs[:, 1]], axis=1)
-        found["TEXCOORD_0"] = pairs.astype("f4")
+    texture = texture_of(surface)
+    if texture is not None:
+        name, pairs = texture
+        pairs[:, 1] = 1.0 - pairs[:, 1]  # v begins at the top
+        found["TEXCOORD_0"] = np.nan_to_num(pairs).astype("f4")
         kept.append(name)
     for name, width in (("RGBA", 4), ("RGB", 3)):
         values = data.get(name)
