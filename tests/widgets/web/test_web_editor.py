@@ -313,8 +313,12 @@ def test_landmarks_and_poses_come_from_files_of_the_visitor_and_landmarks_go_to_
     page.choose_files("[data-name='landmarks.target']", tmp_path / "damaged.csv")
     page.wait("document.querySelector('.sd-fault span')?.textContent.startsWith('damaged.csv')")
     page.save_downloads(tmp_path)
-    page.evaluate("[...document.querySelectorAll('.sd-asks button')]"
-                  ".find((each) => each.textContent == 'Save ...').click()")  # fmt: skip
+    save = (
+        "[...document.querySelectorAll('.sd-asks button')]"
+        ".find((each) => each.textContent == 'Save ...')"
+    )
+    page.wait(f"{save} !== undefined")
+    page.evaluate(f"{save}.click()")
     assert only_file(tmp_path, "small-source.csv").read_text().splitlines()[-1].startswith("nose,1")
     page.wait("document.querySelector('.sd-hint').textContent.startsWith('Downloaded')")
 
