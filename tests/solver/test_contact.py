@@ -153,6 +153,20 @@ def test_no_contact_is_what_is_near_along_the_surface_or_the_other_side_of_a_thi
         assert others[opposite].any() == thin
 
 
+def test_samples_whose_faces_face_all_ways_are_in_contact_with_nothing():
+    """Both sides of a wall thinner than the samples: what is left of the normals is rounding."""
+    corners = np.array([[1.0, 0.0, 0.0], [-0.5, 0.9, 0.0], [-0.5, -0.9, 0.0]])
+    wall = np.vstack([[0.0, 0.0, 1e-17], corners])
+    points = np.vstack([wall, wall + [0.0, 0.0, 0.4]])
+    fan = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+    faces = np.vstack([fan, fan[:, ::-1], fan[:, ::-1] + 4])  # a sheet above it, facing down
+    edges = sparse.csr_array((8, 8))
+    areas = np.full(8, 1.0 / 8.0)
+    surface = ContactSurface.of(np.eye(8), points, faces, areas=areas, edges=edges)
+    assert surface.excluded[:4].all()
+    assert not surface.excluded[4:, 4:][~np.eye(4, dtype=bool)].any()
+
+
 def test_no_two_samples_pass_through_each_other_in_a_step(fork):
     deformer, _ = fork
     contact, p = deformer._constraints.contact, deformer._path.p

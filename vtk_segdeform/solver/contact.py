@@ -14,11 +14,12 @@ fade smoothly to 0 where the samples do not face each other or are not opposite,
 where they have crossed by more than D_ab = 1.5 (h_a + h_b): so deep it is unknown which way is out.
 All of it is a smooth function of p that does not depend on how the mesh is moved as a whole.
 
-Three kinds of pairs are no contact, since they are near each other at rest already:
+Four kinds of pairs are no contact, mostly since they are near each other at rest already:
 
     neighbours      within 2.5 (h_a + h_b) along the surface
     two sides       of a thin part: one is behind the other, within 4.5 (h_a + h_b), facing away
     crossings       the same, of a mesh that crosses itself at rest
+    without normal  samples whose faces face all ways, such as those of both sides of a thin wall
 
 and the margin d_ab = d_a + d_b is at most the gap at rest.  Otherwise d_a is the height of the true
 surface over its sample, and a tenth of the distance between samples.
@@ -49,6 +50,7 @@ _LATERAL = 1.1  # r_ab / (h_a + h_b): discs of this radius about the samples cov
 _DEPTH = 1.5  # D_ab / (h_a + h_b)
 _BEHIND = 4.5  # (h_a + h_b): distance of two sides of a thin part, at most
 _SIDES = 0.5  # <n_a, n_b> of these, at most: a convex part is thick, and may fold inwards
+_ALL_WAYS = 0.1  # length of the sum of the normals of faces, by area, that is none
 _NEIGHBOURS = 2.5  # (h_a + h_b): distance along the surface
 _MARGIN = 0.2  # of h_a
 _OF_GAP = 0.45  # of the least gap at rest: the most of it that a margin takes
@@ -138,7 +140,10 @@ class ContactSurface(Frozen):
 
     def _excluding(self, points: FloatArray, edges: sparse.csr_array) -> ContactSurface:
         """Return the same without contact of samples near each other at rest, at *points*."""
-        n, radii, normals = len(points), self.radii, self.normals(points)
+        n, radii = len(points), self.radii
+        lengths, normals = self.sums(points, np.arange(n))
+        a, b, c = points[self.faces.T]
+        all_ways = lengths < _ALL_WAYS * (self.corners @ _lengths(np.cross(b - a, c - a)))
         largest = 2.0 * float(radii.max(initial=0.0))
         near = csgraph.dijkstra(edges, directed=False, limit=_NEIGHBOURS * largest)
         excluded = np.asarray(near <= _NEIGHBOURS * np.add.outer(radii, radii))
@@ -150,6 +155,7 @@ class ContactSurface(Frozen):
         facing = np.einsum("ij,ij->i", normals[a], normals[b])
         behind = (gap <= 0.0) & (squared < (_BEHIND * sums) ** 2) & (facing < _SIDES)
         excluded[a[behind], b[behind]] = excluded[b[behind], a[behind]] = True
+        excluded[all_ways] = excluded[:, all_ways] = True
         in_front = (gap > 0.0) & (squared - gap**2 < (_LATERAL * sums) ** 2)
         in_front &= (facing < -_FACING[0]) & ~excluded[a, b]
         least = np.full(n, np.inf)
