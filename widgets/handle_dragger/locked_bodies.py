@@ -11,11 +11,10 @@ from vtk_segdeform.session import Session
 def locked_components(session: Session) -> BoolArray:
     """Return which components of the mesh are locked, (c,); a mesh of one component never is."""
     components = session.mesh.components
-    is_free = np.ones(len(components), dtype=bool)
-    is_free[session.fixed] = is_free[session.state.handle] = False
-    count = int(components.max()) + 1
-    locked = np.zeros(count, dtype=bool)
-    if count > 1:
+    locked = np.zeros(int(components.max()) + 1, dtype=bool)
+    if len(locked) > 1:
+        is_free = np.ones(len(components), dtype=bool)
+        is_free[session.fixed] = is_free[session.state.handle] = False
         locked[components[session.fixed]] = True
         locked[components[is_free]] = False
     return locked
