@@ -115,7 +115,7 @@ class LiveSolve:
             return
         is_done, began = False, time.thread_time()
         try:
-            self._session.refine(max_steps=self._steps)
+            self._session.refine(max_steps=min(self._steps, STEPS))
             took = max(time.thread_time() - began, 1e-3)
             self._steps = min(max(int(self._steps * _LONGEST / took), 1), STEPS)
             is_done = True
