@@ -29,9 +29,9 @@ from .symmetry import Mirror
 
 _LEAST, _MOST = 1e-2, 1e2  # of s, in medians
 # Of placing a rigid part: rounds; the longest step, in its sizes and radians, and by how much it is
-# shortened in each round; a step that is rounding; the change of a place by a motion of length 1
-# that counts as none; and the weight of held points in the first fit.
-_ROUNDS, _LONGEST, _SHORTENED, _SHORTEST, _RANK, _FIRM = 100, 0.3, 0.8, 1e-14, 1e-6, 1e6
+# shortened in each round; a step that is rounding; and the change of a place by a motion of length
+# 1 that counts as none.
+_ROUNDS, _LONGEST, _SHORTENED, _SHORTEST, _RANK = 100, 0.3, 0.8, 1e-14, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +92,7 @@ def rigid_places(
     the nearest points (k, 3) of the tracks of (k, 3), and the projections on their normals
     (k, 3, 3), which are 0 for points that do not slide.
     """
-    near, firmly = np.where(held[:, None], places, pose), np.where(held, _FIRM, 1.0)
-    turn, shift = rigid_fit(rest, near, firmly)
+    turn, shift = rigid_fit(rest, np.where(held[:, None], places, pose))
     x, size = rest @ turn.T + shift, largest_length(rest - rest.mean(axis=0)) or 1.0
     for turns in range(_ROUNDS):
         centre = x.mean(axis=0)
