@@ -93,7 +93,8 @@ class Linearised:
             raise ArgumentError("there are no derivatives with slides along a surface")
         if contact is not None and contact.is_active(path.end):
             raise ArgumentError("there are no derivatives while contact is avoided: parts touch")
-        if solution.status not in (Status.CONVERGED, Status.MISSED, Status.CROSSED):
+        found = Status.CONVERGED, Status.MISSED, Status.RIGID_MISSED, Status.CROSSED
+        if solution.status not in found:
             raise ArgumentError(f"solution must be converged; it is {solution.status}")
         return cls(path, enclosed, options)
 

@@ -230,7 +230,7 @@ class LandmarkSet(Frozen):
 
     names: tuple[str, ...] = ()
     source: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
-    """(k, 3) float; NaN for those that only have a target."""
+    """(k, 3) float; NaN where a landmark has a target only."""
     target: FloatArray = field(default_factory=lambda: frozen(np.empty((0, 3))))
     """(k, 3) float; NaN in the rows of those without one."""
     uncertainty: FloatArray = field(default_factory=lambda: frozen(np.empty(0)))

@@ -176,9 +176,9 @@ class Solution(Described):
 
     @property
     def rigid_error(self) -> float:
-        """Largest distance of a vertex of a rigid part from where the part is as one body.
+        """Largest distance of a vertex of a rigid part from its place in the best rigid fit.
 
-        In diagonals of the mesh.  Of the finished pose about 1e-16, unless the handle and fixed
+        In diagonals of the mesh.  Of a finished pose about 1e-16, unless the handle and fixed
         vertices of the part move against each other; of the cages' own pose up to some 1e-3.
         """
         return self._shape_errors[0]
