@@ -46,6 +46,8 @@ LEAST_PAIRS = 3
 """Of a fit: fewer do not tell how a body is turned."""
 _GROUPS = 12  # of landmarks that are left out, at most
 _BOUND, _TESTED, _FITTED = 0.3, 0.75, 0.85  # of the progress
+_MIRRORED = 0.25  # of the squares of a rotation: with a reflection less is left between images
+_ROUNDING = 1e-9
 _WORDS = {0: "", 1: "at least ", -1: "at most "}
 
 
@@ -128,8 +130,9 @@ def fit_landmarks(
     Raises
     ------
     ArgumentError
-        If there are fewer than three pairs, an uncertainty is negative, arrays do not fit, or
-        *slides* are no pairs of landmarks and what they slide along.
+        If there are fewer than three pairs, an uncertainty is negative, arrays do not fit, *slides*
+        are no pairs of landmarks and what they slide along, landmarks or targets are all at one
+        place, or targets are a mirror image of the landmarks, such as with left and right swapped.
     CageError
         If a landmark is too far from the mesh.
     ConstraintError
@@ -155,6 +158,7 @@ def fit_landmarks(
     if sigma.shape not in ((), (len(a),)) or not (np.isfinite(sigma) & (sigma >= 0.0)).all():
         raise ArgumentError(f"uncertainty must be one or {len(a)} numbers, 0 or more")
     u = slid(a, u, tracks)
+    _require_image(a, u)
     goal = checked_goals({"whole": volume})["whole"]
     body = SpringBody(
         mesh,
@@ -204,6 +208,25 @@ def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> Float
     found = as_points(np.where(free[:, None], 0.0, given), "target", count)
     found[free] = np.nan
     return found
+
+
+def _require_image(a: FloatArray, u: FloatArray) -> None:
+    """Raise ArgumentError if *u* (k, 3) is no image of *a* (k, 3), or a mirror image."""
+    for name, points in {"source": a, "target": u}.items():
+        if (points == points[0]).all():
+            raise ArgumentError(f"{name} must not have all landmarks at one place")
+    a, u = (each - each.mean(axis=0) for each in (a, u))
+    a, u = a / np.linalg.norm(a), u / np.linalg.norm(u)
+    left, overlaps, right = np.linalg.svd(u.T @ a)
+    if np.linalg.det(left @ right) > 0.0:
+        return
+    reflected = 1.0 - overlaps.sum() ** 2  # the squares that are left with the best scale
+    turned = 1.0 - (overlaps.sum() - 2.0 * overlaps[-1]) ** 2
+    if reflected + _ROUNDING < _MIRRORED * turned:  # unlike landmarks in a plane
+        raise ArgumentError(
+            "target must not be a mirror image of source: exchange left and right landmarks, or "
+            "mirror the mesh first"
+        )
 
 
 class _Fitting:
