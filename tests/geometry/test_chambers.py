@@ -156,3 +156,18 @@ def test_a_cavity_in_a_chamber_and_a_divided_body_in_a_cavity():
     lids = lids_of(mesh)
     assert lids.encloses.all()
     assert_allclose(signed_volume(mesh.vertices, lids.closed(mesh)), 1.001 - hole)
+
+
+def test_a_flap_on_a_body_is_no_chamber_and_its_lid_no_hole(rng):
+    x, faces = icosphere(2)
+    points = x @ rotation([1, 2, 3], 0.7).T
+    for reach in (1.3, 0.7):  # outside and inside
+        edge = faces[rng.integers(len(faces)), :2]
+        tip = reach * points[edge].mean(axis=0)
+        flapped = Mesh(np.append(points, [tip], axis=0), [*faces, [*edge, len(points)]])
+        lids = lids_of(flapped)
+        (inside,) = lids.chambers.inside
+        assert_allclose(signed_volume(lids.extension @ flapped.vertices, inside), signed_volume(points, faces))
+        if reach > 1.0:
+            assert lids.summary() == "Closed surface: volume kept"
+            assert not lids.is_open.any()

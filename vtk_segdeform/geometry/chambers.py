@@ -27,6 +27,8 @@ from ..arrays import FloatArray, IntArray
 from ..mesh import HalfEdges, connected
 from .volume import corner_and_edges, signed_volume
 
+NO_VOLUME = 1e-11
+"""Of the area to the power 3/2: a volume that is 0 to rounding."""
 _FRONT, _BACK = 0, 1
 _PASSES = 5  # until all edges have an order; two are enough for most
 _FEW_FACES = 5  # at an edge, of which all orders are tried
@@ -80,7 +82,10 @@ def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
     every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
     inside, shells = [], []
     for first, each in every:
-        if signed_volume(vertices - vertices[each[0, 0]], each) > 0.0:
+        points = vertices - vertices[each[0, 0]]
+        _, e, f = corner_and_edges(points, each)
+        area = 0.5 * float(np.linalg.norm(np.cross(e, f), axis=1).sum())
+        if signed_volume(points, each) > NO_VOLUME * area**1.5:  # not so that of a flap and its lid
             inside.append(each)
             shells.append(half_edges.shells[first])
     together = [

@@ -26,7 +26,7 @@ q = a / 2 pi, so that of a long half pipe is 1/2; above 1 the surface is rolled 
     the sum of all volumes is 0 to rounding     no
 
 Along the border of a wall between two bodies three faces meet.  It is part of the boundary, but no
-hole, and its lid is not used.
+hole, and its lid is not used.  Neither is that of a flap, a sheet along an edge of a body.
 
 The absolute value is taken because an open surface may be turned inside out.
 
@@ -49,14 +49,13 @@ from ..checks import shown
 from ..errors import ArgumentError
 from ..freezing import Frozen
 from ..mesh import HalfEdges, Mesh, edge_keys, ragged_arange, require_mesh
-from .chambers import NO_CHAMBERS, Chambers, chambers_of
+from .chambers import NO_CHAMBERS, NO_VOLUME, Chambers, chambers_of
 from .volume import corner_and_edges, signed_volume
 
 _LEAST_WINDING, _MOST_WINDING = 0.48, 1.3  # abs(q) of an open component that encloses a volume
 _SEEN_POINTS = 10  # points y for each of them
 _SUMMED_FACES = 8  # faces of a component, up to which q is summed over pairs of faces
 _INNER_POINTS = np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0  # points x of a face
-_NO_VOLUME = 1e-11  # of the area to the power 3/2
 _known: WeakKeyDictionary[Mesh, dict[bool | None, Lids]] = WeakKeyDictionary()
 
 
@@ -75,7 +74,8 @@ class Lids(Frozen):
     component : (k,) int
         The component of the mesh that each loop bounds.
     of_wall : (k,) bool
-        Whether three or more faces meet at every edge of a loop: it is no hole.
+        Whether three or more faces meet at every edge of a loop, or its lid closes no chamber of a
+        component that has some, like that of a flap: it is no hole.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
     option : bool or None
@@ -120,9 +120,9 @@ class Lids(Frozen):
             sheets = _counted(many, "open sheet") if many > 1 else "Open sheet"
             return f"{sheets}: no volume to preserve"
         done = "kept" if preserved else "measured"
-        what = [f"{_counted(inside, 'chamber')} with common walls"] if inside else []
+        what = [f"{_counted(inside, 'chamber')} with common walls"] if inside > 1 else []
         what += [_counted(holes, "hole")] if holes else []
-        volume = f"volume{' of each' if inside else ''} {done}"
+        volume = f"volume{' of each' if inside > 1 else ''} {done}"
         under = f" under {'a lid' if holes == 1 else 'lids'}" if holes else ""
         parts = [f"{', '.join(what) or 'Closed surface'}: {volume}{under}"]
         without = int((~self.encloses).sum())
@@ -203,7 +203,11 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
         closing = faces[~of_wall[loop]] if wanted is not False else faces[:0]
         walls = np.concatenate([mesh.faces, closing])
         walls = walls[is_two_sided[walls[:, 0]]]
-        found = replace(found, chambers=chambers_of(extension @ mesh.vertices, walls))
+        chambers = chambers_of(extension @ mesh.vertices, walls)
+        found = replace(found, chambers=chambers)
+        around = np.isin(n + np.arange(k), np.concatenate([faces[:0], *chambers.inside]))
+        has_chambers = np.isin(component, found.with_chambers(mesh))
+        found = replace(found, of_wall=of_wall | (has_chambers & ~around))
     return replace(found, encloses=_enclosing(mesh, found, wanted))
 
 
@@ -313,7 +317,7 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
     _, first = np.unique(mesh.components, return_index=True)
     volumes = _volumes(mesh, lids, mesh.vertices[first])
     areas = np.bincount(component, mesh.face_areas, count)
-    encloses &= np.abs(volumes) > _NO_VOLUME * areas**1.5
+    encloses &= np.abs(volumes) > NO_VOLUME * areas**1.5
     chambered = lids.with_chambers(mesh)
     encloses[chambered], is_open[chambered] = True, False
     asked = np.flatnonzero(encloses & is_open)
@@ -332,7 +336,7 @@ def _enclosing(mesh: Mesh, lids: Lids, wanted: bool | None) -> BoolArray:
             points = mesh.vertices[used] - mesh.vertices[first[c]]
             q[c] = mean_winding(points, faces.reshape(-1, 3), most=int(at_once))
         encloses[asked] = (np.abs(q[asked]) >= _LEAST_WINDING) & (np.abs(q[asked]) <= _MOST_WINDING)
-    if abs(volumes[encloses].sum()) <= _NO_VOLUME * areas.sum() ** 1.5:
+    if abs(volumes[encloses].sum()) <= NO_VOLUME * areas.sum() ** 1.5:
         encloses[:] = False  # they cancel: no change could be relative to their sum
     return encloses
 
