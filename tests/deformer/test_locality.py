@@ -297,8 +297,8 @@ def test_only_rings_that_would_bend_resist():
     rows = ring.combinations @ deformer.subspace.at(ring.vertices)
     solver = one._constraints.solver
     (own, both), _ = solver.compliance(np.stack([deformer.subspace.at(np.array([0]))[0], rows[0]]))
-    pulled = 0.3 * d / deformer._problem.frame.size  # 0.05 edges of offset, its edges apart
-    assert abs(both) / own * pulled == pytest.approx(0.05 * ring.edge, rel=0.03)
+    pulled = 0.3 * d / deformer._problem.frame.size  # 0.15 edges of offset, or less by its edges
+    assert abs(both) / own * pulled == pytest.approx(0.15 * ring.edge, rel=0.05)
     far = deformer.hold(handle=[0, 217]).local(0, 0.3 * d, 0.075 * d)
     assert far._constraints.solver.energy.constant > plain.constant + 1.5 * more
 

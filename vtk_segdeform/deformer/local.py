@@ -18,7 +18,7 @@ from .locality import Ring
 from .path import Path
 
 _ANCHOR_WEIGHT = 90.0  # kappa of `locality`, times the scale of the shape energy
-_SPIKE, _FAR_PULL = 0.05, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
+_SPIKE, _FAR_PULL = 0.15, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _HELD = 1.0  # the same of a surface that only volumes move; less than 0.2 lets it turn over
 _BALANCED = 1e-9  # a load smaller than this, times the same, is rounding
