@@ -136,8 +136,8 @@ def coarser(vertices, faces, selection, n):
         3,
         [
             ("cactus", 800, 0.11, 0.09, 0.96),
-            ("cactus", None, 0.10, 0.085, 0.95),
-            ("cylinder", None, 0.22, 0.15, 0.95),
+            ("cactus", None, 0.10, 0.09, 0.95),
+            ("cylinder", None, 0.22, 0.175, 0.95),
         ],
     ),
 )
