@@ -88,7 +88,11 @@ if TYPE_CHECKING:
     from ..io import Surface
 
 # The options that a step changes, and its label; the others are settings.
-_STEPS = {"volumes": "change volumes", "attach": "change attached components"}
+_STEPS = {
+    "volumes": "change volumes",
+    "attach": "change attached components",
+    "symmetry": "change symmetry",
+}
 _ROUNDING = 1e-9  # diagonals: distance of cage vertices that are in the same place
 
 
@@ -836,7 +840,8 @@ class Session(Described):
 
         Options are settings: changing them is no undo step, drops nothing that can be redone, and
         undo and redo leave them as they are.  Only *volumes* and *attach*, on which regions and
-        cages depend, are changed by a step.  An ongoing drag is committed first.
+        cages depend, and *symmetry*, on which handles do, are changed by a step.  An ongoing drag
+        is committed first.
         """
         unknown = sorted(changes.keys() - vars(self.options).keys())
         if unknown:
