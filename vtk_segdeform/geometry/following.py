@@ -98,13 +98,11 @@ class _Samples:
         """Return the nearest points of these faces to *points* (k, 3)."""
         count = min(_NEAREST, len(self.points))
         _, found = self._tree.query(points, np.arange(1, count + 1))
-        corners, shares = np.empty((len(points), 3), dtype=np.int64), np.empty((len(points), 3))
-        gaps = np.full(len(points), np.inf)
-        for faces in self._faces[self.face[np.asarray(found).T]]:
-            own, away = nearest_on_triangles(self._x[faces], points)
-            nearer = away < gaps
-            corners[nearer], shares[nearer], gaps[nearer] = faces[nearer], own[nearer], away[nearer]
-        return Nearest(corners, shares, gaps)
+        faces = self._faces[self.face[np.asarray(found).ravel()]]
+        shares, gaps = nearest_on_triangles(self._x[faces], np.repeat(points, count, axis=0))
+        rows = np.arange(0, len(faces), count)
+        best = rows + gaps.reshape(-1, count).argmin(axis=1)
+        return Nearest(faces[best], shares[best], gaps[best])
 
 
 def carriers(
@@ -221,11 +219,12 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
         far = most(i, j)
         (low, high), (lower, higher) = boxes[i], boxes[j]
         if (low <= higher + far).all() and (lower <= high + far).all():
-            gap = _linked(samples[i], samples[j], far)
+            near = samples[j].nearest(samples[i].points)
+            gap = _linked(samples[i], samples[j], near, far)
             if gap is None and (low > lower).all() and (high < higher).all():
                 one = samples[i].points[:: 1 + len(samples[i].points) // _FEW]
                 if inside_points(one, mesh.vertices, mesh.faces[own[j]]).all():
-                    gap = float(samples[j].nearest(samples[i].points).gaps.min())
+                    gap = float(near.gaps.min())
             found += [] if gap is None else [_Link(gap, i, j)]
     if len(small):
         every = np.concatenate([own[k] for k in large])
@@ -234,14 +233,16 @@ def _links(mesh: Mesh, area: FloatArray, extent: FloatArray) -> list[_Link]:
             mine = _Samples(mesh, own[i], _FEW)
             near = all_large.nearest(mine.points)
             j = int(mesh.components[near.corners[near.gaps.argmin(), 0]])
-            gap = _linked(mine, all_large, most(i, j))
+            gap = _linked(mine, all_large, near, most(i, j))
             found += [] if gap is None else [_Link(gap, i, j)]
     return found
 
 
-def _linked(one: _Samples, other: _Samples, most: float) -> float | None:
-    """Return the gap of *one* to the *other* one if it follows it; *most* if they are against."""
-    near = other.nearest(one.points)
+def _linked(one: _Samples, other: _Samples, near: Nearest, most: float) -> float | None:
+    """Return the gap of *one* to the *other* one, whose nearest points are *near*.
+
+    None if it does not follow it.  With a gap of at most *most* they lie against each other.
+    """
     least = float(near.gaps.min())
     if least <= most:
         return least
