@@ -49,5 +49,7 @@ def grown_cages(problem: Problem, volumes: Volumes) -> FloatArray:
             for each, share in zip(volumes.constraints, shares, strict=True)
         )
         solver.preserve(replace(volumes, constraints=Together(now)))
-        p = solver.landed(p)
+        if (ahead := solver.landed(p)) is p:
+            break  # nor would it lead farther from here
+        p = ahead
     return p

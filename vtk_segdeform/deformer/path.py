@@ -184,22 +184,35 @@ class Path:
         legs, steps = math.ceil(farthest / VOLUME_LEG), 0
         options = replace(options, tolerance=_WAYPOINT_TOLERANCE, max_steps=_WAYPOINT_STEPS)
         for leg in range(1, legs + 1):
-            share = leg / legs
-            ends = zip(begin.constraints, off, strict=True)
-            self._set_volumes(
-                replace(each, target=each.target + share * (each.nearer(by) - each.target))
-                for each, by in ends
-            )
-            if leg < legs:
-                steps += self._minimise(self.targets, options).steps
+            has_landed = self._set_share(leg / legs, begin.constraints, off)
+            if leg == legs:
+                break
+            if not has_landed:  # nor would it farther on
+                self._set_share(1.0, begin.constraints, off)
+                break
+            steps += self._minimise(self.targets, options).steps
         self.is_on_volumes = True
         return steps
 
-    def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> None:
-        """Let the active volumes have the targets of *constraints*, and move the cages there."""
-        volumes = self.constraints.preserved.volumes.among(self.active)
+    def _set_share(
+        self, share: float, begin: Sequence[VolumeConstraint], off: Sequence[float]
+    ) -> bool:
+        """Set volumes a *share* of the way from *begin*, which is *off* its goals; see below."""
+        ends = zip(begin, off, strict=True)
+        return self._set_volumes(
+            replace(each, target=each.target + share * (each.nearer(by) - each.target))
+            for each, by in ends
+        )
+
+    def _set_volumes(self, constraints: Iterable[VolumeConstraint]) -> bool:
+        """Let the active volumes have the targets of *constraints*, and move the cages there.
+
+        Return whether they have arrived there.
+        """
+        volumes, before = self.constraints.preserved.volumes.among(self.active), self.end
         self.solver.preserve(replace(volumes, constraints=Together(constraints)))
-        self.p = self.end = self.solver.landed(self.end)
+        self.p = self.end = self.solver.landed(before)
+        return self.end is not before
 
     def _exchange_bounds(self, x: FloatArray, goal: FloatArray, released: set[int]) -> bool:
         """Activate bounds that the mesh *x* (n, 3) violates; release those with a wrong multiplier.

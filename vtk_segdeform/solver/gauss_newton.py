@@ -84,6 +84,7 @@ _SETTLED = 2  # steps with one H after which their rate is known, Anderson accel
 _WINDOW = 5  # steps that Anderson acceleration remembers
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
+_LANDED = 1e-3  # relative error of a volume: with more, a motion onto the volumes led nowhere
 _SHORT = 20.0  # with less of it, steps are shorter than what remains by at most about this factor
 
 
@@ -335,11 +336,15 @@ class GaussNewton:
         return self._factor.solve_all([np.asarray(row) for row in rows])
 
     def landed(self, p: FloatArray) -> FloatArray:
-        """Return cages *p* (m, 3) moved onto the volumes along Z, with the H of (21)."""
+        """Return cages *p* (m, 3) moved onto the volumes along Z, with the H of (21).
+
+        *p* itself if this leads nowhere, or there are no volumes.
+        """
         if not self.volumes.constraints:
             return p
-        at, _ = self._on_volumes(p, self.directions(self.volumes.rows(self._surface(p))))
-        return at if np.isfinite(at).all() else p
+        at, x = self._on_volumes(p, self.directions(self.volumes.rows(self._surface(p))))
+        has_landed = (np.abs(self.volumes.constraints.relative(x)) < _LANDED).all()
+        return at if has_landed else p
 
     def multipliers(self, p: FloatArray, targets: FloatArray) -> FloatArray:
         """Return lambda (c,) at *p*: minus the change of half the minimum with each volume."""
