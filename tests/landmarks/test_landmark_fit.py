@@ -158,7 +158,9 @@ def test_a_part_without_landmarks_goes_along():
     ball = models.sphere(200, radius=0.1)
     beside = ball.vertices + X.mean(axis=0) + [0.5 * LENGTH, 0.0, 0.0]
     both = Mesh(np.concatenate([X, beside]), np.concatenate([BAR.faces, ball.faces + len(X)]))
-    fit = fit_landmarks(both, X[SPREAD[:12]], bent(40.0)[SPREAD[:12]])
+    fit = fit_landmarks(
+        both, X[SPREAD[:12]], bent(40.0)[SPREAD[:12]], n_regions=2, n_cage_vertices=60
+    )
     size = np.ptp(fit.vertices[len(X) :], axis=0)
     assert (size < 3.0 * np.ptp(beside, axis=0)).all()
     assert np.isfinite(fit.vertices).all()
