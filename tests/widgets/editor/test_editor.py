@@ -5,22 +5,26 @@ from __future__ import annotations
 import threading
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hands import Hand, draw_seldom, picture, plain_view
 from numpy.testing import assert_array_equal
 from scenes import sausage
+from scipy.spatial.transform import Rotation
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 from vtk_segdeform import Session, load_session, models, save_session
 from vtk_segdeform.deformer import LOCALITY
 from vtk_segdeform.errors import CageError, MeshError, RegionError
+from vtk_segdeform.geometry.volume import signed_volume
 from vtk_segdeform.session import solving
 from vtk_segdeform.widgets.editor import actions, controller
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.editor.queue import _Shared
 from vtk_segdeform.widgets.editor.session_file import read_session
+from vtk_segdeform.widgets.handle_dragger.gizmo_shapes import Kind, Part
 from vtk_segdeform.widgets.region_selector.region_selector import Paint, Tool
 from vtk_segdeform.widgets.scene.surface_display import SurfaceStyle
 from vtk_segdeform.widgets.scene.view import View
@@ -102,6 +106,97 @@ def pull_handle(bench, shift=(20, 30), moves=2):
     middle = bench.session.vertices[bench.session.handles[name]].mean(axis=0)
     start = np.array(bench.hand.at(middle))
     bench.hand.drag([start + share * np.array(shift) for share in np.linspace(0.0, 1.0, moves + 1)])
+
+
+def test_the_whole_story(tmp_path):
+    mesh = models.cactus(500)
+    coarse = Session(mesh)
+    coarse.change_options(n_cage_vertices=60)
+    bench = Bench(plain_view((400, 400)), Session(mesh, state=coarse.state))  # without a history
+    del bench.view.render  # drawn at every event
+    hand, z = bench.hand, mesh.vertices[:, 2]
+    volume = signed_volume(mesh.vertices, mesh.faces)
+    drawn = []
+
+    def check_frame(*_):
+        points = bench.editor.widgets.surface.points
+        drawn.append(abs(signed_volume(points, mesh.faces) / volume - 1.0))
+
+    bench.view.renderer.AddObserver("EndEvent", check_frame)
+
+    bench.type("g")
+    assert bench.session.regions.n_regions >= 2
+    assert bench.editor.widgets.selector.region == 1
+    before = bench.session.regions.membership[1].copy()
+    hand.drag([hand.at([0.0, -0.1, height]) for height in (0.45, 0.5, 0.55)])
+    assert bench.session.history.undo_label == "paint region 2"
+    assert np.count_nonzero(bench.session.regions.membership[1]) > np.count_nonzero(before)
+
+    bench.type("f")
+    assert len(bench.session.cages) == bench.session.regions.n_regions
+
+    bench.type("3", "v", "t")
+    start, _, end, _ = bench.around(z < 0.08)
+    hand.drag([start, (end[0], start[1]), end])
+    assert set(np.flatnonzero(z < 0.08)) <= set(bench.session.fixed)
+    assert z[bench.session.fixed].max() < 0.16
+    bench.type("d", "l")
+    hand.drag(bench.around(z > 0.9))
+    assert set(np.flatnonzero(z > 0.9)) <= set(bench.session.handles["handle 1"])
+
+    bench.type("4")
+    assert bench.session.is_bound
+    marked = bench.session.state
+    handle = bench.session.handles["handle 1"]
+    middle = mesh.vertices[handle].mean(axis=0)
+    pivot = np.array(hand.at([0.0, 0.0, 0.5]))
+    arm = np.array(hand.at(middle)) - pivot
+    way = [
+        pivot + [np.cos(a) * arm[0] + np.sin(a) * arm[1], np.cos(a) * arm[1] - np.sin(a) * arm[0]]
+        for a in np.radians(np.linspace(0.0, 60.0, 13))
+    ]
+    hand.drag(way)
+    assert bench.session.history.undo_label == "drag handle 1"
+    there = bench.session.vertices[handle].mean(axis=0)
+    assert np.linalg.norm(np.array(hand.at(there)) - way[-1]) < 12.0
+    turn_by_a_ring(bench)
+    turned = bench.session.vertices
+    assert len(drawn) > 20
+    assert max(drawn) < 1e-12
+
+    steps = 0
+    while bench.session.history.can_undo:
+        bench.type("ctrl+z")
+        steps += 1
+    assert steps == 7  # regions, brush, cages, fixed, handle, drag, turn
+    assert bench.session.regions is None
+    assert_array_equal(bench.editor.widgets.surface.points, mesh.vertices)
+    bench.type(*["ctrl+y", "ctrl+shift+z"] * 3, "ctrl+y")
+    assert not bench.session.history.can_redo
+    assert_array_equal(bench.session.vertices, turned)
+    assert not bench.session.state.changes(replace(marked, pose=bench.session.state.pose))
+
+    bench.editor.path = tmp_path / "cactus.segdeform"
+    bench.type("ctrl+s")
+    while "once the pose has settled" in bench.editor.status:
+        hand.tick()
+    assert "cactus.segdeform" in bench.editor.status
+    assert_array_equal(load_session(bench.editor.path).vertices, bench.session.vertices)
+    assert max(drawn) < 1e-12
+    assert hand.failures == []
+    bench.editor.remove()
+
+
+def turn_by_a_ring(bench):
+    """Rotate the handle about the view direction, by a sixth of the outermost ring."""
+    dragger = bench.editor.widgets.dragger
+    ring = dragger.gizmo.line(Part(Kind.ROTATION))[:, :2]
+    before = bench.session.targets[dragger.handle]
+    bench.hand.drag(ring[np.linspace(0, len(ring) // 6 - 1, 5).astype(int)])
+    assert bench.session.history.undo_label == "rotate handle 1"
+    a, b = (x - x.mean(axis=0) for x in (before, bench.session.targets[dragger.handle]))
+    turn = Rotation.align_vectors(b, a)[0]
+    assert np.degrees(turn.magnitude()) == pytest.approx(60.0, abs=8.0)
 
 
 # Modes, keys and messages.
