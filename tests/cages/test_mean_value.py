@@ -28,7 +28,6 @@ CAGES = {
 DISTANCES = [0.0, *10.0 ** np.arange(-17, -2)]
 
 every_cage = pytest.mark.parametrize("cage", CAGES.values(), ids=CAGES.keys())
-every_distance = pytest.mark.parametrize("distance", DISTANCES)
 
 
 def barycentric(x, corners):
@@ -73,31 +72,31 @@ def test_weights_sum_to_one_and_reproduce_every_point(cage):
         assert_allclose(weights @ cage[0], x, atol=1e-11)
 
 
-@every_distance
 @pytest.mark.parametrize("place", ["face", "plane", "edge", "line", "vertex"])
-def test_weights_are_accurate_at_any_distance_from_a_tetrahedron(place, distance):
+def test_weights_are_accurate_at_any_distance_from_a_tetrahedron(place):
     vertices, faces = TETRAHEDRON[0] @ TURN.T * 1.3 + 0.1, TETRAHEDRON[1]
     off = np.random.default_rng(3).normal(size=(40, 3))
-    off *= distance / np.linalg.norm(off, axis=1, keepdims=True)
-    x = places((vertices, faces))[place] + off
-    assert_allclose(
-        mean_value_coordinates(x, vertices, faces), barycentric(x, vertices), atol=1e-11
-    )
+    off /= np.linalg.norm(off, axis=1, keepdims=True)
+    for distance in DISTANCES:
+        x = places((vertices, faces))[place] + distance * off
+        assert_allclose(
+            mean_value_coordinates(x, vertices, faces), barycentric(x, vertices), atol=1e-11
+        )
 
 
-@pytest.mark.parametrize("distance", [0.0, 1e-16, 1e-12, 1e-8, 1e-4, 1.0])
 @pytest.mark.parametrize("place", ["plane", "line"])
 @pytest.mark.parametrize("name", ["turned octahedron", "turned cube", "sphere", "torus"])
-def test_splitting_a_face_changes_nothing(name, place, distance):
+def test_splitting_a_face_changes_nothing(name, place):
     """The weights integrate a function that is linear on each face, also on the parts of a face."""
     cage, share = CAGES[name], np.array([0.2, 0.3, 0.5])
     finer = split(cage, 0, share)
     off = np.random.default_rng(4).normal(size=(40, 3))
-    off *= distance / np.linalg.norm(off, axis=1, keepdims=True)
-    x = places(cage)[place] + off
-    weights = mean_value_coordinates(x, *finer)
-    weights[:, cage[1][0]] += weights[:, -1:] * share
-    assert_allclose(weights[:, :-1], mean_value_coordinates(x, *cage), atol=1e-10)
+    off /= np.linalg.norm(off, axis=1, keepdims=True)
+    for distance in (0.0, 1e-16, 1e-12, 1e-8, 1e-4, 1.0):
+        x = places(cage)[place] + distance * off
+        weights = mean_value_coordinates(x, *finer)
+        weights[:, cage[1][0]] += weights[:, -1:] * share
+        assert_allclose(weights[:, :-1], mean_value_coordinates(x, *cage), atol=1e-10)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
@@ -135,6 +134,7 @@ def test_weights_agree_with_vtk(name):
 
 def test_memory_is_bounded_for_any_size():
     x = somewhere(20_000)
+    mean_value_coordinates(x, *icosphere(1))  # loads the kernels
     tracemalloc.start()
     weights = mean_value_coordinates(x, *icosphere(1))
     _, peak = tracemalloc.get_traced_memory()

@@ -98,7 +98,7 @@ def test_each_handle_has_its_own_motion_and_a_shift_may_begin_with_a_minus(bar, 
     ("shift", "more", "advice"),
     [
         *((shift, [], ", or use --avoid-contact") for shift in (0.05, -0.8)),
-        *((shift, ["--avoid-contact"], "") for shift in (0.05, -0.6)),
+        (-0.5, ["--avoid-contact"], ""),
     ],
 )
 def test_faces_that_cross_or_are_turned_over_are_counted(

@@ -14,21 +14,27 @@ from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.geometry import rigid_fit
 
 
-@functools.cache
-def club() -> Session:
-    """Return a ball of radius 1 with two arms of radius .2 to z = -3 and 3, which can be pulled."""
+def body() -> Mesh:
+    """Return a ball of radius 1 with two arms of radius .2 to z = -3 and 3."""
     angles = np.linspace(np.pi - 0.3, 0.3, 10)
     ball = np.stack([np.sin(angles), np.cos(angles)], axis=1)
     arm = np.stack([np.full(9, 0.2), np.linspace(1.1, 2.8, 9)], axis=1)
     up = np.concatenate([arm, [[0.14, 2.95], [0.0, 3.0]]])
-    session = Session(Mesh(*revolved(np.concatenate([up[::-1] * [1.0, -1.0], ball, up]), 12)))
-    assert session.accept(session.preparation())
-    return session
+    return Mesh(*revolved(np.concatenate([up[::-1] * [1.0, -1.0], ball, up]), 12))
 
 
-REST = club().mesh.vertices
+BODY = body()
+REST = BODY.vertices
 TIP = int(REST[:, 2].argmax())
 TO = [0.0, 2.0 * np.sin(0.7), 1.0 + 2.0 * np.cos(0.7)]  # by 40 degrees about the joint
+
+
+@functools.cache
+def club() -> Session:
+    """Return a session of the body, which can be pulled."""
+    session = Session(BODY)
+    assert session.accept(session.preparation())
+    return session
 
 
 def another(session: Session) -> Session:
@@ -49,7 +55,7 @@ def bent(hinge: float) -> Session:
 
 def change_of_shape(x: np.ndarray, y: np.ndarray, side: float = 1.0) -> float:
     """Return by how much an arm in the pose *y* differs from that in *x*, turned and moved."""
-    arm = side * club().mesh.vertices[:, 2] > 1.5
+    arm = side * REST[:, 2] > 1.5
     turn, shift = rigid_fit(x[arm], y[arm])
     return float(np.linalg.norm(x[arm] @ turn.T + shift - y[arm], axis=1).max())
 

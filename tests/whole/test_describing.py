@@ -13,6 +13,7 @@ from vtk_segdeform.checks import Described
 SCENE = sausage()
 
 
+@pytest.fixture(scope="module")
 def posed() -> sd.Session:
     session = sd.Session(SCENE.mesh)
     session.set_regions(SCENE.regions)
@@ -24,24 +25,26 @@ def posed() -> sd.Session:
     return session
 
 
-SESSION = posed()
 N = f"{SCENE.mesh.n_vertices:,}"
 
 
 @pytest.mark.parametrize(
     ("thing", "numbers"),
     [
-        (SCENE.mesh, [f"vertices: {N};", "borders: none"]),
-        (sd.Surface(pv.Cube(clean=False)), ["points: 24;", "cells: 6;", "vertices: 8;"]),
-        (SCENE.regions, ["regions: 2;", f"vertices: {N}"]),
-        (SCENE.cages[0], [f"faces: {SCENE.cages[0].n_faces:,}"]),
-        (SESSION.solution, ["status: converged", "volume change: "]),
-        (SESSION.state, ["pose: deformed", "handles: 1"]),
-        (SESSION, [f"vertices: {N};", "handles: 1", "step: 5 of 5", "next: drag a handle"]),
+        (lambda _: SCENE.mesh, [f"vertices: {N};", "borders: none"]),
+        (lambda _: sd.Surface(pv.Cube(clean=False)), ["points: 24;", "cells: 6;", "vertices: 8;"]),
+        (lambda _: SCENE.regions, ["regions: 2;", f"vertices: {N}"]),
+        (lambda _: SCENE.cages[0], [f"faces: {SCENE.cages[0].n_faces:,}"]),
+        (lambda session: session.solution, ["status: converged", "volume change: "]),
+        (lambda session: session.state, ["pose: deformed", "handles: 1"]),
+        (
+            lambda session: session,
+            [f"vertices: {N};", "handles: 1", "step: 5 of 5", "next: drag a handle"],
+        ),
     ],
-    ids=lambda each: type(each).__name__,
 )
-def test_a_line_of_numbers_and_a_table(thing, numbers):
+def test_a_line_of_numbers_and_a_table(posed, thing, numbers):
+    thing = thing(posed)
     line, table = repr(thing), thing._repr_html_()
     assert line.startswith(f"<{type(thing).__name__} ")
     assert "\n" not in line
@@ -58,15 +61,15 @@ def test_an_open_mesh_has_borders_and_a_session_without_anything_has_a_line():
     assert "next: create regions" in repr(sd.Session(mesh))
 
 
-def test_objects_with_large_arrays_have_short_texts():
-    deformer = SESSION.deformer
+def test_objects_with_large_arrays_have_short_texts(posed):
+    deformer = posed.deformer
     for each in (
-        sd.Slide(np.arange(1000)), SESSION.state.pose, deformer.subspace, deformer.bodies,
-        deformer.passengers(SCENE.mesh.vertices), SESSION.lids,
+        sd.Slide(np.arange(1000)), posed.state.pose, deformer.subspace, deformer.bodies,
+        deformer.passengers(SCENE.mesh.vertices), posed.lids,
     ):  # fmt: skip
         assert repr(each).startswith(f"{type(each).__name__}(")
         assert len(repr(each)) < 400
-    assert "an array of int64 and shape" in repr(SESSION.lids)
+    assert "an array of int64 and shape" in repr(posed.lids)
 
 
 def test_text_in_a_table_is_escaped():

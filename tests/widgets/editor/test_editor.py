@@ -326,8 +326,9 @@ def test_a_tap_on_the_key_of_the_mesh_at_rest_ends_with_it_whatever_follows(benc
     assert bench.editor.widgets.surface.instead is None
 
 
-@pytest.mark.parametrize("preset", ["pyvista", "Blender"])
-@pytest.mark.parametrize("mode", [*Mode], ids=lambda mode: mode.name)
+@pytest.mark.parametrize(
+    ("mode", "preset"), [(mode, ("pyvista", "Blender")[k % 2]) for k, mode in enumerate(Mode)]
+)
 def test_no_key_edits_anything_after_a_press_beside_the_mesh(bench, mode, preset):
     editor, session = bench.editor, bench.session
     editor.keys = preset

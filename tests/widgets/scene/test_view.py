@@ -308,6 +308,8 @@ def test_the_surface_follows_the_pose_in_place():
     assert np.array_equal(surface.points, session.vertices)
     assert np.array_equal(session.mesh.vertices, scene.mesh.vertices)
     assert (picture(view) != before).any()
+    session.undo()  # which commits the drag first
+    assert np.array_equal(surface.points, scene.mesh.vertices)
     surface.remove()
 
 
