@@ -30,7 +30,7 @@ const model = {
   get: () => 'picture',
   on: (_, handler) => handlers.add(handler),
   off: (_, handler) => handlers.delete(handler),
-  send(content, _, buffers) {
+  send(content, _, buffers = []) {
     sent = sent.then(async () => socket.send(
       JSON.stringify([content, await Promise.all(buffers.map(packed))])));
   },
@@ -60,6 +60,8 @@ class InNotebook(Served):
 
         self.loop = asyncio.get_running_loop()
         self.tunnel, self.widget = widget.tunnel_of(self.web, "picture")
+        self._outputs: list[asyncio.Queue[str]] = []
+        self.widget.comm.publish_msg = self._publish
         app = web.Application()
         app.router.add_get("/", _page)
         app.router.add_static("/page", Path(widget.__file__).with_name("page"))
@@ -78,28 +80,29 @@ class InNotebook(Served):
         socket = web.WebSocketResponse(max_msg_size=0)
         await socket.prepare(request)
         messages: asyncio.Queue[str] = asyncio.Queue()
-
-        def publish(_: str, data: Any, buffers: Any = (), **__: object) -> None:
-            if data.get("method") != "custom":
-                return
-            texts = [base64.b64encode(each).decode() for each in buffers or ()]
-            messages.put_nowait(json.dumps([data["content"], texts]))
+        self._outputs.append(messages)
 
         async def forward() -> None:
             while True:
                 await socket.send_str(await messages.get())
 
-        comm = self.widget.comm
-        comm.publish_msg = publish
         forwarding = asyncio.ensure_future(forward())
         async for message in socket:
             assert message.type is WSMsgType.TEXT
             content, texts = json.loads(message.data)
             data = {"method": "custom", "content": content}
             buffers = [memoryview(base64.b64decode(each)) for each in texts]
-            comm.handle_msg({"content": {"data": data}, "buffers": buffers})
+            self.widget.comm.handle_msg({"content": {"data": data}, "buffers": buffers})
         forwarding.cancel()
+        self._outputs.remove(messages)
         return socket
+
+    def _publish(self, _: str, data: Any, buffers: Any = (), **__: object) -> None:
+        """Send what the widget sends to all pages, as a kernel does."""
+        if data.get("method") == "custom":
+            texts = [base64.b64encode(each).decode() for each in buffers or ()]
+            for messages in self._outputs:
+                messages.put_nowait(json.dumps([data["content"], texts]))
 
 
 class InFrame:
