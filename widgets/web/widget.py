@@ -22,6 +22,9 @@ class EditorWidget(anywidget.AnyWidget):
     _esm = Path(__file__).with_name("page") / "widget.js"
     picture = traitlets.Unicode().tag(sync=True)  # class of the pictures that a page replaces
 
+    def __repr__(self) -> str:
+        return "The page of the editor is here while its kernel runs."
+
 
 def tunnel_of(editor: WebEditor, picture: str) -> tuple[Tunnel, EditorWidget]:
     """Return the tunnel of an *editor*, and the widget that shows its pages."""
