@@ -73,8 +73,9 @@ def test_a_file_is_uploaded_in_parts_and_the_surface_downloaded(
         " const input = document.querySelector('.sd-file'); input.files = files.files;"
         " input.dispatchEvent(new window.Event('change')); })()"
     )
-    shown.wait(lambda: shown.web.session is not before)
-    frame.wait("document.querySelector('.sd-name').innerText.startsWith('a.off')")
+    frame.wait("!document.querySelector('[data-name=discard]')?.click() && document"
+               ".querySelector('.sd-name').innerText.startsWith('a.off')", 60.0)  # fmt: skip
+    assert shown.web.session is not before
     rested(frame)
     frame.evaluate("document.querySelector('[data-name=download]').click()")
     frame.wait("[...document.querySelectorAll('[role=menuitem]')].length > 1")
