@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import http.client
 import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
-from urllib.request import Request, urlopen
 
 import nbformat
 from nbclient import NotebookClient
@@ -54,29 +51,6 @@ def kernel(folder: Path) -> Iterator[Kernel]:
     client = NotebookClient(nbformat.v4.new_notebook(), timeout=200, kernel_name="python3")
     with client.setup_kernel(env=env):
         yield Kernel(client)
-
-
-def status(address: str, *, upgrade: bool = False) -> int | None:
-    """Return the status that *address* answers with; None if nobody does."""
-    parts = urlsplit(address)
-    connection = http.client.HTTPConnection(str(parts.hostname), parts.port, timeout=20)
-    headers = {
-        "Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
-        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
-    } if upgrade else {}  # fmt: skip
-    try:
-        connection.request("GET", parts.path, headers=headers)
-        return connection.getresponse().status
-    except ConnectionRefusedError:
-        return None
-    finally:
-        connection.close()
-
-
-def loaded(address: str, **headers: str) -> tuple[bytes, str]:
-    """Return the body that *address* answers with, as it is sent, and its encoding."""
-    with urlopen(Request(address, headers=headers), timeout=20) as answer:
-        return answer.read(), answer.headers.get("Content-Encoding", "")
 
 
 def example(change: Callable[[str], str] = str) -> list[str]:

@@ -15,8 +15,11 @@ The files, in reading order:
     transfer    uploads and downloads
     access      a page behind a secret path
     serving     ``segdeform serve``: one editor in one process
-    notebook    the editor in the output of a cell, served by the kernel
-    page/       the page: view.js, panel.js, page.js, page.html, page.css
+    notebook    the editor in the output of a cell, run by the kernel
+    widget tunnel whole_page
+                the parts of that: what is displayed, its messages, its page as one document
+    page/       the page: view.js, panel.js, page.js, page.html, page.css; in a notebook also
+                widget.js around it and tunnel.js in it
     drawing/    the body drawn by the page, from the cages alone
 
 It needs ``pip install 'vtk-segdeform[web]'``.

@@ -1,12 +1,11 @@
-"""The editor in a notebook: a page in the output of a cell, served by the kernel itself.
+"""The editor in a notebook: a page in the output of a cell.
 
     editor = sd.edit(mesh)           # the output shows the page, the cell ends at once
     editor.session.volume_change     # in the next cell
 
-The kernel's event loop runs the server, between cells, so both use the session in one thread.  The
-server listens on 127.0.0.1 only.  Its address contains a secret, because frames of another site get
-no cookies; whoever has the address has the editor.  The page is reached directly, or through
-jupyter-server-proxy if the browser is on another machine: the output tries both.
+The kernel's event loop runs the editor, between cells, so both use the session in one thread.  The
+page talks to the kernel through the channel of the notebook's widgets, wherever the kernel is;
+nothing listens on the network.
 
 An editor ends when nothing refers to it any more, when it is closed, and with the kernel.
 """
@@ -17,14 +16,11 @@ import asyncio
 import base64
 import logging
 import secrets
-import socket
 import string
 import sys
 import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import pyvista as pv
 
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.importing import imported
@@ -44,7 +40,8 @@ _LIVE = ("trame", "server", "client")
 def shows_in_notebook(theme: Any) -> bool:
     """Return whether plotters with this *theme* show in the notebook that runs this code."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
-    has_kernel = getattr(shell, "kernel", None) is not None
+    is_marimo = "marimo" in sys.modules and sys.modules["marimo"].running_in_notebook()
+    has_kernel = getattr(shell, "kernel", None) is not None or is_marimo
     is_wanted = has_kernel if theme.notebook is None else bool(theme.notebook)
     return has_kernel and is_wanted and _backend(theme) != "none"
 
@@ -62,7 +59,8 @@ class NotebookEditor:
 
     def __init__(self, given: Any, web: WebEditor) -> None:
         self.web, self._given = web, given
-        self._page = ""  # PORT/SECRET/index.html
+        self._picture = f"segdeform-{secrets.token_hex(8)}"  # a class of elements
+        self._widget: Any = None
         self._serving: asyncio.Task[None] | None = None
         self._stop: weakref.finalize[Any, Any] | None = None
 
@@ -77,24 +75,19 @@ class NotebookEditor:
         return edited(self._given, self.session)
 
     @property
-    def address(self) -> str:
-        """The address of the page on this machine; it gives access, so keep it private."""
-        return f"http://127.0.0.1:{self._page}" if self.is_live else ""
-
-    @property
     def is_live(self) -> bool:
-        """Whether the editor is served."""
+        """Whether the editor runs."""
         is_wanted = self._stop is not None and self._stop.alive
         return is_wanted and self._serving is not None and not self._serving.done()
 
     def start(self) -> None:
-        """Serve the page in the running event loop; again, do nothing."""
+        """Run the editor in the running event loop; again, do nothing."""
         if self._stop is not None:
             return
-        secret, port = secrets.token_urlsafe(32), _free_port()
-        self._page = f"{port}/{secret}/index.html"
+        tunnel, self._widget = _tunnel_of()(self.web, self._picture)
         loop, ended = asyncio.get_running_loop(), asyncio.Event()
-        self._serving = loop.create_task(self.web.serve_until(ended, port=port, secret=secret))
+        work = self.web.serve_until(ended, last=tunnel.close, port=None)
+        self._serving = loop.create_task(work)
         self._serving.add_done_callback(_report)
         self._stop = weakref.finalize(self, _end, loop, ended)
         self._stop.atexit = False
@@ -107,9 +100,18 @@ class NotebookEditor:
 
     remove = close
 
-    def _repr_mimebundle_(self, **_: Any) -> dict[str, str]:
-        """Return the output of the cell."""
-        return {"text/html": self._html(), "text/plain": repr(self)}
+    def _ipython_display_(self) -> None:
+        """Display a picture, which stays in a saved notebook, and the page in its place."""
+        imported("IPython.display")
+        from IPython.display import display
+
+        display({"text/html": self._html(), "text/plain": repr(self)}, raw=True)
+        if self.is_live:
+            display(self._widget)
+
+    def _display_(self) -> Any:
+        """Return what marimo displays."""
+        return self._widget
 
     def __repr__(self) -> str:
         state = "live" if self.is_live else "closed"
@@ -121,14 +123,9 @@ class NotebookEditor:
         imported(f"{__package__}.pictures")
         from .pictures import Pictures
 
-        theme = pv.global_theme.trame
-        values = {
-            "id": f"segdeform-{secrets.token_hex(8)}",
-            "page": self._page,
-            "picture": base64.b64encode(Pictures(self.web.editor.view).draw()().data).decode(),
-            "proxy": theme.server_proxy_prefix if theme.server_proxy_enabled else "",
-        }
-        return string.Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(values)
+        data = base64.b64encode(Pictures(self.web.editor.view).draw()().data).decode()
+        template = string.Template(_TEMPLATE.read_text(encoding="utf-8"))
+        return template.substitute(picture=self._picture, data=data)
 
 
 def edit_in_notebook(given: Any, session: Session, *, name: str, keys: KeyChoice) -> NotebookEditor:
@@ -211,10 +208,14 @@ def _web_editor() -> type[WebEditor]:
     return WebEditor
 
 
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+def _tunnel_of() -> Any:
+    """Return `widget.tunnel_of`."""
+    try:
+        return imported(f"{__package__}.widget").tunnel_of
+    except ModuleNotFoundError as error:
+        raise MissingDependencyError(
+            f"The editor in a notebook needs {error.name}: pip install 'vtk-segdeform[jupyter]'"
+        ) from None
 
 
 def _end(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:

@@ -17,7 +17,7 @@ import asyncio
 import re
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,7 @@ _POLL = 0.05  # seconds between two looks at whether the pose has settled
 _UPLOAD_TIMEOUT = 30.0  # seconds to wait for the next part of an upload
 UPLOAD_LIMIT = 1 << 30  # bytes
 _COMMON = (".ply", ".obj", ".stl", ".glb", ".off")  # first in the list
+Read = Callable[[], Awaitable[bytes]]
 _LABELS = {".glb": "glTF binary", ".gltf": "glTF"}
 
 
@@ -95,14 +96,17 @@ class Transfer:
 
     async def upload(self, request: web.Request) -> web.Response:
         """Store the body, and open it in the background."""
-        name = re.sub(r"[^\w .()+-]", "_", request.query.get("name", ""))[-_LONGEST_NAME:].strip()
-        suffix = Path(name).suffix.lower()
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may upload files.")
-        field = request.query.get("field", "")
+        return await self.take(request.query, request.content_length, request.content.readany)
+
+    async def take(self, query: Mapping[str, str], size: int | None, read: Read) -> web.Response:
+        """Store a file of this *size*, which *read* returns in parts, and open it."""
+        name = re.sub(r"[^\w .()+-]", "_", query.get("name", ""))[-_LONGEST_NAME:].strip()
+        suffix, field = Path(name).suffix.lower(), query.get("field", "")
         if not field and suffix != _SESSION and not is_mesh_file(f"mesh{suffix}"):
             return _refusal(415, f"{name or 'This file'} is no mesh or session that can be opened.")
-        if (request.content_length or 0) > self.limit:
+        if (size or 0) > self.limit:
             return self._too_large(name)
         if self._is_uploading:
             return _refusal(409, "Another upload is in progress. Wait until it is complete.")
@@ -111,7 +115,7 @@ class Transfer:
         self._is_uploading, folder = True, self._new_folder()
         place, is_open = folder / f"upload{suffix}", False
         try:
-            if not await self._store(request, place):
+            if not await self._store(read, place):
                 return self._too_large(name)
             self._names.update(dict.fromkeys(map(str, (place, place.with_suffix(_SESSION))), name))
             if field:
@@ -134,11 +138,11 @@ class Transfer:
             web.Response() if error is None else _refusal(409, str(error).replace(str(place), name))
         )
 
-    async def _store(self, request: web.Request, place: Path) -> bool:
-        """Write the body to *place*; return False if it is larger than the limit."""
+    async def _store(self, read: Read, place: Path) -> bool:
+        """Write a file to *place*; return False if it is larger than the limit."""
         size = 0
         with replacing(place) as draft, draft.open("wb") as file:
-            while data := await asyncio.wait_for(request.content.readany(), _UPLOAD_TIMEOUT):
+            while data := await asyncio.wait_for(read(), _UPLOAD_TIMEOUT):
                 size += len(data)
                 if size > self.limit:
                     return False
@@ -147,10 +151,13 @@ class Transfer:
 
     async def download(self, request: web.Request) -> web.Response:
         """Send the session, or the surface in its pose, once that has settled."""
-        suffix = f".{request.match_info['suffix']}"
         if _HEADER not in request.headers:
             return _refusal(403, "Only the page of the editor may download files.")
-        field = request.query.get("field", "")
+        return await self.give(request.match_info["suffix"], request.query)
+
+    async def give(self, suffix: str, query: Mapping[str, str]) -> web.Response:
+        """Return a download without an address; see `download`."""
+        suffix, field = f".{suffix}", query.get("field", "")
         if suffix not in ((".csv",) if field else (_SESSION, *writable_suffixes())):
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:

@@ -92,6 +92,10 @@ class WebEditor:
         The server of the page.
     stream : Stream
         The view's input and pictures; ``stream.want()`` is the one place that asks for a picture.
+    transfer : Transfer
+        Uploads and downloads.
+    endpoint : wslink.protocol.WslinkHandler or None
+        Where `Tunnel` connects its pages, while this is served without a port.
     """
 
     def __init__(
@@ -133,9 +137,8 @@ class WebEditor:
         self._stop = self.editor.controller.messages.on_change(self.stream.wake)
         self._aim: tuple[float, ...] | None = tuple(self.plotter.camera.position)
         self._protocol = ViewProtocol(self.stream, drawing, self._sized)
-        self._transfer = Transfer(
-            self.editor, self._folder, upload_limit, names, self.model.changed
-        )
+        self.transfer = Transfer(self.editor, self._folder, upload_limit, names, self.model.changed)
+        self.endpoint: Any = None
         self._secret, self._once = "", ""
         self._hidden: Any = None  # the application behind the secret
         self._make_page()
@@ -160,7 +163,7 @@ class WebEditor:
     async def serve(
         self,
         *,
-        port: int = 0,
+        port: int | None = 0,
         host: str = "127.0.0.1",
         secret: str = "",
         once: str = "",
@@ -171,7 +174,7 @@ class WebEditor:
         Parameters
         ----------
         port, ready
-            As for `start`.
+            As for `start`; if *port* is None, listen nowhere, for the pages of a `Tunnel`.
         host : str
             The address to listen on.
         secret : str
@@ -194,10 +197,10 @@ class WebEditor:
         self.server.controller.on_server_ready.add(begin)
         with _own_settings():
             running = self.server.start(
-                port=port,
+                port=port or 0,
                 host=host,
                 exec_mode="coroutine",
-                backend="aiohttp",
+                backend="generic" if port is None else "aiohttp",
                 open_browser=False,
                 show_connection_info=False,
                 disable_logging=True,
@@ -273,7 +276,7 @@ class WebEditor:
         server.controller.trigger("press")(self.model.press)
         state = server.state
         state.formats = formats()
-        state.upload_limit = self._transfer.limit
+        state.upload_limit = self.transfer.limit
         state.dark = False
         state.change("dark")(self._set_dark)
         themes = {name: {"dark": name == "dark", "colors": c} for name, c in _COLOURS.items()}
@@ -288,7 +291,10 @@ class WebEditor:
 
     def _bound(self, server: Any) -> None:
         """Add the routes of files to wslink's *server*; hide it if there is a secret."""
-        self._transfer.add_routes(server.app)
+        if server.app is None:  # it listens nowhere
+            self.endpoint = server["ws"]
+            return
+        self.transfer.add_routes(server.app)
         if self._secret:
             self._hidden = server.app
             server.set_app(below(self._secret, server.app, once=self._once))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gzip
 import os
 import re
 import signal
@@ -13,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
@@ -154,6 +156,18 @@ def test_no_other_page_learns_the_address(served):
     _, text = get(served, f"/{served.secret}/index.html")
     for header in ("Referrer-Policy: no-referrer", "Cache-Control: no-store"):
         assert header in text
+
+
+def test_the_files_of_the_page_are_compressed_for_browsers_that_accept_it(served):
+    address = f"http://127.0.0.1:{served.port}/{served.secret}/__segdeform/surface.js"
+    with urlopen(address) as answer:
+        plain = answer.read()
+        assert "Content-Encoding" not in answer.headers
+    with urlopen(Request(address, headers={"Accept-Encoding": "gzip"})) as answer:
+        packed = answer.read()
+        assert answer.headers["Content-Encoding"] == "gzip"
+    assert gzip.decompress(packed) == plain
+    assert len(packed) < 0.5 * len(plain)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ const remembered = {
   get(name) { try { return localStorage.getItem(name); } catch { return null; } },
   set(name, value) { try { localStorage.setItem(name, value); } catch { /* private window */ } },
 };
-const address = (path) => new URL(path, window.location.href.replace(/[^/]*([?#].*)?$/, ''));
+const address = (path) => new URL(path, document.baseURI);
 
 const isTouch = window.matchMedia('(pointer: coarse)');
 const LOST = 'The connection to the server was lost.';
