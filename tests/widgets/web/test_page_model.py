@@ -126,7 +126,7 @@ def test_a_download_waits_until_the_pose_has_settled(web, tmp_path):
         request = SimpleNamespace(
             match_info={"suffix": "segdeform"}, query={}, headers={"X-Segdeform": "1"}
         )
-        download = asyncio.create_task(web._transfer.download(request))
+        download = asyncio.create_task(web.transfer.download(request))
         await asyncio.sleep(0.1)
         assert not download.done()
         settle(editor)

@@ -44,6 +44,7 @@ function render({ model, el }) {
       frame.srcdoc = await unpacked(buffer);
       for (const each of document.querySelectorAll(`.${model.get('picture')}`)) each.hidden = true;
     } else if (message.kind === 'ended') {
+      model.off('msg:custom', hear); // pictures that are on their way say nothing any more
       frame.remove();
       say(ENDED);
     } else if (message.kind === 'refused') console.error(message.reason);
