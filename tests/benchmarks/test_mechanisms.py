@@ -31,7 +31,7 @@ class Body:
     def poses(self, case, mechanism=None):
         """Return poses (k, n, 3) of *case*, with *mechanism* turned off."""
         preparation = self.preparation
-        if mechanism is not None and mechanism.binds:
+        if mechanism is not None:
             preparation = mechanisms.bound_again(self.own, preparation)
         if case == "bend":
             session = ready(preparation, self.own, handle=True)

@@ -77,8 +77,6 @@ class Mechanism:
         While it is off, the module or class at *place* has *instead* as its *attribute*.
     cases : tuple of str
         What it can make a difference to.
-    binds : bool
-        Whether it is part of the binding.
     """
 
     name: str
@@ -87,7 +85,6 @@ class Mechanism:
     attribute: str
     instead: Any
     cases: tuple[str, ...]
-    binds: bool = False
 
     @contextlib.contextmanager
     def off(self) -> Iterator[None]:
@@ -143,19 +140,19 @@ MECHANISMS = (
     ),
     Mechanism(
         "coarse volume", "steps preserve the volume of some 2,000 points",
-        "sizes", "COARSE_VOLUME", 1 << 62, _EVERY, binds=True,
+        "sizes", "COARSE_VOLUME", 1 << 62, _EVERY,
     ),
     Mechanism(
         "scaled volume", "beyond 20,000 vertices a pose is scaled to its exact volume",
-        "sizes", "SCALED_VOLUME", 1 << 62, _EVERY, binds=True,
+        "sizes", "SCALED_VOLUME", 1 << 62, _EVERY,
     ),
     Mechanism(
         "inside of the body", "rotations of points inside are in the energy",
-        "deformer.binding", "with_interior", lambda energy, *_: energy, _SHAPE, binds=True,
+        "deformer.binding", "with_interior", lambda energy, *_: energy, _SHAPE,
     ),
     Mechanism(
         "cage stiffness", "the edges of the cages are in the energy",
-        "deformer.binding", "with_cage_stiffness", lambda energy, *_: energy, _SHAPE, binds=True,
+        "deformer.binding", "with_cage_stiffness", lambda energy, *_: energy, _SHAPE,
     ),
     Mechanism(
         "anchors of loose parts", "weak springs on parts without handles",
@@ -215,10 +212,8 @@ def measured(body: str) -> dict[tuple[str, str], Values]:
     own, given = Hand.on(mesh), Session(mesh).preparation()
     found = {}
     for each in MECHANISMS:
-        without = given
-        if each.binds:
-            with each.off():
-                without = bound_again(own, given)
+        with each.off():
+            without = bound_again(own, given)  # which keeps nothing that was computed with it
         for case in each.cases:
             found[each.name, case] = compared(each, case, own, (given, without))
     return found
