@@ -190,19 +190,16 @@ def _decimals(size: float) -> int:
 
 def _files(field: Field, action: Callable[..., Action]) -> tuple[Field, Field]:
     """Return *field* for the landmarks, and for their targets, with *action* for the path."""
-    own = replace(
-        field,
-        name=field.name.format("source"),
-        label=field.label.format(""),
-        tip=field.tip.format("landmarks, at rest,"),
-        act=partial(action, targets=False),
-    )
-    targets = replace(
-        field,
-        name=field.name.format("target"),
-        label=field.label.format(" targets"),
-        tip=field.tip.format("targets"),
-        act=partial(action, targets=True),
+    kinds = ("source", "", "landmarks, at rest,"), ("target", " targets", "targets")
+    own, targets = (
+        replace(
+            field,
+            name=field.name.format(kind),
+            label=field.label.format(label),
+            tip=field.tip.format(what),
+            act=partial(action, targets=kind == "target"),
+        )
+        for kind, label, what in kinds
     )
     return own, targets
 

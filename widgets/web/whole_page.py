@@ -73,7 +73,7 @@ def _style(path: Path) -> str:
 
 
 def _blocks(path: Path, known: set[str]) -> Iterator[str]:
-    """Yield a module of ours as a block of one script, after those that it imports.
+    """Yield the modules that the one at *path* imports, and then itself, as blocks of one script.
 
     Modules import from files beside them, and export by default only.
     """
