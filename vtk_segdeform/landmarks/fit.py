@@ -212,9 +212,9 @@ def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> Float
 
 def _require_image(a: FloatArray, u: FloatArray) -> None:
     """Raise ArgumentError if *u* (k, 3) is no image of *a* (k, 3), or a mirror image."""
-    for name, points in {"source": a, "target": u}.items():
+    for name, points in {"landmarks": a, "targets": u}.items():
         if (points == points[0]).all():
-            raise ArgumentError(f"{name} must not have all landmarks at one place")
+            raise ArgumentError(f"the {name} are all at one place")
     a, u = (each - each.mean(axis=0) for each in (a, u))
     a, u = a / np.linalg.norm(a), u / np.linalg.norm(u)
     left, overlaps, right = np.linalg.svd(u.T @ a)
@@ -224,7 +224,7 @@ def _require_image(a: FloatArray, u: FloatArray) -> None:
     turned = 1.0 - (overlaps.sum() - 2.0 * overlaps[-1]) ** 2
     if reflected + _ROUNDING < _MIRRORED * turned:  # unlike landmarks in a plane
         raise ArgumentError(
-            "target must not be a mirror image of source: exchange left and right landmarks, or "
+            "the targets are a mirror image of the landmarks: exchange left and right ones, or "
             "mirror the mesh first"
         )
 
