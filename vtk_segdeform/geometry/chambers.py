@@ -42,6 +42,8 @@ class Chambers(NamedTuple):
     hulls: tuple[IntArray, ...]
     """(k, 3) each: the faces around all chambers of a connected part of the surface together: those
     that are around one only.  So their volume is the sum of that of the chambers."""
+    flat: tuple[IntArray, ...] = ()
+    """(k, 3) each: faces around nothing, as a flap and its lid are."""
 
 
 NO_CHAMBERS = Chambers((), ())
@@ -80,19 +82,23 @@ def chambers_of(vertices: FloatArray, faces: IntArray) -> Chambers:
     own = np.flatnonzero(crowded[half_edges.shells])
     part = _closed(_apart(around, borders, sides), half_edges, patch)
     every = _around_parts(faces, own, part[2 * patch[own, None] + [_FRONT, _BACK]])
-    inside, shells = [], []
+    inside, shells, flat = [], [], []
     for first, each in every:
         points = vertices - vertices[each[0, 0]]
         _, e, f = corner_and_edges(points, each)
         area = 0.5 * float(np.linalg.norm(np.cross(e, f), axis=1).sum())
-        if signed_volume(points, each) > NO_VOLUME * area**1.5:  # not so that of a flap and its lid
+        volume, tiny = signed_volume(points, each), NO_VOLUME * area**1.5
+        if abs(volume) <= tiny:
+            flat.append(each)
+        elif volume > 0.0:
             inside.append(each)
             shells.append(half_edges.shells[first])
     together = [
         np.concatenate([each for each, of in zip(inside, shells, strict=True) if of == shell])
         for shell in dict.fromkeys(shells)
     ]
-    return Chambers(tuple(inside), tuple(_without_walls(each) for each in together))
+    hulls = tuple(_without_walls(each) for each in together)
+    return Chambers(tuple(inside), hulls, tuple(flat))
 
 
 def _without_walls(faces: IntArray) -> IntArray:

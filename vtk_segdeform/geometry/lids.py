@@ -74,8 +74,8 @@ class Lids(Frozen):
     component : (k,) int
         The component of the mesh that each loop bounds.
     of_wall : (k,) bool
-        Whether three or more faces meet at every edge of a loop, or its lid closes no chamber of a
-        component that has some, like that of a flap: it is no hole.
+        Whether three or more faces meet at every edge of a loop, or it is that of a flap: it is no
+        hole.
     encloses : (c,) bool
         Whether each component of the mesh encloses a volume.
     option : bool or None
@@ -204,10 +204,8 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
         walls = np.concatenate([mesh.faces, closing])
         walls = walls[is_two_sided[walls[:, 0]]]
         chambers = chambers_of(extension @ mesh.vertices, walls)
-        found = replace(found, chambers=chambers)
-        around = np.isin(n + np.arange(k), np.concatenate([faces[:0], *chambers.inside]))
-        has_chambers = np.isin(component, found.with_chambers(mesh))
-        found = replace(found, of_wall=of_wall | (has_chambers & ~around))
+        is_flap = np.isin(n + np.arange(k), np.concatenate([faces[:0], *chambers.flat]))
+        found = replace(found, chambers=chambers, of_wall=of_wall | is_flap)
     return replace(found, encloses=_enclosing(mesh, found, wanted))
 
 
