@@ -14,6 +14,7 @@ from solids import icosphere, rotation
 
 from vtk_segdeform.geometry import lids_of, signed_volume
 from vtk_segdeform.mesh import HalfEdges, Mesh, mesh_of
+from vtk_segdeform.solver import total_volume
 
 
 def pieces(seed: int, size: int) -> np.ndarray:
@@ -170,5 +171,6 @@ def test_a_flap_on_a_body_is_no_chamber_and_its_lid_no_hole(rng):
         assert_allclose(
             signed_volume(lids.extension @ flapped.vertices, inside), signed_volume(points, faces)
         )
+        assert_allclose(total_volume(flapped).target, signed_volume(points, faces))
         assert lids.summary() == "Closed surface: volume kept"
         assert not lids.is_open.any()

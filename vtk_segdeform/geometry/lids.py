@@ -203,8 +203,11 @@ def _lids_of(mesh: Mesh, wanted: bool | None) -> Lids:
         closing = faces[~of_wall[loop]] if wanted is not False else faces[:0]
         walls = np.concatenate([mesh.faces, closing])
         walls = walls[is_two_sided[walls[:, 0]]]
-        chambers = chambers_of(extension @ mesh.vertices, walls)
-        is_flap = np.isin(n + np.arange(k), np.concatenate([faces[:0], *chambers.flat]))
+        points, centres = extension @ mesh.vertices, n + np.arange(k)
+        chambers = chambers_of(points, walls)
+        is_flap = np.isin(centres, np.concatenate([faces[:0], *chambers.flat]))
+        if is_flap.any():  # both of its sides are in one part of space then
+            chambers = chambers_of(points, walls[~np.isin(walls, centres[is_flap]).any(axis=1)])
         found = replace(found, chambers=chambers, of_wall=of_wall | is_flap)
     return replace(found, encloses=_enclosing(mesh, found, wanted))
 
