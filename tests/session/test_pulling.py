@@ -531,3 +531,15 @@ def test_a_face_without_a_vertex_within_the_radius_is_not_grabbed():
     with pytest.raises(ConstraintError, match="no vertex is near this point"):
         session.pull(INSIDE, INSIDE.at(X) + UP, radius=0.001 * D)
     assert session.state.pose is None
+
+
+def test_a_pulled_point_is_moved_as_any_handle_before_the_pull_is_committed():
+    session, motion = ready(), np.eye(4)
+    motion[:3, 3] = UP
+    session.pull(HIGH, X[HIGH] + UP)
+    (name,) = session.handles
+    session.move_handle(name, motion)
+    assert_allclose(session.targets[name], [X[HIGH] + 2.0 * UP], atol=1e-9 * D)
+    session.commit()
+    assert session.undo() is not None
+    assert_allclose(session.targets[name], [X[HIGH] + UP], atol=1e-9 * D)

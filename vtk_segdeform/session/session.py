@@ -627,6 +627,9 @@ class Session(Described):
         if matrix.shape != (4, 4):
             return self.drag({name: matrix}, max_steps=max_steps)
         drag = self.history.drag
+        if drag is not None and name not in drag.start.handles:
+            self.commit()  # the pull that made it
+            drag = None
         start = self._released(self.state if drag is None else drag.start)
         places = handles.targets_of(self.mesh, start)[name]
         return self.drag({name: handles.moved(places, matrix)}, max_steps=max_steps)
