@@ -19,6 +19,7 @@ from vtk_segdeform import models, sizes
 from vtk_segdeform.arrays import FloatArray
 from vtk_segdeform.cages import fit_cages
 from vtk_segdeform.deformer.deformer import Deformer
+from vtk_segdeform.deformer.limbs import _lengths
 from vtk_segdeform.deformer.locality import Ring, SurfaceSamples
 from vtk_segdeform.deformer.path import Path
 from vtk_segdeform.deformer.pull import pull
@@ -615,3 +616,13 @@ def test_a_point_is_pulled_alone_where_its_ring_may_not_resist(corners):
     assert_allclose(
         row @ local._problem.rest_cages, point.at(local._problem.rest.vertices), atol=1e-6
     )
+
+
+def test_no_front_is_shorter_than_nothing(rng):
+    """Between parts of a surface that are not joined there are no faces, but rounding of areas."""
+    for _ in range(8):
+        low = np.concatenate([0.5 * rng.random(50), 2.0 + 0.5 * rng.random(50)])
+        ends, rates = low + 0.1 + 0.4 * rng.random(100), rng.random(100)
+        found = _lengths(np.linspace(1.2, 1.8, 7), low, ends, rates, 0.1)
+        assert (found >= 0.0).all()
+        assert (found < 1e-12).all()
