@@ -163,7 +163,7 @@ def _lengths(
     area = np.concatenate([[0.0], np.cumsum(slope[:-1] * np.diff(where))])
     half = 0.5 * _ACROSS * edge
     upper, lower = (np.interp(levels + side, where, area) for side in (half, -half))
-    return np.maximum((upper - lower) / (2.0 * half), 0.0)  # rounding of areas
+    return np.asarray(np.maximum(upper - lower, 0.0) / (2.0 * half))  # 0: rounding of areas
 
 
 def with_hinge(
