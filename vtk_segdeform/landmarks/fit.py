@@ -46,8 +46,6 @@ LEAST_PAIRS = 3
 """Of a fit: fewer do not tell how a body is turned."""
 _GROUPS = 12  # of landmarks that are left out, at most
 _BOUND, _TESTED, _FITTED = 0.3, 0.75, 0.85  # of the progress
-_MIRRORED = 0.25  # of the squares of a rotation: with a reflection less is left between images
-_ROUNDING = 1e-9
 _WORDS = {0: "", 1: "at least ", -1: "at most "}
 
 
@@ -132,7 +130,7 @@ def fit_landmarks(
     ArgumentError
         If there are fewer than three pairs, an uncertainty is negative, arrays do not fit, *slides*
         are no pairs of landmarks and what they slide along, landmarks or targets are all at one
-        place, or targets are a mirror image of the landmarks, such as with left and right swapped.
+        place, or the body would be turned inside out, such as with left and right swapped.
     CageError
         If a landmark is too far from the mesh.
     ConstraintError
@@ -158,7 +156,7 @@ def fit_landmarks(
     if sigma.shape not in ((), (len(a),)) or not (np.isfinite(sigma) & (sigma >= 0.0)).all():
         raise ArgumentError(f"uncertainty must be one or {len(a)} numbers, 0 or more")
     u = slid(a, u, tracks)
-    _require_image(a, u)
+    _require_extent(a, u)
     goal = checked_goals({"whole": volume})["whole"]
     body = SpringBody(
         mesh,
@@ -175,6 +173,12 @@ def fit_landmarks(
     tell(progress, _TESTED, "moving the body")
     move = to = fitting.map_of(stiffness)
     x = move(None)
+    frame = body.problem.frame
+    if body.enclosed.has_volume and body.enclosed.relative(frame.about_origin(x)) <= -1.0:
+        raise ArgumentError(
+            "the targets turn the body inside out, as a mirror image does: exchange left and right "
+            "landmarks, or mirror the mesh first"
+        )
     if goal is not None:
         tell(progress, _FITTED, "reaching the volume")
         text = f"{_WORDS[goal.bound]}{goal.target(body.enclosed.target)!r}"
@@ -189,7 +193,7 @@ def fit_landmarks(
 
         to = carried
     tell(progress, 1.0, "fitted")
-    change = body.enclosed.relative(body.problem.frame.about_origin(x))
+    change = body.enclosed.relative(frame.about_origin(x))
     tested = errors[best], errors[0]
     return LandmarkFit(x, u, u - to(a), *tested, stiffness, change, _map=to, _mesh=mesh)
 
@@ -210,23 +214,11 @@ def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> Float
     return found
 
 
-def _require_image(a: FloatArray, u: FloatArray) -> None:
-    """Raise ArgumentError if *u* (k, 3) is no image of *a* (k, 3), or a mirror image."""
+def _require_extent(a: FloatArray, u: FloatArray) -> None:
+    """Raise ArgumentError if landmarks *a* (k, 3) or targets *u* (k, 3) are all at one place."""
     for name, points in {"landmarks": a, "targets": u}.items():
         if (points == points[0]).all():
             raise ArgumentError(f"the {name} are all at one place")
-    a, u = (each - each.mean(axis=0) for each in (a, u))
-    a, u = a / np.linalg.norm(a), u / np.linalg.norm(u)
-    left, overlaps, right = np.linalg.svd(u.T @ a)
-    if np.linalg.det(left @ right) > 0.0:
-        return
-    reflected = 1.0 - overlaps.sum() ** 2  # the squares that are left with the best scale
-    turned = 1.0 - (overlaps.sum() - 2.0 * overlaps[-1]) ** 2
-    if reflected + _ROUNDING < _MIRRORED * turned:  # unlike landmarks in a plane
-        raise ArgumentError(
-            "the targets are a mirror image of the landmarks: exchange left and right ones, or "
-            "mirror the mesh first"
-        )
 
 
 class _Fitting:
