@@ -193,6 +193,8 @@ def test_what_turns_the_body_inside_out_is_refused_and_a_plate_may_bend_the_othe
     other = bent(-60.0, X * flat)  # nearly the mirror image of the plate
     fit = fit_landmarks(plate, plate.vertices[ids], other[ids], **OPTIONS)
     assert off(fit, other) < 0.02 * LENGTH
+    fit = fit_landmarks(BAR, X[ids], 1e-9 * X[ids], **OPTIONS)  # whose volume is 0 to rounding
+    assert_allclose(fit.vertices, 1e-9 * X, atol=1e-12)
 
 
 def test_progress_rises_and_cancels():

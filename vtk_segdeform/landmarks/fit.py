@@ -174,7 +174,8 @@ def fit_landmarks(
     move = to = fitting.map_of(stiffness)
     x = move(None)
     frame = body.problem.frame
-    if body.enclosed.has_volume and body.enclosed.relative(frame.about_origin(x)) <= -1.0:
+    alike = frame.about_origin(x / fitting.scale)  # of about the size at rest
+    if body.enclosed.has_volume and body.enclosed.relative(alike) <= -1.0:
         raise ArgumentError(
             "the targets turn the body inside out, as a mirror image does: exchange left and right "
             "landmarks, or mirror the mesh first"
@@ -242,10 +243,10 @@ class _Fitting:
             kept, spline = few[stays], Spline(a[few[stays]], smoothing[stays])
             self._splits.append((kept, left, spline))
             self._alone[left] = np.linalg.norm(spline.at(a[left], u[kept]) - u[left], axis=1)
-        self._scale = _scale_between(a[few], u[few])
-        self._rotation, self._shift = rigid_fit(self._scale * a[few], u[few])
-        self._u = (u - self._shift) @ self._rotation / self._scale
-        self._sigma = sigma / self._scale
+        self.scale = _scale_between(a[few], u[few])
+        self._rotation, self._shift = rigid_fit(self.scale * a[few], u[few])
+        self._u = (u - self._shift) @ self._rotation / self.scale
+        self._sigma = sigma / self.scale
 
     def left_out(self, progress: Progress | None) -> FloatArray:
         """Return the distance of each landmark from its target if left out, (1 + stiffness, k)."""
@@ -256,7 +257,7 @@ class _Fitting:
             for row, pose in zip(found[1:], self._poses(kept, STIFFNESS), strict=True):
                 x, r, back = self._left(pose)
                 x = x[left] + _turned(r[left], spline.at(self._a[left], back[kept]))
-                row[left] = self._scale * np.linalg.norm(x - self._u[left], axis=1)
+                row[left] = self.scale * np.linalg.norm(x - self._u[left], axis=1)
         return found
 
     def map_of(self, stiffness: float) -> Callable[[FloatArray | None], FloatArray]:
@@ -281,7 +282,7 @@ class _Fitting:
             if pose is not None:
                 x, r = pose.surface() if points is None else pose.at(self._body.attach(points))
                 x = x + _turned(r, grown)
-            return np.asarray(self._scale * x @ self._rotation.T + self._shift)
+            return np.asarray(self.scale * x @ self._rotation.T + self._shift)
 
         return move
 
