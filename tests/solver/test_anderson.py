@@ -51,3 +51,15 @@ def test_a_step_combines_the_last_ones_so_that_their_residuals_cancel_best(windo
     shares = np.linalg.solve(full, np.append(np.zeros(window + 1), 1.0))[:-1]
     ends = np.hstack([p + h for p, h in zip(ps, hs, strict=True)][-window - 1 :])
     assert_allclose(p, ends @ shares[:, None], atol=1e-9)
+
+
+def test_differences_serve_on_where_the_map_has_moved_by_a_constant():
+    """As with new targets: then one step reaches the fixed point, for all of space is known."""
+    A, b = _problem()
+    anderson = Anderson(N)
+    p = _steps(anderson, A, b, np.zeros_like(b), N + 1)
+    anderson.pause()
+    moved = b + np.array([[3.0], [-1.0], [0.5], [2.0]])
+    assert_allclose(_steps(anderson, A, moved, p, 1), moved, atol=1e-9)
+    anderson.forget()
+    assert_allclose(_steps(anderson, A, b, p, 1), p + 0.5 * A @ (b - p))

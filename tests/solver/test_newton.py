@@ -97,6 +97,29 @@ def test_an_accelerated_step_that_is_not_allowed_is_not_taken():
     assert limited.merits[-1] < 1e-3 * limited.merits[0]
 
 
+class Wild(Anderson):
+    """An acceleration that leads astray, to *where*."""
+
+    def __init__(self, where):
+        super().__init__(1)
+        self.where = where
+
+    def extrapolate(self, q, residual):
+        return self.where
+
+
+@pytest.mark.parametrize("share, is_taken", [(0.9, False), (0.5, False), (1e-4, True)])
+def test_an_accelerated_step_must_do_about_as_well_as_the_plain_one_promises(share, is_taken):
+    """Not only lower the merit, which is large where a handle has moved on."""
+    problem = bowl()
+    problem.H = problem.A / 0.99  # so the plain step promises a hundredth of the merit
+    start = problem.evaluated(np.zeros((N, 3)))
+    wild = problem.goal * (1.0 - np.sqrt(share))
+    end = minimise(problem, start, Wild(wild), tolerance=1e-9, max_steps=1)
+    assert (end.pose.at is wild) == is_taken
+    assert end.merits[1] <= 0.02 * start.merit
+
+
 def test_another_matrix_is_tried_where_no_share_of_a_step_helps():
     problem = bowl()
     problem.H, problem.others = -problem.A, [-problem.A, problem.A]

@@ -6,6 +6,8 @@ combined alike, cancel best:
     gamma = argmin | h_k - sum_j gamma_j (h_j+1 - h_j) |
     p     = q_k - sum_j gamma_j (q_j+1 - q_j)
 
+The differences are of the map only: if q changes by a constant, as with new targets, they serve on.
+
 Source
 ------
 D. G. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12(4), 1965.
@@ -36,6 +38,10 @@ class Anderson:
     def copy(self) -> Anderson:
         """Return another with the same steps."""
         return copy.copy(self)  # lists and arrays are replaced, never changed
+
+    def pause(self) -> None:
+        """Keep the differences, which hold for other targets, too, but not the last step."""
+        self._last = None
 
     def forget(self) -> None:
         """Discard all steps."""

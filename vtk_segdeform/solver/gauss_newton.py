@@ -36,8 +36,9 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
    rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
    lowers the objective, the paper's H takes its place.
-3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  In pulls of soft
-   bodies, with 8 steps a frame, poses are 2 to 5 times nearer to converged ones with it.
+3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  Targets change q by
+   a constant, so it remembers the steps of earlier frames, until H changes.  This saves a quarter
+   of the steps of drags and pulls.
 4. *Line search* (`newton`).
 5. *Extrapolation* (`extrapolation`).  A slow drag starts each solve on along the way of the last
    ones, if the objective is lower there.  This saves half of the steps of a steady drag.
@@ -81,7 +82,7 @@ _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
 _COST = 4  # of computing H again, in steps
 _SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
-_WINDOW = 5  # steps that Anderson acceleration remembers
+_WINDOW = 5  # steps that Anderson acceleration remembers, those of earlier calls included
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
 _EXACT = 0.99  # least share of the rotations' term with which a step tells what remains
 _LANDED = 1e-3  # relative error of a volume: with more, a motion onto the volumes led nowhere
@@ -150,10 +151,10 @@ class _State:
     end: tuple[FloatArray, FloatArray] | None = None  # p and targets of the last call
 
     def begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> None:
-        """Begin a call; forget the last steps unless it begins where the last one ended."""
+        """Begin a call, which continues the last steps if it begins where they ended."""
         self.tolerance, self.left, self.is_new = options.tolerance, options.max_steps, False
         if self.end is None or self.end[0] is not p or not np.array_equal(targets, self.end[1]):
-            self.acceleration.forget()
+            self.acceleration.pause()
             self.length = math.inf
 
     def is_slow(self, step: Step) -> bool:
@@ -418,6 +419,8 @@ class GaussNewton:
     def _renew(self, here: _Iterate) -> None:
         """Let H be that of this pose; the paper's if it is not convex."""
         state = self._state
+        if not state.is_new:  # another H of the same call differs little
+            state.acceleration.forget()  # the differences are of steps with the last H
         state.factor, state.age, state.is_new = self._factor_at(here), 0, True
         state.has_terms = here.is_active
 

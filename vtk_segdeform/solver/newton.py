@@ -6,8 +6,9 @@ Every step is (21), with a Hessian that the objective chooses, and ends on the v
 poses have the same volumes, and the objective itself is the merit, which falls in every step:
 
 1. Anderson acceleration proposes a step.
-2. If the merit is not lower there, the plain step is tried, and shares 1/2, 1/4 ... of it: the
-   epsilon of section 3.3.
+2. If the merit there is not lower, or more than twice what the plain step promises, the plain step
+   is tried, and shares 1/2, 1/4 ... of it: the epsilon of section 3.3.  (Of a handle that has moved
+   on, the merit is so large that almost any step would lower it.)
 3. If no share helps, the objective may have a step with another Hessian.
 
 The iteration has converged if the step is short, or no gain beyond rounding is left.
@@ -34,6 +35,7 @@ from .solution import Status
 _EPSILON = 2.0**-52  # relative gain of a step that is less than rounding
 _ROUNDING = 1e-13  # relative gain that may be due to rounding
 _SHORTEST = 1.0 / 64.0  # least share of a step
+_PROMISED = 2.0  # an accelerated step may leave this much of the merit promised, which is >= 0
 
 
 class Iterate(Protocol):
@@ -147,7 +149,8 @@ def minimise(
         if step.is_whole:
             guess = anderson.extrapolate(here.at + step.h, objective.residual(step.h))
             if objective.allows(here, guess):
-                ahead = _lower(objective.moved(guess, step.directions), here)
+                most = min(here.merit, _PROMISED * (here.merit - gain))
+                ahead = _lower(objective.moved(guess, step.directions), most)
         while ahead is None and trial is not None:
             anderson.forget()
             ahead = _shortened(objective, here, trial)
@@ -168,14 +171,15 @@ def _shortened(objective: Objective[_Pose], here: _Pose, step: Step) -> _Pose | 
     """Return the first of the steps h, h/2, h/4 ... that lowers the merit, or None."""
     epsilon = 1.0
     while epsilon >= _SHORTEST:
-        if ahead := _lower(objective.moved(here.at + epsilon * step.h, step.directions), here):
+        moved = objective.moved(here.at + epsilon * step.h, step.directions)
+        if ahead := _lower(moved, here.merit):
             return ahead
         epsilon *= 0.5
     return None
 
 
-def _lower(ahead: _Pose, here: _Pose) -> _Pose | None:
-    return ahead if ahead.merit < here.merit else None
+def _lower(ahead: _Pose, most: float) -> _Pose | None:
+    return ahead if ahead.merit < most else None
 
 
 def constrained_step(
