@@ -292,14 +292,28 @@ def changed(program):
     return load_session(only_file(program.unsaved, "*/session.segdeform"))
 
 
-@pytest.mark.parametrize(
-    "how", [pytest.param(signal.SIGTERM, marks=pytest.mark.campaign), signal.SIGKILL]
-)
-def test_a_killed_one_is_continued_and_ctrl_c_ends_it_at_once_and_leaves_nothing(tmp_path, how):
+@pytest.mark.campaign
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_a_killed_one_is_continued(tmp_path, how):
     with serving(tmp_path) as program:
         before = changed(program)
         program.end(how)
-    with serving(tmp_path) as program:
+    continue_and_end(tmp_path, before)
+
+
+def test_what_is_unsaved_is_continued_and_ctrl_c_ends_it_at_once_and_leaves_nothing(tmp_path):
+    before = Session(torso(2))
+    before.segment(2)
+    slot = Autosaves(tmp_path / "data" / "segdeform" / "unsaved").new(
+        About("cactus.ply", mesh=str(tmp_path / "cactus.ply"))
+    )
+    slot.write(before)
+    slot.release()
+    continue_and_end(tmp_path, before)
+
+
+def continue_and_end(folder, before):
+    with serving(folder) as program:
         assert "Recovered the unsaved work on cactus.ply" in program.said
         after = load_session(only_file(program.unsaved, "*/session.segdeform"))
         np.testing.assert_array_equal(after.regions.membership, before.regions.membership)
