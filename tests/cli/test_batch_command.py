@@ -15,7 +15,7 @@ from vtk_segdeform.batches.tasks import compute
 from vtk_segdeform.cli.main import main
 
 
-def here(run, count, settings):  # noqa: ARG001
+def here(run, count, settings):
     """Compute the tasks in threads: test_batches starts processes."""
     with ThreadPoolExecutor(count) as pool:
         run.on(partial(pool.submit, compute), count)

@@ -6,9 +6,9 @@ import functools
 
 import numpy as np
 import pytest
+from limbed import crab
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
-from limbed import crab
 from solids import icosphere
 
 import vtk_segdeform as sd
@@ -179,6 +179,7 @@ def test_a_mirrored_deformer_has_derivatives(rng):
     assert np.vdot(gradient, tangent) == pytest.approx(np.vdot(cotangent, first), rel=1e-9)
 
 
+@pytest.mark.campaign  # the gradient itself is tested every day
 def test_three_handles_are_found_again_from_a_deformed_mesh(rng):
     base = bound()
     mesh, order = base.mesh, np.argsort(base.mesh.vertices @ [0.3, 1.0, -0.5])

@@ -21,6 +21,7 @@ from app_hands import (
     settings_in,
     slots,
 )
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 from qt_hands import Qt, QtCore, QtTest, QtWidgets, application, until
@@ -320,7 +321,7 @@ def test_closing_asks_and_follows_the_answer(start, ball_file, tmp_path, monkeyp
 
 
 @BLANK
-@pytest.mark.parametrize("is_saving", [False, True])
+@pytest.mark.parametrize("is_saving", every(2, [False, True]))
 def test_closing_saves_a_pose_once_it_has_settled(start, arm_file, monkeypatch, boxes, is_saving):
     hand = start(arm_file)
     session, widgets = hand.window.session, hand.window.editor.widgets
