@@ -24,7 +24,7 @@ from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.mesh import Mesh, mesh_of
 from vtk_segdeform.solver import Status
 
-BAR = models.bar((0.3, 0.16, 2.4), divisions=(3, 3, 36))
+BAR = models.bar((0.3, 0.16, 2.4), divisions=(5, 4, 48))
 X = BAR.vertices
 HEIGHT = X[:, 2] - X[:, 2].min()  # s, the arc length of beam theory
 LENGTH = float(np.ptp(X[:, 2]))
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.usefixtures("bound_once")
 @functools.cache
 def bar_deformer() -> sd.Deformer:
     regions = sd.segment(BAR, 1)
-    return sd.Deformer(BAR, regions, sd.fit_cages(BAR, regions, 150))
+    return sd.Deformer(BAR, regions, sd.fit_cages(BAR, regions, 200))
 
 
 def of_two_materials(ratio: float) -> sd.Deformer:
@@ -48,7 +48,7 @@ def bent(ratio: float, fixed, handle, targets) -> np.ndarray:
     """Return the vertices of the bar, whose upper half is stiffer by *ratio*, in a pose."""
     stiffness = np.where(HEIGHT < LENGTH / 2, 1.0, ratio)
     return sd.deform(
-        BAR, fixed, handle, targets, stiffness=stiffness, n_regions=1, n_cage_vertices=150
+        BAR, fixed, handle, targets, stiffness=stiffness, n_regions=1, n_cage_vertices=200
     ).vertices
 
 
