@@ -18,7 +18,7 @@ import pytest
 from limbed import crab, torso
 
 import vtk_segdeform as sd
-from vtk_segdeform.batches.run import _AHEAD
+from vtk_segdeform.batches import run
 from vtk_segdeform.batches.store import Writer
 from vtk_segdeform.batches.tasks import (
     _stiffened,
@@ -31,7 +31,7 @@ from vtk_segdeform.cages import suggested_size
 from vtk_segdeform.errors import ArgumentError, ConstraintError, SegDeformError
 
 BEND = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
-RANDOM = {"random": 4, "seed": 7, "degrees": 40.0}
+RANDOM = {"random": 2, "seed": 7, "degrees": 40.0}
 
 
 class Here(Executor):
@@ -52,7 +52,7 @@ class Here(Executor):
 
 @pytest.fixture(scope="module")
 def meshes():
-    return [torso(3), crab(3)]
+    return [torso(2), crab(2)]
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +63,7 @@ def own_cache(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="module")
 def plan(meshes):
-    return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2, "n_cage_vertices": 60}
+    return {"meshes": meshes, "poses": [BEND, RANDOM], "block": 2, "n_cage_vertices": 40}
 
 
 @pytest.fixture(scope="module")
@@ -137,32 +137,32 @@ def test_a_batch_continues_with_what_is_missing(plan, reference, tmp_path):
     with pytest.raises(sd.Cancelled, match="enough"):
         sd.batch(plan, tmp_path / "out", executor=first, n_workers=1, progress=stop)
     done = sum(first.tasks)
-    assert 0 < done < 10
+    assert 0 < done < 6
     store = sd.batch(plan, tmp_path / "out", executor=second)
-    assert sum(second.tasks) == 10 - done
+    assert sum(second.tasks) == 6 - done
     assert store.digest() == reference.digest()
     more = {**plan, "poses": [*plan["poses"], {**RANDOM, "random": 1, "seed": 8}]}
     store = sd.batch(more, tmp_path / "out", executor=third)
     assert sum(third.tasks) == 2
-    assert len(store) == 12
-    assert len(sd.batch(plan, tmp_path / "out", executor=Here())) == 10
+    assert len(store) == 8
+    assert len(sd.batch(plan, tmp_path / "out", executor=Here())) == 6
 
 
 def test_a_poisonous_pose_is_set_aside_after_two_tries(plan, tmp_path):
     tries = []
 
     def fails(pose):
-        is_poison = pose.get("number") == 2
+        is_poison = pose.get("number") == 1
         tries.append(is_poison)
         return is_poison
 
     store = sd.batch(plan, tmp_path / "out", executor=Here(fails))
     table = store.table()
     bad = [k for k, status in enumerate(table["status"]) if status == "set aside"]
-    assert [table["pose"][k] for k in bad] == ["random 2", "random 2"]
+    assert [table["pose"][k] for k in bad] == ["random 1", "random 1"]
     assert table["message"][bad[0]] == "tried 2 times: OSError: no luck"
     assert sum(tries) == 4
-    assert table["status"].count("converged") == 8
+    assert table["status"].count("converged") == 4
     with pytest.raises(ArgumentError, match=f"number {bad[0]} .* set aside"):
         store.vertices(bad[0])
     again, retried = Here(), Here()
@@ -184,7 +184,10 @@ def test_a_bad_mesh_or_selection_does_not_stop_the_others(meshes, tmp_path):
     assert "selects none" in table["message"][3]
 
 
-def test_a_task_that_takes_too_long_ends_its_process_and_is_set_aside(meshes, tmp_path):
+def test_a_task_that_takes_too_long_ends_its_process_and_is_set_aside(
+    meshes, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(run, "_MOST_TRIES", 1)  # each starts a process
     plan = {"meshes": meshes[:1], "poses": [BEND], "seconds": 0.01}
     table = sd.batch(plan, tmp_path / "out", n_workers=1).table()
     assert table["status"] == ["set aside"]
@@ -226,18 +229,17 @@ def tell(fraction, text):
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background
-    random = {"random": 4, "seed": 7, "degrees": 40.0}
+    random = {"random": 2, "seed": 7, "degrees": 40.0}
     bend = {"fixed": "z<10%", "handles": [{"select": "z>90%", "rotate": "y,20"}]}
-    meshes = [torso(3), crab(3)]
-    plan = {"meshes": meshes, "poses": [bend, random], "block": 2, "n_cage_vertices": 60}
+    meshes = [torso(2), crab(2)]
+    plan = {"meshes": meshes, "poses": [bend, random], "block": 2, "n_cage_vertices": 40}
     sd.batch(plan, sys.argv[1], n_workers=1, progress=tell)
 """
 
 
+@pytest.mark.campaign  # two processes; what is left by a killed one is the same
 @pytest.mark.skipif(sys.platform != "linux", reason="signals")
-@pytest.mark.parametrize(
-    "number", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.campaign)]
-)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_killed_client_continues(number, plan, reference, tmp_path):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
@@ -257,7 +259,7 @@ def test_a_killed_client_continues(number, plan, reference, tmp_path):
     assert client.returncode != 0
     left = Here()
     store = sd.batch(plan, tmp_path / "out", executor=left)
-    assert 0 < sum(left.tasks) < 10
+    assert 0 < sum(left.tasks) < 6
     assert store.digest() == reference.digest()
 
 
@@ -281,7 +283,7 @@ def test_a_killed_worker_of_a_cluster_costs_no_pose(plan, reference, tmp_path):
         executor = client.get_executor()
         store = sd.batch(plan, tmp_path / "out", executor=executor, n_workers=2, progress=kill)
     print("\n".join(map(str, log)))
-    assert log[-1] == "10 of 10 poses"
+    assert log[-1] == "6 of 6 poses"
     assert store.digest() == reference.digest()
 
 
@@ -304,7 +306,7 @@ def test_an_executor_has_few_tasks_at_a_time(plan, tmp_path):
 
     few = {**plan, "poses": [BEND, {**RANDOM, "random": 1}], "block": 1}
     sd.batch(few, tmp_path / "out", executor=Slow(), n_workers=1)
-    assert Slow.most == _AHEAD
+    assert Slow.most == run._AHEAD
 
 
 def test_what_is_under_way_is_stored_when_the_batch_is_cancelled(plan, tmp_path):
@@ -324,7 +326,7 @@ def test_what_is_under_way_is_stored_when_the_batch_is_cancelled(plan, tmp_path)
             sd.batch(plan, tmp_path, executor=first, n_workers=2, progress=stop)
     sd.batch(plan, tmp_path, executor=left)
     assert sum(first.tasks) > 2
-    assert sum(left.tasks) == 10 - sum(first.tasks)
+    assert sum(left.tasks) == 6 - sum(first.tasks)
 
 
 def test_one_batch_at_a_time_writes_a_store(plan, tmp_path):
@@ -343,9 +345,9 @@ def test_one_batch_at_a_time_writes_a_store(plan, tmp_path):
 
 def test_the_table_is_written_with_and_without_pyarrow(reference, monkeypatch):
     columns = reference.table()
-    assert columns["number"] == list(range(10))
+    assert columns["number"] == list(range(6))
     assert max(map(abs, columns["volume_change"])) < 1e-12
-    assert columns["crossings"] == columns["folds"] == [0] * 10
+    assert columns["crossings"] == columns["folds"] == [0] * 6
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     path = reference.write_table()
     with open(path, newline="") as file:
@@ -403,7 +405,7 @@ def test_a_bad_plan_file_names_itself(tmp_path):
 
 
 def test_stiffness_slides_and_symmetry_of_a_pose_are_those_of_a_deformer(tmp_path):
-    mesh = sd.models.bar(divisions=(3, 3, 12))
+    mesh = sd.models.bar(divisions=(2, 2, 10))
     x = mesh.vertices
     z = (x[:, 2] - x[:, 2].min()) / np.ptp(x[:, 2])
     foot, tip = np.flatnonzero(z < 0.1), np.flatnonzero(z > 0.9)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from limbed import torso
 
 import vtk_segdeform as sd
 from vtk_segdeform.batches.random_poses import Skeleton
@@ -15,15 +16,15 @@ from vtk_segdeform.models import random_limbs
 
 @pytest.fixture(scope="module")
 def body():
-    return random_limbs(500, 11)
+    return torso(3)
 
 
 def test_the_first_poses_are_the_same_for_any_number_of_them(body):
-    three, one = (sd.random_poses(body, n, 1).poses for n in (3, 1))
-    for a, b in zip(three, one, strict=False):
+    two, one = (sd.random_poses(body, n, 1).poses for n in (2, 1))
+    for a, b in zip(two, one, strict=False):
         assert a.vertices.tobytes() == b.vertices.tobytes()
     other = sd.random_poses(body, 1, 2).poses[0]
-    assert np.abs(other.vertices - three[0].vertices).max() > 0.01 * body.diagonal
+    assert np.abs(other.vertices - two[0].vertices).max() > 0.01 * body.diagonal
 
 
 def test_random_poses_are_valid_and_differ(body):
@@ -60,7 +61,8 @@ def test_refused_poses_are_counted(body, monkeypatch):
     np.testing.assert_allclose(found.poses[0].vertices, from_rest.vertices, atol=1e-10)
 
 
-def test_limbs_turn_about_their_necks_by_at_most_the_given_angle(body):
+def test_limbs_turn_about_their_necks_by_at_most_the_given_angle():
+    body = random_limbs(500, 11)
     skeleton = Skeleton.of(body, sd.segment(body).labels)
     x, angle = body.vertices, np.radians(30.0)
     assert len(skeleton.joints) >= 3
@@ -95,6 +97,6 @@ def test_no_limbs_are_found_in_loose_pieces():
 
 def test_an_impossible_angle_says_what_to_do(body, monkeypatch):
     monkeypatch.setattr(sd.Solution, "crossings", lambda self: np.arange(1))
-    monkeypatch.setitem(sd.random_poses.__globals__, "_MOST_DRAWS", 3)
+    monkeypatch.setitem(sd.random_poses.__globals__, "_MOST_DRAWS", 1)
     with pytest.raises(sd.errors.ConstraintError, match="bend by less than 60 degrees"):
         sd.random_poses(body, 1)

@@ -199,6 +199,7 @@ def test_iterations_end_near_their_limit_and_not_where_they_are_slow():
         assert count == pytest.approx(np.log(near / np.sqrt(3.0)) / np.log(rate), abs=1.0)
 
 
+@pytest.mark.campaign  # a peer, not this package
 def test_libigl_runs_until_it_has_converged(monkeypatch, task):
     monkeypatch.undo()
     pytest.importorskip("igl")

@@ -16,9 +16,7 @@ POSE = ["--fixed", "z<0.4", "--handle", "z>3.6", "--rotate", "y,50", "--pivot", 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return bent(
-        rod(0.5, 0.0, 4.0, n=16, step=0.25), tube(0.55, 0.62, 1.0, 3.0, n=16, step=0.25)
-    ).mesh
+    return bent(rod(0.5, 0.0, 4.0, n=12, step=0.4), tube(0.56, 0.64, 1.0, 3.0, n=12, step=0.4)).mesh
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
 
@@ -141,7 +142,7 @@ def test_check_tells_a_script_of_files_that_cannot_be_read(tmp_path, capsys):
 
 @pytest.mark.parametrize("away", [0.0, 1e4, 4e6])
 def test_check_says_where_single_precision_is_too_coarse(away, tmp_path, capsys):
-    ball, path = sphere(2000), tmp_path / "ball.ply"
+    ball, path = sphere(500), tmp_path / "ball.ply"
     x = ball.vertices + away
     for points in (x, x.astype(np.float32)):
         write_mesh(path, pv.make_tri_mesh(points, ball.faces))
@@ -196,8 +197,10 @@ def numbers_told(text):
     return float(volume[1]), float(error[1]) / 100.0 if error else None
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".glb", ".obj"])
-@pytest.mark.parametrize("command", ["deform", "pull"])
+@pytest.mark.parametrize(
+    ("command", "suffix"),
+    every(2, itertools.product(["deform", "pull"], [".stl", ".glb", ".obj"])),
+)
 def test_numbers_are_told_of_the_file_as_it_is_read_again(
     far_file, tmp_path, capsys, suffix, command
 ):

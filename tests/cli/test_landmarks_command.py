@@ -14,7 +14,7 @@ from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import read_mesh, read_points, write_mesh
 from vtk_segdeform.landmarks import Landmarks, read_landmarks, write_landmarks
 
-BAR = models.bar(divisions=(4, 4, 16))
+BAR = models.bar(divisions=(3, 3, 12))
 SOME = np.random.default_rng(1).permutation(BAR.n_vertices)[:12]
 GROWTH = np.array([1.5, 0.8, 1.1])
 UNKNOWN = np.full(12, np.nan)

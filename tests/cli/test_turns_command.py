@@ -38,7 +38,7 @@ def turned(tmp_path_factory):
     return run
 
 
-@pytest.mark.parametrize("degrees", [-180, 270])
+@pytest.mark.parametrize("degrees", every(2, [270, -180]))
 def test_a_bar_is_wound_evenly_in_the_direction_and_by_the_angle_that_are_told(degrees, turned):
     code, x = turned("--rotate", f"z,{degrees}")
     angles = twist(x)

@@ -31,12 +31,12 @@ def arm(**meshing: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 SCENES = {
-    "sleeve": lambda: bent(arm(step=0.2), tube(0.53, 0.6, 1.0, 3.0, n=24, step=0.15)),
+    "sleeve": lambda: bent(arm(n=16, step=0.25), tube(0.54, 0.6, 1.0, 3.0, n=16, step=0.25)),
     "wide sleeve": lambda: bent(arm(n=32), tube(0.7, 0.8, 1.2, 2.7, step=0.15)),
     "tight fine sleeve": lambda: bent(arm(step=0.2), tube(0.51, 0.53, 0.8, 2.9, n=40, step=0.06)),
     "open sleeve": lambda: bent(arm(), revolved([(0.58, 0.8), (0.62, 3.1)], 28, 0.12)),
     "lining": lambda: bent(
-        tube(0.5, 0.65, 0.0, 4.0, step=0.15), tube(0.39, 0.42, 0.2, 3.8, step=0.15)
+        tube(0.5, 0.65, 0.0, 4.0, n=16, step=0.25), tube(0.37, 0.41, 0.2, 3.8, n=16, step=0.25)
     ),
     "rod in a tube": lambda: bent(tube(0.5, 0.65, 0.0, 4.0), rod(0.3, 0.2, 3.8)),
     "beads": lambda: bent(
@@ -93,7 +93,7 @@ def test_followers_keep_their_place_on_a_body_that_is_bent(name):
 
 
 def test_bodies_that_stand_near_each_other_do_not_follow():
-    thin = rod(0.3, 0.0, 4.0, n=12, step=0.2)
+    thin = rod(0.3, 0.0, 4.0, n=8, step=0.4)
     for gap in (0.2, 1.0):
         scene = bent(thin, (thin[0] - [0.6 + gap, 0.0, 0.0], thin[1]))
         given = scene.mesh, scene.fixed, scene.handle, scene.targets(50.0)

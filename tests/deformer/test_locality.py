@@ -334,6 +334,7 @@ def test_arguments_of_a_local_deformer_are_checked(changes, says):
         held().local(**{"vertex": HIGH, "reach": 1.0, "spread": 0.5, **changes})
 
 
+@pytest.mark.campaign  # its energy is tested every day
 def test_the_finish_of_a_pull_makes_no_bump_around_the_pulled_point():
     mesh = models.cactus(1800)
     x = mesh.vertices

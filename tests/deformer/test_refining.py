@@ -6,6 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import sausage
 
@@ -35,7 +36,7 @@ def pulled_apart(refine=None, **named):
     return pulled(refine, avoid_contact=True, **named)
 
 
-@pytest.mark.parametrize("make", [bent, pulled_apart])
+@pytest.mark.parametrize("make", every(2, [bent, pulled_apart]))
 def test_small_meshes_are_finished_and_large_ones_on_request(make, monkeypatch):
     plain, finished = make(False), make()
     assert distortion(SCENE.mesh, finished.vertices) < distortion(SCENE.mesh, plain.vertices)

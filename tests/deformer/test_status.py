@@ -33,7 +33,7 @@ def bent_sausage():
 
 
 def bent_bar():
-    mesh = models.bar(size=(0.2, 0.2, 1.0), divisions=(3, 3, 15))
+    mesh = models.bar(size=(0.2, 0.2, 1.0), divisions=(2, 2, 10))
     z, regions = mesh.vertices[:, 2], segment(mesh, 2)
     fixed, handle = np.flatnonzero(z < 0.05), np.flatnonzero(z > 0.95)
     cages = fit_cages(mesh, regions, 90)
@@ -132,7 +132,7 @@ def test_a_finish_that_cannot_move_the_pose_stalls(monkeypatch):
 # Folds
 
 
-BALL = models.sphere(600)
+BALL = models.sphere(300)
 
 
 def pulled_across(mesh: Mesh, vertex: int) -> np.ndarray:

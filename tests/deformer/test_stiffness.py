@@ -72,7 +72,7 @@ def residuals(mesh: Mesh, stiffness: np.ndarray, x: np.ndarray) -> list[float]:
     return found
 
 
-@pytest.mark.parametrize(("ratio", "degrees"), every(2, [(4.0, 12.0), (8.0, 60.0), (2.0, 35.0)]))
+@pytest.mark.parametrize(("ratio", "degrees"), every(3, [(4.0, 12.0), (8.0, 60.0), (2.0, 35.0)]))
 def test_curvatures_under_one_moment_are_as_the_inverse_of_the_stiffness(ratio, degrees):
     """The end is where it is if both halves are arcs, of curvatures k and k / ratio.
 

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 import pytest
+from campaign import every
 from numpy.testing import assert_allclose
 from open_meshes import combined
 from organs import under_a_lid
@@ -221,7 +222,7 @@ PLACED = [
         ({"area of component 0": "+4%", "cavity": "-10%"}, 0.0),
         ({"centroid y": "keep", "centroid z": "keep", "whole": "keep"}, 0.0),
         ({"centroid y of body 0": "at least -3"}, 0.0),
-        *((goals, offset) for goals in PLACED for offset in (0.0, 2000.0)),
+        *every(2, ((goals, offset) for goals in PLACED for offset in (0.0, 2000.0))),
     ],
 )
 def test_areas_and_centroids_are_those_of_their_goals(goals, offset):

@@ -22,7 +22,7 @@ from vtk_segdeform.io.convert import to_polydata
 
 pytestmark = pytest.mark.usefixtures("bound_once", "fitted_once")
 
-MESH = sd.models.bar(divisions=(4, 4, 14))
+MESH = sd.models.bar(divisions=(2, 2, 8))
 HEIGHT = MESH.vertices[:, 2]
 FIXED, HANDLE = np.flatnonzero(HEIGHT < 0.1), np.flatnonzero(HEIGHT > 0.9)
 SHIFT = np.array([0.25, 0.0, -0.05])

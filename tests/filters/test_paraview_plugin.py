@@ -186,6 +186,7 @@ def test_the_file_in_the_package_finds_the_package_that_contains_it(loaded, tmp_
     assert loaded(PLUGIN, LIBRARIES) == OURS
 
 
+@pytest.mark.campaign  # another process; those of the file itself remain
 def test_a_copy_needs_the_package_in_the_path(loaded, tmp_path):
     (tmp_path / "vtk_segdeform").mkdir()
     copy = shutil.copy(PLUGIN, tmp_path / "vtk_segdeform" / "copy.py")

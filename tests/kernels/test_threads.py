@@ -22,7 +22,7 @@ import vtk_segdeform as sd
 def blas():
     return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
-mesh = sd.models.sphere(400)
+mesh = sd.models.sphere(200)
 height = mesh.vertices[:, 2]
 
 def drag():

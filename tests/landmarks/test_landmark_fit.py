@@ -13,7 +13,7 @@ from vtk_segdeform.landmarks import Spline, fit_landmarks
 from vtk_segdeform.landmarks import fit as fitting
 from vtk_segdeform.mesh import Mesh
 
-BAR = models.bar(divisions=(4, 4, 24))
+BAR = models.bar(divisions=(3, 3, 16))
 X = BAR.vertices
 SPREAD = np.random.default_rng(3).permutation(len(X))
 OPTIONS = {"n_regions": 1, "n_cage_vertices": 40}

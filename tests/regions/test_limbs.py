@@ -80,7 +80,7 @@ def noisy(mesh, seed=1):
     return mesh.with_vertices(mesh.vertices + np.median(mesh.adjacency.data) * shift)
 
 
-@pytest.mark.parametrize("name", every(2, BODIES))
+@pytest.mark.parametrize("name", every(4, BODIES))
 @pytest.mark.parametrize(
     "change",
     [

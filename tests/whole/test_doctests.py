@@ -29,7 +29,12 @@ def modules() -> dict[str, Path]:
 
 
 MODULES = modules()
-LONG = {"vtk_segdeform.models.shapes"}  # makes bodies like those of its tests; in the campaign
+# In the campaign only: the first makes bodies like those of its tests, pages call the others.
+LONG = {
+    "vtk_segdeform.models.shapes",
+    "vtk_segdeform.landmarks.fit",
+    "vtk_segdeform.batches.random_poses",
+}
 WITH_EXAMPLES = [
     pytest.param(name, marks=pytest.mark.campaign if name in LONG else ())
     for name, path in MODULES.items()

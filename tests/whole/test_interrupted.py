@@ -106,6 +106,7 @@ def output_of(script, *arguments, **environment):
     return done.stdout.split()
 
 
+@pytest.mark.campaign  # test_an_import_is_completed... and test_each_kernel... are parts of it
 def test_a_first_call_works_after_interruptions_of_it():
     count, *others = output_of(FIRST_CALL)
     assert int(count) > 5

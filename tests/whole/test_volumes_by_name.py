@@ -53,6 +53,7 @@ def conserved(mesh: sd.Mesh, endocardium: np.ndarray, x: np.ndarray) -> float:
     return area(mesh.vertices) / area(x)
 
 
+@pytest.mark.campaign  # test_volume_goals shrinks the cavity of a small body as far
 def test_a_ventricle_contracts_to_two_fifths_with_its_wall():
     deformer, endocardium = beating()
     mesh, at_rest = deformer.mesh, deformer.volumes()
@@ -103,7 +104,7 @@ def hollow(inner: float) -> tuple[sd.Mesh, int]:
     return combined(sd.Mesh(x, faces), sd.Mesh(inner * x, faces)), len(x)
 
 
-@pytest.mark.parametrize("goal", [-40, 30])
+@pytest.mark.parametrize("goal", every(2, [-40, 30]))
 def test_the_wall_of_a_hollow_body_stays_even_where_its_cavity_changes(goal):
     """In the cage of the outer surface the cavity could not, and both became spiky."""
     mesh, n = hollow(0.7)

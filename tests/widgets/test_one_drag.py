@@ -103,11 +103,8 @@ def screen():
     server.communicate()
 
 
-@pytest.mark.parametrize(
-    "window",
-    [pytest.param(IN_PYVISTA, marks=pytest.mark.campaign), IN_QT],
-    ids=["pyvista", "Qt"],
-)
+@pytest.mark.campaign  # test_qt_widget and test_plugin drag in windows of their own process
+@pytest.mark.parametrize("window", [IN_PYVISTA, IN_QT], ids=["pyvista", "Qt"])
 def test_one_drag_right_after_opening_bends_the_mesh(screen, window):
     environment = {
         **{k: v for k, v in os.environ.items() if k != "VTK_DEFAULT_OPENGL_WINDOW"},

@@ -383,7 +383,7 @@ def test_a_pose_stopped_by_escape_is_written_as_it_was_shown(closed_early, capfd
     assert "finishing" not in capfd.readouterr().out
 
 
-@pytest.mark.parametrize(("stage", "settled"), [(0.0, False), (0.5, True)])
+@pytest.mark.parametrize(("stage", "settled"), every(2, [(0.5, True), (0.0, False)]))
 def test_ctrl_c_while_the_pose_is_completed_writes_what_there_is(
     closed_early, capfd, monkeypatch, stage, settled
 ):

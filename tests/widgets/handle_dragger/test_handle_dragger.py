@@ -127,7 +127,7 @@ def turned(bench):
 
 @pytest.mark.parametrize(
     ("look", "parallel", "local"),
-    every(2, [(LOOKS[0], False, False), (LOOKS[2], False, True), (LOOKS[1], True, True)]),
+    every(3, [(LOOKS[1], True, True), (LOOKS[0], False, False), (LOOKS[2], False, True)]),
 )
 @about_targets
 def test_every_part_moves_as_it_says(look, parallel, local):

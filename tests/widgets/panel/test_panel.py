@@ -18,7 +18,7 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.mesh.mesh import Mesh
 from vtk_segdeform.regions import segment
 from vtk_segdeform.session.state import State
-from vtk_segdeform.widgets.editor import Controller, controller, preparing
+from vtk_segdeform.widgets.editor import Controller, controller
 from vtk_segdeform.widgets.editor.editor import DeformEditor, Mode
 from vtk_segdeform.widgets.panel.fields import Field, Table, tooltip
 from vtk_segdeform.widgets.panel.panel import all_sections, checked, press, sections
@@ -30,16 +30,7 @@ from vtk_segdeform.widgets.scene import Draft
 SOMETIMES_GOOD = {"None", "True", "False", "numpy True", "0", "3", "2.5", "1e-320", "empty list"}
 VALUES = ("toggle", "number", "integer", "slider", "choice")
 
-
-pytestmark = pytest.mark.usefixtures("bound_once")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _unprepared():
-    """Do not prepare sessions for pulls in the background."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(preparing, "lacking", lambda *_: None)
-        yield
+pytestmark = pytest.mark.usefixtures("bound_once", "unprepared")
 
 
 @functools.cache

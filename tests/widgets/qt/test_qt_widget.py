@@ -224,6 +224,7 @@ def around(seen, mask):
     return places.min(axis=0) - 4.0, places.max(axis=0) + 4.0
 
 
+@pytest.mark.campaign  # test_editor and test_web_editor tell such stories; others use each control
 def test_the_whole_story_by_mouse_on_the_panel_and_the_view(make):
     seen = make(MESH)
     panel, hand, height = seen.panel, seen.view_hand(), MESH.vertices[:, 2]
@@ -363,7 +364,7 @@ def turn_wheel(field, clicks=-1):
     return step.isAccepted()
 
 
-@pytest.mark.parametrize("mode", every(2, Mode))
+@pytest.mark.parametrize("mode", every(4, Mode))
 def test_the_wheel_over_the_panel_changes_nothing_but_a_field_that_was_clicked(seen, mode):
     seen.mode(mode)
     before, options = seen.session.history.undo_label, seen.session.options
@@ -737,7 +738,7 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
 # Accessibility.
 
 
-@pytest.mark.parametrize("mode", every(2, Mode))
+@pytest.mark.parametrize("mode", every(4, Mode))
 def test_every_control_is_reached_by_tab_and_has_a_tooltip(seen, mode):
     seen.mode(mode)
     size = seen.widget.size()

@@ -18,7 +18,7 @@ from vtk_segdeform import Mesh, models
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Chromium]:
     """Yield a browser; whoever opens a page in it closes it."""
-    with Chromium() as browser:
+    with Chromium(900, 620) as browser:
         yield browser
 
 

@@ -30,6 +30,7 @@ from yarl import URL
 from vtk_segdeform import Session, load_session, models
 from vtk_segdeform.io import write_mesh
 from vtk_segdeform.widgets.editor import About, Autosaves
+from vtk_segdeform.widgets.web import serving as program_of_serve
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -84,13 +85,9 @@ def serving(folder: Path, *options: str) -> Iterator[Program]:
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory):
-    """Yield a program that finds damaged work on its file, which it reports and leaves."""
+    """Yield a program that continues work on its file; at the end, end it by Ctrl+C."""
     folder = tmp_path_factory.mktemp("served")
-    slot = Autosaves(folder / "data" / "segdeform" / "unsaved").new(
-        About("cactus.ply", mesh=str(folder / "cactus.ply"))
-    )
-    slot.path.write_bytes(b"damaged")
-    slot.release()
+    unsaved(folder).release()
     browser = folder / "browser"
     browser.write_text(f'#!/bin/sh\necho "$1" > {folder}/opened\n')
     browser.chmod(0o700)
@@ -98,8 +95,32 @@ def served(tmp_path_factory):
         patch.setenv("BROWSER", f"{browser} %s")
         with serving(folder, "--upload-limit", "1", "--open") as program:
             yield program
-            assert program.errors == ""
-    assert slot.path.read_bytes() == b"damaged"
+            require_end(program)
+
+
+def work():
+    """Return a session with regions."""
+    session = Session(torso(2))
+    session.segment(2)
+    return session
+
+
+def unsaved(folder):
+    """Return the unsaved work of a program in *folder* that has been killed."""
+    slot = Autosaves(folder / "data" / "segdeform" / "unsaved").new(
+        About("cactus.ply", mesh=str(folder / "cactus.ply"))
+    )
+    slot.write(work())
+    return slot
+
+
+def require_end(program):
+    """Check that Ctrl+C ends a program at once, which leaves nothing."""
+    with socket.create_connection(("127.0.0.1", program.port)) as half:
+        half.sendall(b"GET / HTTP/1.1\r\n")
+        assert program.end(signal.SIGINT) == 0
+    assert program.rest == []
+    assert program.errors == ""
 
 
 def do(story):
@@ -265,8 +286,20 @@ def test_a_command_line_names_an_address_that_works_once(served):
     assert " 403 " in get(served, opened.path)[0]
 
 
-def test_damaged_work_is_reported(served):
-    assert "The unsaved work on cactus.ply cannot be read" in served.said
+def test_damaged_work_is_reported_and_left(tmp_path, monkeypatch):
+    slot = unsaved(tmp_path)
+    slot.path.write_bytes(b"damaged")
+    slot.release()
+    path, said = tmp_path / "cactus.ply", []
+    write_mesh(path, torso(2))
+    monkeypatch.setattr(program_of_serve, "Autosaves", lambda: Autosaves(slot.path.parents[1]))
+    monkeypatch.setattr(program_of_serve, "WebEditor", lambda session, **_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):  # instead of the program itself
+        program_of_serve.serve_until_stopped(
+            path, host="", port=0, upload_limit=1, started=print, say=said.append
+        )
+    assert "The unsaved work on cactus.ply cannot be read" in said[0]
+    assert slot.path.read_bytes() == b"damaged"
 
 
 def press(program, *names):
@@ -292,33 +325,34 @@ def changed(program):
     return load_session(only_file(program.unsaved, "*/session.segdeform"))
 
 
-@pytest.mark.parametrize(
-    "how", [pytest.param(signal.SIGTERM, marks=pytest.mark.campaign), signal.SIGKILL]
-)
-def test_a_killed_one_is_continued_and_ctrl_c_ends_it_at_once_and_leaves_nothing(tmp_path, how):
+@pytest.mark.campaign
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
+def test_a_killed_one_is_continued(tmp_path, how):
     with serving(tmp_path) as program:
         before = changed(program)
         program.end(how)
     with serving(tmp_path) as program:
-        assert "Recovered the unsaved work on cactus.ply" in program.said
-        after = load_session(only_file(program.unsaved, "*/session.segdeform"))
-        np.testing.assert_array_equal(after.regions.membership, before.regions.membership)
-        with socket.create_connection(("127.0.0.1", program.port)) as half:
-            half.sendall(b"GET / HTTP/1.1\r\n")
-            assert program.end(signal.SIGINT) == 0
-        assert program.rest == []
-        assert program.errors == ""
+        require_continued(program, before)
+        require_end(program)
+
+
+def test_unsaved_work_is_continued(served):
+    require_continued(served, work())
+
+
+def require_continued(program, before):
+    assert "Recovered the unsaved work on cactus.ply" in program.said
+    after = load_session(only_file(program.unsaved, "*/session.segdeform"))
+    np.testing.assert_array_equal(after.regions.membership, before.regions.membership)
 
 
 def test_the_work_on_another_file_is_left_alone(tmp_path):
-    from vtk_segdeform.widgets.web.serving import recoverable
-
     autosaves = Autosaves(tmp_path)
     for name in ("one.ply", "two.ply"):
         slot = autosaves.new(About(name, mesh=f"/meshes/{name}"))
         slot.write(Session(models.sphere(300)))
         slot.release()
-    slot = recoverable(autosaves, Path("/meshes/one.ply"))
+    slot = program_of_serve.recoverable(autosaves, Path("/meshes/one.ply"))
     assert slot.about.name == "one.ply"
     assert [each.about.name for each in autosaves.abandoned()] == ["two.ply"]
 
