@@ -47,6 +47,7 @@ from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
+from .moving import with_points
 from .polygons import polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
@@ -79,6 +80,7 @@ __all__ = [
     "to_polydata",
     "triangles_of",
     "volume_change",
+    "with_points",
     "with_vertices",
     "writable_suffixes",
     "write_gltf_motion",
