@@ -89,8 +89,8 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"fit             {seconds:.1f} s including regions and cages")
     say(f"written         {options.output}")
     for one, other in options.carry:
-        given = Follower.read(one)
-        given.write(other, fit.moved(given.points))
+        follower = Follower.read(one)
+        follower.write(other, fit.moved(follower.points))
         say(f"written         {other}")
     if options.residuals is not None:
         _write_residuals(options.residuals, fit, pairs)

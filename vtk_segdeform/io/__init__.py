@@ -48,7 +48,7 @@ from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
 from .moving import with_points
-from .polygons import polydata_of, triangles_of
+from .polygons import drawn_cells, polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
@@ -58,6 +58,7 @@ __all__ = [
     "IS_ROUNDING",
     "Surface",
     "as_polydata",
+    "drawn_cells",
     "follow",
     "from_meshset",
     "from_polydata",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..arrays import FloatArray, IntArray
 from ..importing import imported
 from .files import LANDMARK_SUFFIXES, Landmarks, read_landmarks, write_landmarks
 
@@ -46,6 +46,17 @@ class Follower:
     def points(self) -> FloatArray:
         """(k, 3) float: its points as they were read."""
         return np.asarray(self.data.points, dtype=np.float64)
+
+    @property
+    def drawn(self) -> tuple[FloatArray, IntArray, IntArray]:
+        """Points (k, 3), triangles (m, 3) and edges of lines (e, 2); of a grid its surface."""
+        if isinstance(self.data, Landmarks):
+            none = np.empty((0, 3), dtype=np.int64)
+            return self.points, none, none[:, :2]
+        imported("vtk_segdeform.io")
+        from ..io import drawn_cells
+
+        return drawn_cells(self.data)
 
     def at(self, points: FloatArray) -> Landmarks | pv.PolyData | pv.UnstructuredGrid:
         """Return a copy of its data with the points at *points* (k, 3)."""

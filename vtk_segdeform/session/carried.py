@@ -142,9 +142,9 @@ class SessionCarried(Mapping[str, CarriedFile]):
         for name in self:
             stem, suffix = Path(name).stem, Path(name).suffix
             suffix = ".csv" if suffix.lower() in LANDMARK_SUFFIXES else suffix
-            taken = {
-                path.name for path in as_path(folder).iterdir() if path not in ours
-            } | {path.name for path in written.values()}
+            taken = {path.name for path in as_path(folder).iterdir() if path not in ours} | {
+                path.name for path in written.values()
+            }
             path = as_path(folder) / _unused(f"{stem}{suffix}", taken)
             try:
                 self.write(name, path)

@@ -305,11 +305,8 @@ class Poses:
         If *live*, as in the frames of a drag: how far a finished mesh is from that of its cages,
         which a drag hardly changes, is as in the last call that was not.
         """
-        off: float | FloatArray | None = 0.0
-        if state.pose is not None:
-            off = self.memo.find("off cages", (points,)) if live else None
-            if off is None:
-                off = self._off_cages(state, points)
+        known = self.memo.find("off cages", (points,)) if live else None
+        off: float | FloatArray = self._off_cages(state, points) if known is None else known
         self.memo.keep("off cages", (points,), off, _MOST_CARRIED)
         if state.pose is None:
             return points

@@ -51,6 +51,7 @@ from ..errors import (
     RegionError,
     SessionError,
 )
+from ..files import replacing
 from ..freezing import Frozen
 from ..geometry import FREE, checked_attach
 from ..landmarks import Follower
@@ -275,7 +276,8 @@ class CarriedFile:
         """What it has; a MeshError if it cannot be read."""
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"file{Path(self.name).suffix}"
-            path.write_bytes(self.content)
+            with replacing(path) as draft:
+                draft.write_bytes(self.content)
             try:
                 return Follower.read(path)
             except MeshError as fault:

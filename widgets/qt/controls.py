@@ -32,6 +32,8 @@ def using(editor: DeformEditor) -> Press:
         with editor.view.guarded():
             if isinstance(value, Path):
                 use_file(editor, name, value)
+            elif isinstance(value, tuple):
+                use_file(editor, name, *value)
             else:
                 press(editor, name, value)
             editor.controller.refresh()  # and with it the panel, even if nothing was done

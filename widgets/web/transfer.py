@@ -7,8 +7,8 @@
     POST paraview/             null: trame's page asks for a launcher first, and there is none
 
 The first two need the header ``X-Segdeform``, which a page of another origin cannot send.  A page
-never names a file of the server: of NAME only the suffix is used, and the text is shown.  One file
-is uploaded at a time, each to a folder of its own.
+never names a file of the server: one file is uploaded at a time, each to a folder of its own.  Of
+NAME only letters, digits and " .()+-" are used.
 """
 
 from __future__ import annotations
@@ -113,7 +113,9 @@ class Transfer:
         if self._editor.is_busy:
             return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
         self._is_uploading, folder = True, self._new_folder()
-        place, is_open = folder / f"upload{suffix}", False
+        # A file for a control keeps its name, which the session may show.
+        own = field and Path(name).stem.strip(". ")
+        place, is_open = folder / (name if own else f"upload{suffix}"), False
         try:
             if not await self._store(read, place):
                 return self._too_large(name)
@@ -158,7 +160,8 @@ class Transfer:
     async def give(self, suffix: str, query: Mapping[str, str]) -> web.Response:
         """Return a download without an address; see `download`."""
         suffix, field = f".{suffix}", query.get("field", "")
-        if suffix not in ((".csv",) if field else (_SESSION, *writable_suffixes())):
+        known = ".csv" if field else _SESSION, *writable_suffixes()
+        if suffix not in known:
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:
             await asyncio.sleep(_POLL)
@@ -194,7 +197,8 @@ class Transfer:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if field:
-            if not file_field(editor, field).saves:
+            control = file_field(editor, field)
+            if not control.saves or place.suffix not in control.suffixes:
                 raise SessionError("This control saves nothing.")
             error = use_file(editor, field, place)
             if error or not place.exists():
