@@ -18,6 +18,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -160,8 +161,7 @@ class Transfer:
     async def give(self, suffix: str, query: Mapping[str, str]) -> web.Response:
         """Return a download without an address; see `download`."""
         suffix, field = f".{suffix}", query.get("field", "")
-        known = ".csv" if field else _SESSION, *writable_suffixes()
-        if suffix not in known:
+        if suffix not in self._suffixes(field):
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:
             await asyncio.sleep(_POLL)
@@ -197,8 +197,7 @@ class Transfer:
             raise SessionError("Finish the drag or the work before downloading.")
         editor.controller.finishing.interrupt()
         if field:
-            control = file_field(editor, field)
-            if not control.saves or place.suffix not in control.suffixes:
+            if not file_field(editor, field).saves:
                 raise SessionError("This control saves nothing.")
             error = use_file(editor, field, place)
             if error or not place.exists():
@@ -210,6 +209,15 @@ class Transfer:
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
         return None
+
+    def _suffixes(self, field: str) -> tuple[str, ...]:
+        """Return the suffixes of what *field* saves, or of the session and the surface."""
+        if not field:
+            return (_SESSION, *writable_suffixes())
+        if not self._editor.is_busy:
+            with suppress(ArgumentError):
+                return file_field(self._editor, field).suffixes
+        return (".csv",)
 
     def _too_large(self, name: str) -> web.Response:
         most = f"{self.limit / 1e6:,.0f} MB"
