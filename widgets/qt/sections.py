@@ -151,7 +151,7 @@ def _ask(parent: Any, field: Field, press: Callable[..., object]) -> None:
         if field.several:
             paths, _ = ask.getOpenFileNames(parent, title, "", kinds)
             if paths:
-                press(tuple(map(Path, paths)))
+                press([*map(Path, paths)])
             return
         path, _ = ask.getOpenFileName(parent, title, "", kinds)
     if path:
