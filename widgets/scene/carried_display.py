@@ -3,7 +3,7 @@
 Of a surface the faces are drawn, of a grid those of its surface, of curves the lines, and points
 that have neither as dots.  Where there are many points, a regular grid divides them, and one of
 each grid cell stands for all of it: the frames of a drag then cost the same for any file.  While
-something moves in a view that draws slowly, nothing of it is drawn: it comes back at the release.
+something moves in a view that is drawn in software, nothing of it is drawn: it comes back at the release.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.pictures import rgb
 from vtk_segdeform.session import Change, Session
 
-from .draft import SLOW, Draft, observe_drafts
+from .draft import Draft, observe_drafts
 from .view import View
 from .wireframe import cells_of, points_of
 
@@ -28,6 +28,7 @@ CARRIED_COLOUR = "#3E6472"  # slate: of no region, handle or landmark
 _BEFORE, _THROUGH = 0.35, 0.15  # opacities
 _LINE, _DOT = 2.0, 5.0  # pixels
 _MOST = 2_500  # points that are drawn of a file
+_FAST = 0.010  # seconds for a picture by a graphics card; in software these layers double a frame
 _COARSER = 1.2  # factor of the grid until they are not more
 
 
@@ -105,7 +106,7 @@ class CarriedDisplay:
             self._take_away(file)
 
     def _leave_out(self, begins: bool) -> None:
-        begins &= Draft.of(self._view).seconds > SLOW
+        begins &= Draft.of(self._view).seconds > _FAST
         if begins != self._is_left_out:
             self._is_left_out = begins
             self._show_all()
