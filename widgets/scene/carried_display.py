@@ -3,7 +3,7 @@
 Of a surface the faces are drawn, of a grid those of its surface, of curves the lines, and points
 that have neither as dots.  Where there are many points, a regular grid divides them, and one of
 each grid cell stands for all of it: the frames of a drag then cost the same for any file.  While
-something moves in a view that is drawn in software, nothing of it is drawn: it comes back at the release.
+something moves in a view that is drawn in software, nothing of it is drawn until the release.
 """
 
 from __future__ import annotations
