@@ -152,7 +152,7 @@ def test_a_bad_argument_is_accepted_or_the_error_names_it(modules, bounded):
     _check_errors(cheap, 1, 1, bounded)
 
 
-@pytest.mark.parametrize(("step", "most"), every(2, [(5, 7), (1, 30)]))
+@pytest.mark.parametrize(("step", "most"), every(2, [(5, 9), (1, 33)]))
 @pytest.mark.parametrize("cls", [State, Pose, Locality], ids=lambda cls: cls.__name__)
 def test_a_session_rejects_a_state_with_bad_parts(cls, step, most, bounded):
     """Each field of a state, or of its pose, in turn holds each *step*-th bad value."""

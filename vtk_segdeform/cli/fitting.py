@@ -18,13 +18,13 @@ from ..io import Surface, stored_vertices, volume_change
 from ..landmarks import (
     LANDMARK_SUFFIXES,
     LEAST_PAIRS,
+    Follower,
     LandmarkFit,
     Landmarks,
     Pairs,
     fit_landmarks,
     paired,
     read_landmarks,
-    write_landmarks,
     write_rows,
 )
 from ..mesh import Mesh
@@ -89,7 +89,8 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
     say(f"fit             {seconds:.1f} s including regions and cages")
     say(f"written         {options.output}")
     for one, other in options.carry:
-        _carry(fit, one, other)
+        follower = Follower.read(one)
+        follower.write(other, fit.moved(follower.points))
         say(f"written         {other}")
     if options.residuals is not None:
         _write_residuals(options.residuals, fit, pairs)
@@ -154,19 +155,6 @@ def _report(fit: LandmarkFit, pairs: Pairs, say: Say) -> None:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.nanmean(values**2)))
-
-
-def _carry(fit: LandmarkFit, one: Path, other: Path) -> None:
-    """Move what is in the file *one* along, to the file *other*."""
-    if _is_of_landmarks(one):
-        found = read_landmarks(one)
-        moved = Landmarks(found.names, fit.moved(found.points), found.uncertainty)
-        write_landmarks(other, moved)
-        return
-    data = io.read_points(one)
-    moved_data = data.copy()
-    moved_data.points = fit.moved(np.asarray(data.points, dtype=float))
-    io.write_points(other, moved_data)
 
 
 def _is_of_landmarks(path: Path) -> bool:

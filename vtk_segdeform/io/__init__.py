@@ -47,7 +47,8 @@ from .gltf import write_gltf_motion
 from .kinds import of_its_kind, surface_of
 from .meshlab import from_meshset, simplify, to_meshset
 from .meshlab_project import read_project, write_project
-from .polygons import polydata_of, triangles_of
+from .moving import with_points
+from .polygons import drawn_cells, polydata_of, triangles_of
 from .repaired import repair_surface
 from .stored import loss_of, stored_vertices, volume_change
 from .surface import Surface, read_mesh
@@ -57,6 +58,7 @@ __all__ = [
     "IS_ROUNDING",
     "Surface",
     "as_polydata",
+    "drawn_cells",
     "follow",
     "from_meshset",
     "from_polydata",
@@ -79,6 +81,7 @@ __all__ = [
     "to_polydata",
     "triangles_of",
     "volume_change",
+    "with_points",
     "with_vertices",
     "writable_suffixes",
     "write_gltf_motion",

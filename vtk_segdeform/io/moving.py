@@ -109,6 +109,17 @@ def _tangents_of(given: pv.PolyData) -> dict[str, Any]:
     return found
 
 
+def with_points(
+    data: pv.PolyData | pv.UnstructuredGrid, points: FloatArray
+) -> pv.PolyData | pv.UnstructuredGrid:
+    """Return a copy of *data* with its points at *points* (n, 3) float."""
+    if isinstance(data, pv.PolyData):
+        return MovingSurface(data).at(points)
+    moved = data.copy()
+    moved.points = np.array(points, dtype=np.float64)
+    return moved
+
+
 def _normals_of(carried: NormalTransport, given: Any) -> _Update:
     return lambda points: carried.normals(points).astype(given.dtype)
 

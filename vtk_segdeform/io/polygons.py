@@ -13,6 +13,7 @@ from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray,
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+from vtkmodules.vtkFiltersGeometry import vtkGeometryFilter
 
 from ..arrays import FloatArray, IntArray
 from ..errors import MeshError
@@ -107,6 +108,30 @@ def cells_of(polydata: pv.PolyData) -> IntArray:
     first = polydata.GetNumberOfVerts() + polydata.GetNumberOfLines()  # VTK's order of cells
     cells: IntArray = first + np.repeat(np.arange(len(times)), times)
     return cells
+
+
+def drawn_cells(
+    data: pv.PolyData | pv.UnstructuredGrid,
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return points (k, 3), triangles (m, 3) and the edges (e, 2) of lines; of a grid its surface.
+
+    Raises
+    ------
+    MeshError
+        If a vertex index is out of range.
+    """
+    if isinstance(data, pv.UnstructuredGrid):
+        surface = vtkGeometryFilter()
+        surface.SetInputData(data)
+        surface.Update()
+        data = pv.wrap(surface.GetOutput())
+    lines = data.GetLines()
+    corners = pv.convert_array(lines.GetConnectivityArray()).astype(np.int64)
+    _require_points(data.n_points, corners)
+    is_edge = np.ones(len(corners), dtype=bool)
+    is_edge[pv.convert_array(lines.GetOffsetsArray())[1:] - 1] = False
+    edges = np.stack([corners, np.roll(corners, -1)], axis=1)[is_edge]
+    return np.asarray(data.points, dtype=np.float64), triangles_of(data), edges
 
 
 def texture_of(surface: pv.PolyData) -> tuple[str, FloatArray] | None:

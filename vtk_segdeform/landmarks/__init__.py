@@ -6,6 +6,7 @@ The files, in reading order:
     semilandmarks  those that slide along curves and surfaces
     spline         thin-plate splines
     files          landmarks in files, by name
+    followers      files whose points follow a body
 """
 
 from .files import (
@@ -18,11 +19,13 @@ from .files import (
     write_rows,
 )
 from .fit import LEAST_PAIRS, LandmarkFit, fit_landmarks
+from .followers import Follower
 from .spline import Spline
 
 __all__ = [
     "LANDMARK_SUFFIXES",
     "LEAST_PAIRS",
+    "Follower",
     "LandmarkFit",
     "Landmarks",
     "Pairs",

@@ -17,6 +17,7 @@ The files, in reading order:
     finishing      poses finished on the mesh itself
     saved_poses    poses by name: saved, applied and blended
     landmark_edits landmarks and their targets, and the pose fitted to them
+    carried        files whose points follow the mesh
     pose_copies    a pose of one mesh given to another one
     output         the surface as PolyData and files
     stand_in       a coarse stand-in until a session is bound
@@ -30,6 +31,7 @@ The files, in reading order:
 
 from ..mesh import SurfacePoint
 from . import finishing, preparing, pulls, separating, solving
+from .carried import SessionCarried
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .handles import require_handle
@@ -56,6 +58,7 @@ __all__ = [
     "Preparation",
     "SavedPoses",
     "Session",
+    "SessionCarried",
     "SessionLandmarks",
     "StandIn",
     "State",

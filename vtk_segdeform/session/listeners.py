@@ -36,6 +36,8 @@ class Change(enum.Flag):
     """`Session.saved_poses`."""
     LANDMARKS = enum.auto()
     """`Session.landmarks`."""
+    CARRIED = enum.auto()
+    """`Session.carried`."""
 
 
 Listener = Callable[[Change], None]

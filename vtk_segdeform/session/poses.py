@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import sizes
-from ..arrays import FloatArray, frozen
+from ..arrays import FloatArray, as_points, frozen
 from ..deformer import Deformer, Mirror
 from ..errors import CageError
 from ..files import cache_folder
@@ -33,12 +33,14 @@ from ..geometry import Lids, lids_of
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..solver import Solution, VolumeConstraint, total_volume
+from ..subspace import blend_at
 from . import pulls
 from .handles import stacked
 from .memo import Memo
 from .state import Cages, Pose, State
 
 _KEPT = 3  # bound deformers, rotations and surfaces of the last poses
+_MOST_CARRIED = 16  # files whose points stay bound
 # The options that are not those of `Deformer.hold`: of cages, regions and the binding.
 _NOT_HELD = {
     "n_cage_vertices", "offset", "attach", "stretch", "rotation_groups", "symmetry",
@@ -291,8 +293,35 @@ class Poses:
 
     def carry(self, state: State, points: ArrayLike) -> FloatArray:
         """Return *points* (k, 3), given at rest, moved along with the mesh to the pose."""
-        cages = state.cage_vertices
-        return self._bound_to(state, cages).passengers(points).moved(cages)
+        points = as_points(points, "points")
+        if state.pose is None:
+            return points
+        bound = self._bound_to(state, state.cage_vertices).passengers(points)
+        return bound.moved(state.cage_vertices) + self._off_cages(state, points)
+
+    def carry_often(self, state: State, points: FloatArray, *, live: bool) -> FloatArray:
+        """Return `carry` in little time, if it was called with this array before.
+
+        If *live*, as in the frames of a drag: how far a finished mesh is from that of its cages,
+        which a drag hardly changes, is as in the last call that was not.
+        """
+        known = self.memo.find("off cages", (points,)) if live else None
+        off: float | FloatArray = self._off_cages(state, points) if known is None else known
+        self.memo.keep("off cages", (points,), off, _MOST_CARRIED)
+        if state.pose is None:
+            return points
+        deformer = self._bound_to(state, state.cage_vertices)
+        bound = partial(deformer.passengers, points)
+        passengers = self.memo.get("passengers", (deformer, points), bound, _MOST_CARRIED)
+        return np.asarray(passengers.moved(state.cage_vertices) + off)
+
+    def _off_cages(self, state: State, points: FloatArray) -> float | FloatArray:
+        """Return how far the mesh is from that of its cages, near *points* (k, 3): (k, 3), or 0."""
+        pose = state.pose
+        if pose is None or pose.finished is None:
+            return 0.0
+        off = pose.finished.vertices - self.surface(state, pose.cage_vertices)
+        return blend_at(self.mesh.vertices, off.T, points).T
 
     def mirror(self, state: State) -> Mirror | None:
         """Return the plane of symmetry with the option of *state*, if there is one."""

@@ -14,6 +14,7 @@ Each of these calls is one undo step, except that all moves of a drag are one st
     handles    the handles and their edits              painting    edits of the regions
     saved_poses                                         poses by name, applied and blended
     landmarks                                           points with targets, and the fit to them
+    carried                                             other files whose points follow the mesh
 
 - New regions or cages reset the pose, unless `set_cages` gets the cages in the pose.  New regions
   keep the cages if each cage still encloses its region; otherwise all cages are removed.
@@ -59,6 +60,7 @@ from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Solution, Status
 from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
+from .carried import SessionCarried
 from .finishing import FinishedPose
 from .handle_edits import Handles
 from .landmark_edits import SessionLandmarks
@@ -201,6 +203,11 @@ class Session(Described):
     def landmarks(self) -> SessionLandmarks:
         """The landmarks by name; and edits of them, and the fit of the mesh to their targets."""
         return SessionLandmarks(self.history, self.poses)
+
+    @property
+    def carried(self) -> SessionCarried:
+        """The files whose points follow the mesh, by name; and edits of them."""
+        return SessionCarried(self.history, self.poses)
 
     @property
     def painting(self) -> Painting:

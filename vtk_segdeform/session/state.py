@@ -11,8 +11,11 @@ Long because each part of a state is checked here, where it enters.
 from __future__ import annotations
 
 import itertools
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -40,9 +43,18 @@ from ..deformer import (
     checked_place,
     checked_slides,
 )
-from ..errors import ArgumentError, CageError, ConstraintError, RegionError, SessionError
+from ..errors import (
+    ArgumentError,
+    CageError,
+    ConstraintError,
+    MeshError,
+    RegionError,
+    SessionError,
+)
+from ..files import replacing
 from ..freezing import Frozen
 from ..geometry import FREE, checked_attach
+from ..landmarks import Follower
 from ..mesh import Mesh, SurfacePoint
 from ..regions import Regions
 from .listeners import Change
@@ -241,6 +253,38 @@ _NO_LANDMARKS = LandmarkSet()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class CarriedFile:
+    """A file whose points follow the mesh; see `SessionCarried`.
+
+    Raises
+    ------
+    MeshError
+        If *name* is not that of a file.
+    """
+
+    name: str
+    """With its suffix, without a folder."""
+    content: bytes
+
+    def __post_init__(self) -> None:
+        is_name = isinstance(self.name, str) and self.name.isprintable()
+        if not is_name or not self.name.strip(". ") or set(self.name) & set("/\\:"):
+            raise MeshError(f"{shown(self.name)} is not the name of a file")
+
+    @cached_property
+    def follower(self) -> Follower:
+        """What it has; a MeshError if it cannot be read."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"file{Path(self.name).suffix}"
+            with replacing(path) as draft:
+                draft.write_bytes(self.content)
+            try:
+                return Follower.read(path)
+            except MeshError as fault:
+                raise MeshError(str(fault).replace(str(path), self.name)) from None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class State(Described, Frozen):
     """Everything in a session except its mesh; immutable."""
 
@@ -273,6 +317,7 @@ class State(Described, Frozen):
     saved: tuple[tuple[str, State], ...] = ()
     """Saved poses by name, as in `SavedPoses`; these states have none themselves."""
     landmarks: LandmarkSet = _NO_LANDMARKS
+    carried: tuple[CarriedFile, ...] = ()
 
     def facts(self) -> dict[str, str]:
         """Return its numbers as texts, by what they are."""
@@ -326,6 +371,7 @@ class State(Described, Frozen):
             (Change.OPTIONS, self.options == other.options),
             (Change.SAVED_POSES, self.saved is other.saved),
             (Change.LANDMARKS, self.landmarks is other.landmarks),
+            (Change.CARRIED, self.carried == other.carried),  # equal only if identical
         )
         changed = Change(0)
         for change, same in pairs:
@@ -384,7 +430,7 @@ def checked_state(mesh: Mesh, state: State) -> State:
         regions, cages, *constraints, pose, state.options, names, pulls, locality, pivots, places,
         checked_stiffness(mesh, state.stiffness), owned_slides(mesh, state.slides),
         owned_parts(mesh, state.parts), _checked_saved(mesh, state.saved),
-        owned_landmarks(mesh, state.landmarks),
+        owned_landmarks(mesh, state.landmarks), all_of(state.carried, CarriedFile, "state.carried"),
     )  # fmt: skip
 
 

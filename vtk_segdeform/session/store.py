@@ -19,6 +19,7 @@ The file is an `archive`, which ``numpy.load`` reads as an .npz file:
                           all of the above of a pose that was saved with other cages
     landmark_source.npy, landmark_target.npy, landmark_uncertainty.npy
                           as in `state.LandmarkSet`                                if any
+    carried_0.npy ...     the bytes of files that are carried along                if any
     surface_...npy        the given surface, as in `surface_store`                 if any
 
 The header may also have the ``view`` of the editor: camera, mode and up axis.  Nothing else depends
@@ -44,6 +45,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..checks import as_flag, as_path, require
 from ..errors import SessionError
 from ..files import open_regular, replacing
@@ -55,13 +58,14 @@ from .archive import (
     field,
     list_of,
     map_of,
+    row_of,
     text,
     whole,
     write_archive,
 )
 from .saved_poses import has_cages, in_pose
 from .session import Session
-from .state import State
+from .state import CarriedFile, State
 from .state_store import (
     FIRST_OPTIONS,
     pose_parts,
@@ -201,6 +205,10 @@ def _write(
         header["version"] = 4
     if any("state" in each for each in saved):
         header["version"] = 5
+    if state.carried:  # optional: earlier versions ignore them
+        header["carried"] = [[each.name, len(each.content)] for each in state.carried]
+        contents = (np.frombuffer(each.content, np.uint8) for each in state.carried)
+        arrays |= {f"carried_{k}": content for k, content in enumerate(contents)}
     if given is not None:
         imported("vtk_segdeform.session.surface_store")  # imports pyvista
         from .surface_store import surface_parts
@@ -235,7 +243,12 @@ def _read(archive: Archive) -> tuple[Mesh | Surface, State]:
                 locality=None,
             )
         saved.append((field(each, "name", text), posed))
-    state = replace(state, saved=tuple(saved))
+    files = header.get("carried", [])
+    carried = tuple(
+        CarriedFile(name, archive.array(f"carried_{k}", "u1", (size,)).tobytes())
+        for k, (name, size) in enumerate(list_of(row_of(text, whole))(files, "carried"))
+    )
+    state = replace(state, saved=tuple(saved), carried=carried)
     if "surface" not in header:
         return mesh, state
     imported("vtk_segdeform.session.surface_store")  # imports pyvista

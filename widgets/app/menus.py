@@ -75,7 +75,12 @@ class Menus:
             "&Copy poses of a session ...",
             lambda: window.editor_widget.panel.controls["poses.copy"].click(),
         )
-        self._need_mesh.append(copy)
+        carry = self._add(
+            menu,
+            "Carry &files along ...",
+            lambda: window.editor_widget.panel.controls["carried.add"].click(),
+        )
+        self._need_mesh += [copy, carry]
         menu.addSeparator()
         self._add(menu, "&Quit", window.close, _Keys.Quit).setMenuRole(_role("QuitRole"))
 

@@ -12,18 +12,19 @@ from typing import Any
 
 from vtk_segdeform.io import to_polydata
 from vtk_segdeform.mesh import Mesh
-from vtk_segdeform.session import Session
+from vtk_segdeform.session import Session, State
 
 from .documents import Document, Opened, Unopenable
 from .repair_dialog import RepairDialog
+
+_NEW = State()
 
 
 def ask_repair(window: Any) -> Opened | None:
     """Show what a repair of the open document would do; return the repaired copy, or None."""
     session, camera = window.session, window.editor.view.camera
     given = to_polydata(session.mesh) if session.surface is None else session.surface.given
-    has_pose = session.state.pose is not None
-    return _ask(window, window.document, given, session.mesh, camera, has_pose=has_pose)
+    return _ask(window, window.document, given, session.mesh, camera, state=session.state)
 
 
 def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Opened | None:
@@ -32,9 +33,9 @@ def ask_repair_of(window: Any, path: Path, error: Unopenable) -> Opened | None:
 
 
 def _ask(
-    window: Any, document: Document, given: Any, mesh: Mesh, camera: Any, *, has_pose: bool = False
+    window: Any, document: Document, given: Any, mesh: Mesh, camera: Any, *, state: State = _NEW
 ) -> Opened | None:
-    dialog = RepairDialog(given, mesh, camera, window, has_pose=has_pose)
+    dialog = RepairDialog(given, mesh, camera, window, has_pose=state.pose is not None)
     try:
         repaired = dialog.repaired if dialog.exec() == dialog.DialogCode.Accepted else None
     finally:
@@ -46,4 +47,4 @@ def _ask(
     name = f"{Path(document.name).stem.removesuffix(' (repaired)')} (repaired)"
     # Files are proposed beside the original, under the new name.
     place = None if document.source is None else document.source.with_stem(name)
-    return Document(name, source=place), Session(repaired)
+    return Document(name, source=place), Session(repaired, state=State(carried=state.carried))

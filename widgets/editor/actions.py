@@ -167,7 +167,8 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
     """Return the action that writes the surface in the pose, otherwise as it was given.
 
     The suffix selects the format, which may not support all arrays: see `io.write_mesh`; what is
-    left out is said.  The file is then read again in another thread, see `Controller.read_again`.
+    left out is said.  What the session carries along is written beside it.  The file is then read
+    again in another thread, see `Controller.read_again`.
     A pose that still converges is written once it has settled, and *then* is called.
     """
 
@@ -177,8 +178,9 @@ def exporting(path: Path, then: Callable[[], object] = lambda: None) -> Action:
             raise SessionError("Finish the drag before saving the mesh")
         controller.finishing.interrupt()
         written = write_posed(session, path, displacement=controller.displacement)
-        saved = f"Mesh saved to {path}{pose_remark(session)}"
-        controller.say(". ".join([saved, *written.remarks]))
+        remarks = *written.remarks, *controller.file.write_carried(session, path.parent)
+        written = replace(written, remarks=remarks)
+        controller.say(". ".join([f"Mesh saved to {path}{pose_remark(session)}", *remarks]))
         controller.read_again(written)
         then()
 
@@ -797,6 +799,27 @@ def saving_landmarks(path: Path, *, targets: bool) -> Action:
         controller.say(f"Saved to {path}")
 
     return save
+
+
+def carrying(paths: Sequence[Path]) -> Action:
+    """Return the action that carries files along with the mesh."""
+
+    def carry(controller: Controller) -> None:
+        names = controller.session.carried.add(*paths)
+        what = names[0] if len(names) == 1 else f"{len(names)} files"
+        controller.say(f"{_sentence(what)} will follow the mesh")
+
+    return carry
+
+
+def saving_carried(name: str, path: Path) -> Action:
+    """Return the action that writes a carried file in the pose, once that has settled."""
+
+    def save(controller: Controller) -> None:
+        controller.session.carried.write(name, path)
+        controller.say(f"Saved to {path}")
+
+    return once_settled(save)
 
 
 # Painting.

@@ -58,6 +58,7 @@ class SessionFile:
         self.is_new = False
         self._written: Path | None = None
         self._saved = session.state
+        self._carried: set[Path] = set()  # that were written
 
     @property
     def may_overwrite(self) -> bool:
@@ -86,6 +87,17 @@ class SessionFile:
         """Save *session* to `path`; see `save_session`."""
         save_session(self.path, session, view=view)
         self.mark_saved(session)
+
+    def write_carried(self, session: Session, folder: Path) -> tuple[str, ...]:
+        """Write what *session* carries along to a *folder*; return what to say, in sentences.
+
+        No file is replaced but those that were written so before.
+        """
+        written, failed = session.carried.write_all(folder, ours=self._carried)
+        self._carried |= {*written.values()}
+        beside = ", ".join(path.name for path in written.values())
+        said = [f"Beside it: {beside}"] if written else []
+        return *said, *(f"{name} was not saved: {why}" for name, why in failed.items())
 
     def mark_saved(self, session: Session) -> None:
         """Record that the file contains *session*."""

@@ -29,7 +29,7 @@ from ..region_selector import (
     RegionOutlines,
     RegionSelector,
 )
-from ..scene import Pointer, SurfaceDisplay, View, Widget
+from ..scene import CarriedDisplay, Pointer, SurfaceDisplay, View, Widget
 from ..volume_overlay import VolumeOverlay
 
 
@@ -85,6 +85,7 @@ class WidgetSet:
         self.dragger.pulls_with = lambda: self.puller.options
         self.landmarks = LandmarkMarks(view, session, self.surface)
         self.overlay = VolumeOverlay(view, session, self.surface)
+        self.carried = CarriedDisplay(view, session)
         self.cages_wanted = self.overlay_wanted = self.regions_wanted = False
         self.cages.hide()
         self._chosen: tuple[int, ...] = ()
@@ -175,6 +176,7 @@ class WidgetSet:
             lines=self.regions_wanted and mode is not Mode.REGIONS,
             numbers=self.regions_wanted or mode is Mode.REGIONS,
         )
+        self.carried.is_shown = True
         if mode is Mode.CAGES or self.cages_wanted:
             self.cages.show()
         else:
@@ -189,6 +191,7 @@ class WidgetSet:
         self.switch_off()
         self.overlay.hide()
         self.cages.hide()
+        self.carried.is_shown = False
         self.outlines.show(lines=False, numbers=False)
         self.surface.instead = vertices
 
@@ -213,6 +216,7 @@ class WidgetSet:
         self.puller.hinge = before.puller.hinge
         self.dragger.local = before.dragger.local
         self.landmarks.is_hidden = before.landmarks.is_hidden
+        self.carried.copy_settings(before.carried)
         self.overlay.wanted_range = before.overlay.wanted_range
         self.surface.style = before.surface.style
         self.cages_wanted, self.overlay_wanted = before.cages_wanted, before.overlay_wanted
@@ -316,6 +320,7 @@ class WidgetSet:
     def remove(self) -> None:
         """Remove everything from the view, permanently."""
         self.overlay.remove()
+        self.carried.remove()
         for widget in reversed(self.interactive):
             widget.remove()
         self.outlines.remove()

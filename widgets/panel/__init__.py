@@ -15,7 +15,7 @@ The files, in reading order:
 
     fields      what fields, tables and sections are
     panel       `sections` and `press`
-    pulling handles motion poses landmarks options volumes regions painting
+    pulling handles motion poses landmarks carried options volumes regions painting
                 the sections
     toolbar     the toolbar and the menu about the view
     menu        the menu of the right button

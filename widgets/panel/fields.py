@@ -67,6 +67,8 @@ class Field:
     """The entries of a menu; None separates two groups."""
     suffixes: tuple[str, ...] = ()
     """Of the files that a "file" of a section asks for; without any, of any kind."""
+    several: bool = False
+    """Whether it may be more than one file."""
     saves: bool = False
     """Whether it writes this file."""
     while_busy: bool = False

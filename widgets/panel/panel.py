@@ -13,6 +13,7 @@ from vtk_segdeform.checks import as_flag, as_text, require, shown
 from vtk_segdeform.errors import ArgumentError
 
 from ..editor import DeformEditor, Mode, jumping_to, preview
+from .carried import carried_section
 from .fields import Field, Item, Section, Table
 from .handles import handles_section
 from .landmarks import landmarks_section
@@ -38,6 +39,7 @@ _SECTIONS: tuple[tuple[Callable[[DeformEditor], Section], set[Mode]], ...] = (
     (deform_section, {Mode.DEFORM}),
     (volumes_section, {Mode.PULL, Mode.DEFORM}),
     (bodies_section, {Mode.PULL, Mode.DEFORM}),
+    (carried_section, {Mode.PULL, Mode.DEFORM}),
     (regions_section, {Mode.REGIONS, Mode.CAGES, Mode.DEFORM}),
     (advanced_section, {Mode.DEFORM}),
     (painting_section, {Mode.REGIONS, Mode.HANDLES}),
@@ -143,11 +145,12 @@ def file_field(editor: DeformEditor, name: str) -> Field:
     raise ArgumentError(f"name: there is no control {shown(name)} that asks for a file")
 
 
-def use_file(editor: DeformEditor, name: str, path: Path) -> Exception | None:
-    """Use the control `file_field` with the file that the skin has asked for."""
+def use_file(editor: DeformEditor, name: str, *paths: Path) -> Exception | None:
+    """Use the control `file_field` with what the skin has asked for: one file, or `several`."""
     field = file_field(editor, name)
     assert field.act is not None
-    return editor.do(field.act(path)) if field.enabled else None
+    chosen: Any = paths if field.several else paths[0]
+    return editor.do(field.act(chosen)) if field.enabled else None
 
 
 def checked(field: Field, value: Any) -> Any:

@@ -30,8 +30,9 @@ def using(editor: DeformEditor) -> Press:
 
     def use(name: str, value: Any = None) -> None:
         with editor.view.guarded():
-            if isinstance(value, Path):
-                use_file(editor, name, value)
+            paths = value if isinstance(value, list) else [value]
+            if paths and isinstance(paths[0], Path):
+                use_file(editor, name, *paths)
             else:
                 press(editor, name, value)
             editor.controller.refresh()  # and with it the panel, even if nothing was done

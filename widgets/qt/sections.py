@@ -147,7 +147,13 @@ def _ask(parent: Any, field: Field, press: Callable[..., object]) -> None:
     if field.saves:
         path, _ = QtWidgets.QFileDialog.getSaveFileName(parent, title, "", kinds)
     else:
-        path, _ = QtWidgets.QFileDialog.getOpenFileName(parent, title, "", kinds)
+        ask = QtWidgets.QFileDialog
+        if field.several:
+            paths, _ = ask.getOpenFileNames(parent, title, "", kinds)
+            if paths:
+                press([*map(Path, paths)])
+            return
+        path, _ = ask.getOpenFileName(parent, title, "", kinds)
     if path:
         chosen = Path(path)
         is_whole = chosen.suffix or not field.saves

@@ -18,11 +18,13 @@ The files, in reading order:
     draft              drawing fast while something moves
     decimated_surface  a large mesh in motion, by fewer vertices
     labels             rectangles and text in display coordinates
+    carried_display    the files that a session carries along
     wireframe          edges and vertices of a mesh
     highlights         loops and vertices of a mesh, marked
 """
 
 from .backdrop import set_background, set_lights
+from .carried_display import CARRIED_COLOUR, CarriedDisplay
 from .decimated_surface import decimated_soon
 from .draft import Draft
 from .gestures import Gesture, Phase, Pointer
@@ -40,7 +42,9 @@ from .widget import Widget
 from .wireframe import Wireframe, cells_of, points_of
 
 __all__ = [
+    "CARRIED_COLOUR",
     "VIEWS",
+    "CarriedDisplay",
     "Draft",
     "Gesture",
     "Glide",

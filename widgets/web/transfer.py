@@ -7,8 +7,8 @@
     POST paraview/             null: trame's page asks for a launcher first, and there is none
 
 The first two need the header ``X-Segdeform``, which a page of another origin cannot send.  A page
-never names a file of the server: of NAME only the suffix is used, and the text is shown.  One file
-is uploaded at a time, each to a folder of its own.
+never names a file of the server: one file is uploaded at a time, each to a folder of its own.  Of
+NAME only letters, digits and " .()+-" are used.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import re
 import shutil
 import tempfile
 from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +114,9 @@ class Transfer:
         if self._editor.is_busy:
             return _refusal(409, "The editor is busy. Wait, or cancel the work, and try again.")
         self._is_uploading, folder = True, self._new_folder()
-        place, is_open = folder / f"upload{suffix}", False
+        # A file for a control keeps its name, which the session may show.
+        own = field and Path(name).stem.strip(". ")
+        place, is_open = folder / (name if own else f"upload{suffix}"), False
         try:
             if not await self._store(read, place):
                 return self._too_large(name)
@@ -158,7 +161,7 @@ class Transfer:
     async def give(self, suffix: str, query: Mapping[str, str]) -> web.Response:
         """Return a download without an address; see `download`."""
         suffix, field = f".{suffix}", query.get("field", "")
-        if suffix not in ((".csv",) if field else (_SESSION, *writable_suffixes())):
+        if suffix not in self._suffixes(field):
             return _refusal(404, f"There is no format {suffix}.")
         while self._editor.widgets.is_pose_to_come:
             await asyncio.sleep(_POLL)
@@ -206,6 +209,15 @@ class Transfer:
         save_session(place, session, view=editor.controller.camera.settings(editor.mode))
         editor.controller.file.mark_saved(session)
         return None
+
+    def _suffixes(self, field: str) -> tuple[str, ...]:
+        """Return the suffixes of what *field* saves, or of the session and the surface."""
+        if not field:
+            return (_SESSION, *writable_suffixes())
+        if not self._editor.is_busy:
+            with suppress(ArgumentError):
+                return file_field(self._editor, field).suffixes
+        return (".csv",)
 
     def _too_large(self, name: str) -> web.Response:
         most = f"{self.limit / 1e6:,.0f} MB"

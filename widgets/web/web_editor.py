@@ -125,6 +125,7 @@ class WebEditor:
         table = {**keys_of(keys).changes, **_NO_KEYS}
         self.editor: DeformEditor = add_editor(self.plotter, session, keys=table)
         self.editor.controller.messages.show_line(False)  # which the page shows
+        self.editor.widgets.carried.follows_drags = False  # a page that draws would get all of it
         if self._is_plotter_ours:
             self.plotter.show(interactive=False, auto_close=False)
         names = {str(self.editor.path): name}

@@ -36,7 +36,7 @@ def widget(unprepared):
     widget.resize(900, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
-    for name in ("volumes", "advanced", "landmarks"):
+    for name in ("volumes", "advanced", "landmarks", "carried"):
         box = widget.panel.boxes[name]
         assert not any(control.isVisibleTo(box) for control in box.controls.values())
         box.fold.click()
@@ -151,6 +151,8 @@ def test_every_visible_control_presses_its_field(widget, monkeypatch):
     monkeypatch.setattr(f"{module.rpartition('.')[0]}.use_file", lambda *a: pressed.append(a[1:]))
     for ask in ("getOpenFileName", "getSaveFileName"):
         monkeypatch.setattr(QtWidgets.QFileDialog, ask, lambda *_, ask=ask: (f"/{ask}", ""))
+    several = lambda *_: (["/one", "/other"], "")  # noqa: E731
+    monkeypatch.setattr(QtWidgets.QFileDialog, "getOpenFileNames", several)
     panel, editor = widget.panel, widget.editor
     kinds = set()
     for mode in Mode:
@@ -162,8 +164,10 @@ def test_every_visible_control_presses_its_field(widget, monkeypatch):
                     continue
                 pressed.clear()
                 use(panel.controls[field.name], field)
-                assert [name for name, _ in pressed] == [field.name]
-                if field.kind == "file":  # asked for by the skin
+                assert [name for name, *_ in pressed] == [field.name]
+                if field.several:
+                    assert pressed[0][1:] == (Path("/one"), Path("/other"))
+                elif field.kind == "file":  # asked for by the skin
                     name = "getSaveFileName.csv" if field.saves else "getOpenFileName"
                     assert pressed[0][1] == Path(f"/{name}")
                 kinds.add(field.kind)
