@@ -108,7 +108,7 @@ class Wild(Anderson):
         return self.where
 
 
-@pytest.mark.parametrize("share, is_taken", [(0.9, False), (0.5, False), (1e-4, True)])
+@pytest.mark.parametrize(("share", "is_taken"), [(0.9, False), (0.5, False), (1e-4, True)])
 def test_an_accelerated_step_must_do_about_as_well_as_the_plain_one_promises(share, is_taken):
     """Not only lower the merit, which is large where a handle has moved on."""
     problem = bowl()

@@ -65,7 +65,7 @@ def checked_slides(mesh: Mesh, slides: Any) -> tuple[Slide, ...]:
     if slides is None:
         return ()
     try:
-        every = list(slides)
+        every = iter(slides)  # not a list: the first that is none ends it
     except TypeError:  # numbers, and arrays without dimensions, which claim to be iterable
         raise ConstraintError(f"slides must be a sequence of Slide; got {shown(slides)}") from None
     found = []
