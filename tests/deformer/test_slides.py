@@ -213,6 +213,7 @@ def test_many_sliding_vertices_need_little_memory():
         ([sd.Slide([0], "plane", "up")], "direction of a slide"),
         ([sd.Slide([0], "plane", [1j, 0, 1])], "direction of a slide"),
         ([sd.Slide([0], ["plane"])], "along a plane, line or surface"),
+        (range(10**12), "slides must be a Slide; got 0"),
     ],
 )
 def test_what_is_no_slide_is_named(slides, text):
