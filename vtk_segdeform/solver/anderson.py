@@ -33,7 +33,9 @@ class Anderson:
 
     def __init__(self, window: int) -> None:
         self.window = window
-        self.forget()
+        self._last: tuple[FloatArray, FloatArray] | None = None
+        self._moves: list[FloatArray] = []  # differences of q = p + h
+        self._changes: list[FloatArray] = []  # differences of the residual
 
     def copy(self) -> Anderson:
         """Return another with the same steps."""
@@ -45,9 +47,7 @@ class Anderson:
 
     def forget(self) -> None:
         """Discard all steps."""
-        self._last: tuple[FloatArray, FloatArray] | None = None
-        self._moves: list[FloatArray] = []  # differences of q = p + h
-        self._changes: list[FloatArray] = []  # differences of the residual
+        self._last, self._moves, self._changes = None, [], []
 
     def extrapolate(self, q: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the accelerated successor of p, whose plain successor is *q* = p + h."""
