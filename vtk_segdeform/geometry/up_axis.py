@@ -23,7 +23,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 from ..arrays import FloatArray, bounds_of
 
 _FOOTPRINT_HEIGHT = 0.03  # of the height: the vertices that belong to a footprint
-_ON_GROUND = 1e-3  # of the height: the distance from the plane through the origin
+_ON_GROUND = 5e-3  # of the height, to the plane through the origin: a remeshed body just misses it
 _ALIKE = 1e-3  # of the middle extent: bodies at less than this distance are the same
 _MOST_FOOTPRINT, _MOST_MIRROR, _MIRRORED = 100_000, 20_000, 1500  # points
 

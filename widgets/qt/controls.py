@@ -258,8 +258,9 @@ def _highlight(button: Any, down: bool) -> None:
     button.setPalette(palette)
     if isinstance(button, QtWidgets.QToolButton):
         button.setAutoRaise(not down)  # a flat one would not show its colour
-    policies = Qt.FocusPolicy  # Tab selects the one that is down, arrows its neighbours
-    button.setFocusPolicy(policies.TabFocus if down else policies.NoFocus)
+    policies = Qt.FocusPolicy  # in a group Tab selects the one that is down, arrows its neighbours
+    is_reached = down or button.group() is None
+    button.setFocusPolicy(policies.TabFocus if is_reached else policies.NoFocus)
 
 
 def _policy(name: str) -> Any:

@@ -82,6 +82,20 @@ class Toolbar(QtWidgets.QWidget):
                 if entry.name in self._toggles:
                     self._toggles[entry.name].setChecked(entry.value)
 
+    def add_toggle(self, name: str, label: str, key: str) -> Any:
+        """Return a new button at the end, which stays down, with the icon of that *name*."""
+        *_, last = self.buttons.values()
+        button = self.buttons[name] = highlighted(tool_button(label))
+        button.setToolTip(f"Show or hide: {label.lower()} ({key})")
+        self._icons[name] = name
+        button.setMinimumHeight(_HEIGHT - 4)
+        self._groups[-1].layout().addWidget(button)
+        self.setTabOrder(last, button)
+        self._draw_icons()
+        self._level = -1
+        self._fit()
+        return button
+
     def resizeEvent(self, event: Any) -> None:  # noqa: N802 - Qt's name
         """Show as many names as there is room for."""
         super().resizeEvent(event)

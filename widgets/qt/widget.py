@@ -26,14 +26,20 @@ from .. import plugin  # noqa: F401 - registers `segdeform` on plotters even wit
 from ..editor import DeformEditor, Keys
 from ..hosting import session_of
 from ..scene import View, set_background, set_lights
+from .controls import shortcut
 from .keys_dialog import KeysDialog
 from .panel import DeformPanel
 
+_NARROW = 1000  # pixels: in a widget that is less wide, the panel would take half of it
+_PANEL_KEY = "F9"
 _DARK = 128  # lightness of a window, 0 to 255, below which its palette is dark
 
 
 class DeformWidget(QtWidgets.QWidget):
     """A toolbar, a view with the editor in it, the panel beside it, and the status below.
+
+    In a narrow widget the panel is closed at first, and opens over the view.  The button *Panel* of
+    the toolbar and F9 open and close it.
 
     Parameters
     ----------
@@ -50,6 +56,8 @@ class DeformWidget(QtWidgets.QWidget):
         The editor in the view.
     panel : DeformPanel
         The panel beside it.
+    panel_button : QToolButton
+        Shows the panel while it is down.
     taken_keys : callable
         Returns the keys that no action can have, with labels; the application's menus have them.
     keys_changed : signal
@@ -77,17 +85,24 @@ class DeformWidget(QtWidgets.QWidget):
         self.panel = DeformPanel(self.editor, self)
         self.deformed, self.regions_changed = self.panel.deformed, self.panel.regions_changed
         self.session_changed, self.error = self.panel.session_changed, self.panel.error
-        halves = QtWidgets.QSplitter(self)
-        halves.addWidget(self.plotter)
-        halves.addWidget(self.panel)
-        halves.setStretchFactor(0, 1)  # a wider window enlarges the view
-        halves.setCollapsible(0, False)
-        layout = QtWidgets.QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(0)
-        layout.addWidget(self.panel.toolbar)
-        layout.addWidget(halves, 1)
-        layout.addWidget(self.panel.status)
+        self._halves = QtWidgets.QSplitter(self)
+        self._halves.addWidget(self.plotter)
+        self._halves.addWidget(self.panel)
+        self._halves.setStretchFactor(0, 1)  # a wider window enlarges the view
+        self._halves.setCollapsible(0, False)
+        self.panel.setAutoFillBackground(True)  # it may lie over the view
+        self._is_narrow = False
+        self._layout = QtWidgets.QGridLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(0)
+        self._layout.addWidget(self.panel.toolbar, 0, 0)
+        self._layout.addWidget(self._halves, 1, 0)
+        self._layout.addWidget(self.panel.status, 2, 0)
+        self._layout.setRowStretch(1, 1)
+        self.panel_button = self.panel.toolbar.add_toggle("panel", "Panel", _PANEL_KEY)
+        self.panel_button.setChecked(True)
+        self.panel_button.toggled.connect(self.panel.setVisible)
+        shortcut(_PANEL_KEY, self, self.panel_button.click)
         self.panel.status.lie_down()
         self.setFocusProxy(self.plotter)
         application = QtWidgets.QApplication.instance()
@@ -104,7 +119,8 @@ class DeformWidget(QtWidgets.QWidget):
         for shown in self.findChildren(KeysDialog):
             shown.reject()
             return
-        dialog = KeysDialog(self, self.editor.keys, self.taken_keys())
+        taken = {_PANEL_KEY.lower(): "Panel", **self.taken_keys()}
+        dialog = KeysDialog(self, self.editor.keys, taken)
         dialog.accepted.connect(lambda: self._use_keys(dialog.keys))
         dialog.show()  # not modal: a drag may be going on
 
@@ -126,6 +142,21 @@ class DeformWidget(QtWidgets.QWidget):
         if self._camera_position == tuple(self.plotter.camera.position):
             self.editor.controller.camera.viewpoint.frame(animate=False)
         self._camera_position = None
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802
+        """Move the panel over the view of a narrow widget, closed, or back beside it."""
+        super().resizeEvent(event)
+        is_narrow = self.width() < _NARROW
+        if is_narrow == self._is_narrow or self._is_closed:
+            return
+        self._is_narrow = is_narrow
+        if is_narrow:
+            self._layout.addWidget(self.panel, 1, 0, QtCore.Qt.AlignmentFlag.AlignRight)
+            self.panel.raise_()
+        else:
+            self._halves.addWidget(self.panel)
+        self.panel_button.setChecked(not is_narrow)
+        self.panel.setVisible(not is_narrow)
 
     def changeEvent(self, event: Any) -> None:  # noqa: N802
         """Use the background for a new palette, light or dark."""

@@ -33,7 +33,7 @@ def widget(unprepared):
     session.landmarks.add(0, mesh.vertices[0])
     widget = DeformWidget(session)
     widget.plotter.setUpdatesEnabled(False)  # the view is not tested, and slow to draw
-    widget.resize(900, 900)
+    widget.resize(1000, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
     for name in ("volumes", "advanced", "landmarks", "carried"):
@@ -320,7 +320,7 @@ def two_bodies():
     session.bind()
     widget = DeformWidget(session)
     widget.plotter.setUpdatesEnabled(False)
-    widget.resize(900, 900)
+    widget.resize(1000, 900)
     widget.show()
     until(lambda: widget.windowHandle().isExposed(), "the window")
     yield widget

@@ -51,7 +51,7 @@ class Seen:
 
     def __init__(self, widget, window=None):
         window = window or widget
-        window.resize(760, 560)
+        window.resize(1000, 560)  # below, the panel is closed at first
         window.show()
         until(lambda: window.windowHandle() and window.windowHandle().isExposed(), "the window")
         window.activateWindow()
@@ -659,6 +659,7 @@ def test_two_widgets_and_a_dock_in_one_window_are_independent(state):
     assert [seen.editor.mode for seen in hands] == [Mode.DEFORM, Mode.REGIONS, Mode.CAGES]
     bend(hands[0])
     assert [len(seen.deformed) for seen in hands] == [1, 0, 0]
+    hands[1].click(second.panel_button)  # a narrow widget, whose panel is closed at first
     hands[1].click_row(second.panel.controls["regions.list"], 1)
     hands[1].click(second.panel.controls["regions.split"])
     assert [seen.session.regions.n_regions for seen in hands] == [2, 3, 2]
@@ -733,6 +734,31 @@ def test_deleting_a_dock_leaves_the_editor_unchanged(state):
     window.close()
     window.deleteLater()
     delete_now()
+
+
+def test_in_a_narrow_widget_the_panel_opens_over_the_view(seen):
+    widget, panel, wide = seen.widget, seen.panel, seen.widget.size()
+    radius = panel.controls["pull.radius"]
+    seen.mode(Mode.PULL)
+    assert panel.isVisible()
+    assert panel.geometry().left() >= widget.plotter.geometry().right()  # beside it
+    widget.resize(700, 500)
+    until(lambda: not panel.isVisible() and widget.plotter.width() == 700, "the whole width")
+    seen.click(widget.panel_button)
+    assert widget.plotter.width() == 700
+    assert panel.geometry().right() == widget.rect().right()
+    at = radius.mapTo(widget, radius.rect().center())
+    assert panel.isAncestorOf(widget.childAt(at))  # not hidden by the view
+    for is_shown in (False, True):
+        QtTest.QTest.keyClick(widget.plotter, Qt.Key_F9)
+        assert panel.isVisible() is widget.panel_button.isChecked() is is_shown
+    widget.resize(wide)
+    until(lambda: widget.plotter.width() < wide.width() - 300, "the view")
+    assert panel.isVisible()
+    assert widget.panel_button.isChecked()
+    QtTest.QTest.keyClick(widget.plotter, Qt.Key_F9)  # also where there is room
+    assert not panel.isVisible()
+    seen.click(widget.panel_button)
 
 
 # Accessibility.
