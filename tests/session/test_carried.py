@@ -78,6 +78,8 @@ def test_they_are_written_as_they_were_given_but_never_over_another_file(files, 
     again, _ = session.carried.write_all(tmp_path, ours={*written.values()})
     assert again == written
     assert session.carried.write_all(tmp_path)[0]["skin.ply"] == tmp_path / "skin-3.ply"
+    with pytest.raises(MeshError, match="there is no such folder"):
+        session.carried.write_all(tmp_path / "nowhere")
 
 
 def test_a_session_file_has_their_content_when_the_files_are_gone(files, tmp_path):

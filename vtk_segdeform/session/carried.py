@@ -96,7 +96,7 @@ class SessionCarried(Mapping[str, CarriedFile]):
         return tuple(names)
 
     def remove(self, *names: str) -> None:
-        """Carry one or more files no longer."""
+        """Stop carrying one or more files."""
         gone = {self._known(name) for name in names}
         if gone:
             label = names[0] if len(gone) == 1 else f"{len(gone)} carried files"
@@ -137,15 +137,23 @@ class SessionCarried(Mapping[str, CarriedFile]):
             Where they are, by name.
         failed : dict of str to str
             Why the others could not be written.
+
+        Raises
+        ------
+        MeshError
+            If there is no such folder.
         """
+        folder = as_path(folder)
+        if not folder.is_dir():
+            raise MeshError(f"{folder}: there is no such folder")
         written, failed = dict[str, Path](), dict[str, str]()
         for name in self:
             stem, suffix = Path(name).stem, Path(name).suffix
             suffix = ".csv" if suffix.lower() in LANDMARK_SUFFIXES else suffix
-            taken = {path.name for path in as_path(folder).iterdir() if path not in ours} | {
+            taken = {path.name for path in folder.iterdir() if path not in ours} | {
                 path.name for path in written.values()
             }
-            path = as_path(folder) / _unused(f"{stem}{suffix}", taken)
+            path = folder / _unused(f"{stem}{suffix}", taken)
             try:
                 self.write(name, path)
                 written[name] = path

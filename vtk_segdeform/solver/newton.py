@@ -8,7 +8,8 @@ poses have the same volumes, and the objective itself is the merit, which falls 
 1. Anderson acceleration proposes a step.
 2. If the merit there is not lower, or more than twice what the plain step promises, the plain step
    is tried, and shares 1/2, 1/4 ... of it: the epsilon of section 3.3.  (Of a handle that has moved
-   on, the merit is so large that almost any step would lower it.)
+   on, the merit is so large that almost any step would lower it.  Merits are sums of squares, and
+   the load of a pull leaves them positive; at one below zero the plain step is tried.)
 3. If no share helps, the objective may have a step with another Hessian.
 
 The iteration has converged if the step is short, or no gain beyond rounding is left.
@@ -35,7 +36,7 @@ from .solution import Status
 _EPSILON = 2.0**-52  # relative gain of a step that is less than rounding
 _ROUNDING = 1e-13  # relative gain that may be due to rounding
 _SHORTEST = 1.0 / 64.0  # least share of a step
-_PROMISED = 2.0  # an accelerated step may leave this much of the merit promised, which is >= 0
+_PROMISED = 2.0  # what an accelerated step may leave, of the merit that the plain one promises
 
 
 class Iterate(Protocol):

@@ -807,7 +807,7 @@ def carrying(paths: Sequence[Path]) -> Action:
     def carry(controller: Controller) -> None:
         names = controller.session.carried.add(*paths)
         what = names[0] if len(names) == 1 else f"{len(names)} files"
-        controller.say(f"{_sentence(what)} will follow the mesh")
+        controller.say(f"The mesh carries {what} along")
 
     return carry
 

@@ -82,7 +82,7 @@ def carried_section(editor: DeformEditor) -> Section:
                     "carried.remove",
                     "button",
                     "Remove",
-                    "Carries the selected file no longer",
+                    "Stops carrying the selected file",
                     visible=bool(rows),
                     act=lambda _: lambda c: c.session.carried.remove(chosen),
                 ),

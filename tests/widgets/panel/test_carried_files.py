@@ -41,7 +41,7 @@ def test_files_are_added_follow_the_frames_of_a_drag_are_hidden_and_saved(editor
     for name in ("skin.ply", "lining.ply"):
         write_mesh(tmp_path / name, session.mesh.with_vertices(x * (1.0 + 0.1 * (name[0] == "s"))))
     assert use_file(editor, "carried.add", tmp_path / "skin.ply", tmp_path / "lining.ply") is None
-    assert editor.controller.messages.text.startswith("2 files will follow the mesh")
+    assert editor.controller.messages.text.startswith("The mesh carries 2 files along")
     assert shown(editor) == [("skin.ply", f"{len(x):,}", True), ("lining.ply", f"{len(x):,}", True)]
     name, at = next(iter(session.targets.items()))
     session.drag({name: at + [0.0, 0.5, 0.0]})
