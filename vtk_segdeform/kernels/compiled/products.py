@@ -18,9 +18,6 @@ _compile = kernel(fastmath={"reassoc", "contract"})
 )
 def add_product(x, rows, block, p, start, stop):
     """Add block @ p.T to *rows* start..stop of *x*, for *p* (k, m), k a multiple of 3."""
-    if len(p) == 6:
-        _add_six(x, rows, block, p, start, stop)
-        return
     four = start + (stop - start) // 4 * 4
     for i in range(start, four, 4):
         b0, b1, b2, b3 = block[i], block[i + 1], block[i + 2], block[i + 3]
@@ -52,43 +49,6 @@ def add_product(x, rows, block, p, start, stop):
                 x[k, c + 1] += d1
                 x[k, c + 2] += d2
     for i in range(four, stop):
-        _add_row(x, rows[i], block[i], p)
-
-
-@_compile()
-def _add_six(x, rows, block, p, start, stop):
-    """Do `add_product` for six columns, reading the block once: all sums fit into registers."""
-    p0, p1, p2, p3, p4, p5 = p[0], p[1], p[2], p[3], p[4], p[5]
-    two = start + (stop - start) // 2 * 2
-    for i in range(start, two, 2):
-        b, c, q, r = block[i], block[i + 1], np.uint64(rows[i]), np.uint64(rows[i + 1])
-        s0 = s1 = s2 = s3 = s4 = s5 = t0 = t1 = t2 = t3 = t4 = t5 = 0.0
-        for j in range(len(b)):
-            u0, u1, u2, u3, u4, u5 = p0[j], p1[j], p2[j], p3[j], p4[j], p5[j]
-            v, w = float(b[j]), float(c[j])
-            s0 += v * u0
-            s1 += v * u1
-            s2 += v * u2
-            s3 += v * u3
-            s4 += v * u4
-            s5 += v * u5
-            t0 += w * u0
-            t1 += w * u1
-            t2 += w * u2
-            t3 += w * u3
-            t4 += w * u4
-            t5 += w * u5
-        for row, d0, d1, d2, d3, d4, d5 in (
-            (q, s0, s1, s2, s3, s4, s5),
-            (r, t0, t1, t2, t3, t4, t5),
-        ):
-            x[row, 0] += d0
-            x[row, 1] += d1
-            x[row, 2] += d2
-            x[row, 3] += d3
-            x[row, 4] += d4
-            x[row, 5] += d5
-    for i in range(two, stop):
         _add_row(x, rows[i], block[i], p)
 
 
