@@ -140,25 +140,48 @@ def test_an_almost_singular_hessian_does_not_stop_the_solver(monkeypatch):
     expected, deformer = SCENE.held().solve(SCENE.turned(60)), SCENE.held()
     with monkeypatch.context() as wrong:
         wrong.setattr(GaussNewton, "_factor_at", almost_singular)
-        for _ in range(20):  # with few steps left H is computed soon
+        for _ in range(20):
             found = deformer.solve(SCENE.turned(60), max_steps=3)
     assert len(asked) > 1
     assert distance(found, expected) < 5e-3
 
 
-def is_slow(lengths, *, max_steps=500, age=1, is_new=False):
-    """Tell whether H is out of date for the last of steps with these *lengths*.
+def is_slow(lengths, *, age=1, cost=5.0, max_steps=500, has_begun=True, is_new=False):
+    """Tell whether H is computed for the last of steps with these *lengths*; tolerance 1e-4.
 
-    The tolerance is 1e-4, and *age* is that of H at the start of the call: 1 if it is that of rest.
+    *age* is that of the present H at the start of the call, in steps, and *cost* that of a new one.
     """
     nowhere = np.zeros((0, 3))
-    state = _State(None, age=age)
+    state = _State(None, cost, age, has_begun)
     state.begin(nowhere, nowhere, SolverOptions(tolerance=1e-4, max_steps=max_steps))
     state.is_new = is_new
     *taken, last = (Step(nowhere, (), length) for length in lengths)
     for step in taken:
         state.took(step)
     return state.is_slow(last)
+
+
+def test_the_first_h_is_computed_unless_it_takes_longer_than_all_steps():
+    assert is_slow([1e-3], has_begun=False)
+    assert is_slow([1e-3], has_begun=False, cost=8.0, max_steps=8)
+    assert not is_slow([1e-3], has_begun=False, cost=9.0, max_steps=8)
+    assert is_slow([1e-3, 9e-4], has_begun=False, cost=9.0, max_steps=8)  # as later
+    assert not is_slow([1e-4], has_begun=False)  # it has converged
+
+
+def test_h_is_computed_again_where_steps_would_not_converge_in_that_time():
+    halved, to_a_third = [1e-2, 5e-3], [9e-3, 3e-3]
+    assert is_slow(halved)  # 5e-3 / 2^5 > 1e-4
+    assert not is_slow(to_a_third)
+    assert not is_slow(halved, cost=10.0)
+    assert not is_slow(halved, age=0)  # after one step with it its rate is not known
+    assert not is_slow([1e-2], age=9)  # of a call that has just begun
+    assert is_slow([2e-3, 5e-3]) and not is_slow([1e-5, 1e-4])  # longer ones
+
+
+@pytest.mark.parametrize(("age", "slow"), [(3, False), (4, True)])
+def test_an_h_of_the_same_call_serves_five_steps(age, slow):
+    assert is_slow([1e-2, 9e-3], age=age, is_new=True) is slow
 
 
 def test_h_is_computed_where_a_pose_is_far_and_saves_steps_there(monkeypatch):

@@ -90,7 +90,8 @@ def test_a_term_limits_every_step():
     far = np.abs(expected.p - start).max()
     assert far > 4.0 * limit
     assert 0.9 * limit < max(moves) < 1.1 * limit  # and a little to restore the volume
-    assert_allclose(p, expected.p, atol=1e-5)
+    surface = own.problem.subspace.map  # some cage vertices hardly move it
+    assert_allclose(surface(p), surface(expected.p), atol=2e-6)
 
 
 def test_h_contains_a_term_from_the_first_step_on_at_which_it_is_active():

@@ -30,10 +30,10 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    and rotations follow one step behind: where much turns, hundreds of steps are needed, and a small
    step does not mean that the minimum is near.  With the derivatives of the rotations and of the
    volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
-   takes as long as some 4 steps.  So the paper's H is used first, and H is computed at the present
-   pose if steps at the present rate would not converge within 4 steps, or those that are left, and
-   if no share of a step lowers the objective.  An H of the same call serves 5 steps at least, which
-   fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
+   takes as long as several steps, the more the more cage vertices there are.  So H is computed where
+   the first call begins, if it takes no longer than all its steps, and again if steps at the present
+   rate would not converge in that time, and if no share of a step lowers the objective.  An H of the
+   same call serves 5 steps at least, which fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
    rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
    lowers the objective, the paper's H takes its place.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  Targets change q by
@@ -80,7 +80,7 @@ from .volumes import Volumes, violations
 
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
-_COST = 4  # of computing H again, in steps
+_PER_STEP = 30  # cage vertices: for each so many, computing H takes as long as another step
 _SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
 _WINDOW = 5  # steps that Anderson acceleration remembers, those of earlier calls included
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
@@ -140,8 +140,10 @@ class _Iterate:
 class _State:
     """The running state of an iteration, from which a later call continues."""
 
-    factor: Factor  # of H
-    age: int = 1  # of the factor, in steps; that of the start is of rest
+    factor: Factor  # of H; at first the paper's
+    cost: float  # of computing H, in steps
+    age: int = 1  # of the factor, in steps
+    has_begun: bool = False  # whether H has been computed
     is_new: bool = False  # whether the factor was computed in this call
     length: float = math.inf  # of the last step in this call
     left: int = 0  # steps, in this call
@@ -158,10 +160,11 @@ class _State:
             self.length = math.inf
 
     def is_slow(self, step: Step) -> bool:
-        """Tell whether *step* and the next ones would not converge while a new H pays."""
-        rate, steps = min(step.length / self.length, 1.0), min(self.left, _COST)
-        least = _WINDOW if self.is_new else _SETTLED
-        return self.age >= least and step.length * rate**steps > self.tolerance
+        """Tell whether *step* and the next ones would not converge while a new H is computed."""
+        if not self.has_begun and self.cost <= self.left:
+            return step.length > self.tolerance
+        rate, least = min(step.length / self.length, 1.0), _WINDOW if self.is_new else _SETTLED
+        return self.age >= least and step.length * rate**self.cost > self.tolerance
 
     def took(self, step: Step) -> None:
         """Count a step."""
@@ -208,7 +211,8 @@ class GaussNewton:
             raise CageError(
                 "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
-        self._factor, self._state = factor, _State(factor)
+        self._factor = factor
+        self._state = self._unbegun()
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_term"}
@@ -222,8 +226,11 @@ class GaussNewton:
     def fresh(self) -> GaussNewton:
         """Return a solver of the same problem that has not begun."""
         other = copy.copy(self)
-        other._state, other._last, other._way = _State(self._factor), None, Way()
+        other._state, other._last, other._way = self._unbegun(), None, Way()
         return other
+
+    def _unbegun(self) -> _State:
+        return _State(self._factor, len(self._hessian) / _PER_STEP)
 
     def preserve(self, volumes: Volumes) -> None:
         """Preserve other *volumes* from now on."""
@@ -421,7 +428,8 @@ class GaussNewton:
         state = self._state
         if not state.is_new:  # another H of the same call differs little
             state.acceleration.forget()  # the differences are of steps with the last H
-        state.factor, state.age, state.is_new = self._factor_at(here), 0, True
+        state.factor, state.age = self._factor_at(here), 0
+        state.has_begun = state.is_new = True
         state.has_terms = here.is_active
 
     def _factor_at(self, here: _Iterate) -> Factor:
