@@ -30,12 +30,13 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    and rotations follow one step behind: where much turns, hundreds of steps are needed, and a small
    step does not mean that the minimum is near.  With the derivatives of the rotations and of the
    volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
-   takes as long as several steps, the more the more cage vertices there are.  So H is computed where
-   the first call begins, if it takes no longer than all its steps, and again if steps at the present
-   rate would not converge in that time, and if no share of a step lowers the objective.  An H of the
-   same call serves 5 steps at least, which fill the window of Anderson acceleration.  If it is not convex, it contains a share of the
-   rotations' derivatives only, and h is shorter.  If it is almost singular, so that no share of h
-   lowers the objective, the paper's H takes its place.
+   takes as long as several steps, the more, the more cage vertices there are.  So it is computed
+   where the first call begins, if that takes no longer than all its steps; and again if steps at
+   the present rate would not converge in that time, and if no share of a step lowers the objective.
+   An H of the same call serves 5 steps at least, which fill the window of Anderson acceleration.
+   If it is not convex, it contains a share of the rotations' derivatives only, and h is shorter.
+   If it is almost singular, so that no share of h lowers the objective, the paper's H takes its
+   place.
 3. *Anderson acceleration* (`anderson`) of (21) as a fixed-point map p -> q(p).  Targets change q by
    a constant, so it remembers the steps of earlier frames, until H changes.  This saves a quarter
    of the steps of drags and pulls.
