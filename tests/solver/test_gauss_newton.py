@@ -13,7 +13,9 @@ from vtk_segdeform.errors import ArgumentError
 from vtk_segdeform.solver.extrapolation import Way
 from vtk_segdeform.solver.gauss_newton import GaussNewton, SolverOptions, _State
 from vtk_segdeform.solver.newton import Step
+from vtk_segdeform.solver.other_measures import area_of
 from vtk_segdeform.solver.solution import Status
+from vtk_segdeform.solver.volumes import Together
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(2, is_coarse=True)  # 258 vertices in two overlapping cages
@@ -113,6 +115,23 @@ def test_the_directions_of_the_volume_do_not_depend_on_the_way_to_a_pose():
         ends.append(deformer._path.solver._way.ends[-1])
     (first,), (second,) = (end.directions for end in ends)
     assert np.linalg.norm(first - second) < 1e-4 * np.linalg.norm(first)
+
+
+def test_cages_land_on_other_volumes_unless_that_leads_nowhere():
+    deformer = SCENE.held()
+    solver, p = deformer._path.solver.copy(), deformer._path.p
+    volumes, (volume,) = solver.volumes, solver.volumes.constraints
+    area = area_of(volumes.surface.map(p), volume.faces)
+
+    def landed(*goals):
+        solver.preserve(replace(volumes, constraints=Together(goals)))
+        return solver.landed(p)
+
+    for share in (1.2, 0.7):
+        goal = replace(volume, target=share * volume.target)
+        assert abs(goal.relative(volumes.surface.map(landed(goal)))) < 1e-13
+    assert landed(volume, replace(area, target=0.3 * area.target)) is p  # less than of a ball
+    assert landed() is p
 
 
 def test_at_the_end_the_slope_is_a_multiple_of_the_volume_gradient():

@@ -44,6 +44,7 @@ def test_known_solids():
     assert centroid(0, moved).target - centroid(0, box).target == pytest.approx(4.0)
 
 
+@pytest.mark.usefixtures("either")
 @pytest.mark.parametrize("mesh", [BODY, open_box()], ids=["closed", "under a lid"])
 def test_gradients_are_derivatives_to_second_order(mesh, rng):
     x = mesh.vertices + 0.1 * rng.normal(size=mesh.vertices.shape)
