@@ -23,6 +23,7 @@ from vtk_segdeform.solver import (
     violations,
     with_same_points,
 )
+from vtk_segdeform.solver.volumes import values_along
 from vtk_segdeform.subspace import Subspace
 
 BODY = Mesh(icosphere(2)[0] * [2.0, 1.0, 1.3], icosphere(2)[1])
@@ -57,6 +58,9 @@ def test_gradients_are_derivatives_to_second_order(mesh, rng):
         for t in (1e-3, 1e-4)
     ]
     assert_allclose(np.log10(off[0] / off[1]), 2.0, atol=0.1)
+    values, along = values_along(every, np.hstack([x, d, -2.0 * d]))
+    assert_allclose(values, violations(every, x), atol=1e-13)
+    assert_allclose(along, np.outer(slopes, [1.0, -2.0]), atol=1e-12)
     alone = [each.gradient(x) for each in some]
     assert_allclose(gradients(every, x), alone, atol=1e-13)
 

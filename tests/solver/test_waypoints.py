@@ -103,9 +103,10 @@ def test_a_screw_motion_turns_and_slides_evenly(s):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_half_a_turn_is_about_the_axis_toward_the_farthest_point_of_the_handle(side):
+@pytest.mark.parametrize("up", [0.0, 2.0])
+def test_half_a_turn_is_about_the_axis_toward_the_farthest_point_of_the_handle(side, up):
     arms = np.array([[0.0, 0.1, 0.3], [0.1, -0.1, -0.1], [-0.1, 0.0, -0.1], [0.1, 0.1, -0.1]])
-    start = arms * [1.0, 1.0, side] + [0.4, 0.0, 0.0]
+    start = arms * [1.0, 1.0, side] + [0.4, 0.0, up]
     end = start @ rotation([0.0, 0.0, 1.0], np.pi).T
     way = waypoints(start, end, [np.arange(4)])
     turn = rotation([0.0, 0.0, side], np.pi / len(way))
