@@ -237,21 +237,42 @@ def either(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
         monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
-@pytest.fixture(scope="module")
-def bound_once() -> Iterator[None]:
-    """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
+def _binding_of(bind: Any, inputs: Any, folder: Any, progress: Any) -> Any:
     from vtk_segdeform import sizes
+
+    key = inputs.digest(), *(size for size in vars(sizes).values() if isinstance(size, int | float))
+    if key not in _bindings:
+        if len(_bindings) > 100:
+            _bindings.clear()
+        _bindings[key] = bind(inputs, folder, progress)
+    return _bindings[key]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _bound_once_in_memory() -> Iterator[None]:
+    """Bind equal meshes, regions and cages once, unless in a folder or with reports of progress."""
     from vtk_segdeform.deformer import problem
 
     bind = problem.cached_binding
 
     def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
-        key = inputs.digest(), *(size for size in vars(sizes).values() if isinstance(size, int))
-        if key not in _bindings:
-            if len(_bindings) > 100:
-                _bindings.clear()
-            _bindings[key] = bind(inputs, folder, progress)
-        return _bindings[key]
+        known = folder is None and progress is None
+        return _binding_of(bind, inputs, None, None) if known else bind(inputs, folder, progress)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(problem, "cached_binding", bound)
+        yield
+
+
+@pytest.fixture(scope="module")
+def bound_once() -> Iterator[None]:
+    """Bind equal inputs once, whatever the folder: for tests of poses, not of binding."""
+    from vtk_segdeform.deformer import problem
+
+    bind = problem.cached_binding
+
+    def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
+        return _binding_of(bind, inputs, folder, progress)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(problem, "cached_binding", bound)
