@@ -607,19 +607,6 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     assert len(seen.session.fixed) == int(rows(seen.panel.controls["handles.list"])[0][1]) > 0
 
 
-def test_poses_of_another_session_are_copied_from_the_panel(seen, tmp_path, monkeypatch):
-    other = Session(seen.session.mesh, state=seen.session.state)
-    other.saved_poses.save("wave")
-    save_session(tmp_path / "other.segdeform", other)
-    answer(monkeypatch, tmp_path / "other.segdeform")
-    seen.mode(Mode.DEFORM)
-    seen.settle()
-    seen.click(seen.panel.controls["poses.copy"])
-    seen.settle()
-    assert list(seen.session.saved_poses) == ["wave"]
-    assert "Copied 1 pose" in seen.panel.status.words.text()
-
-
 def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeypatch):
     path = tmp_path / "ball.ply"
     from vtk_segdeform.io.convert import write_mesh
