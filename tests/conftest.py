@@ -155,7 +155,7 @@ def _coordinates_once() -> Iterator[None]:
             inputs.update(np.ascontiguousarray(array))
         key = inputs.digest(), len(points), sizes.COMPILED, dispatch._kernels
         if key not in known:
-            if len(known) > 2_000:  # 100 megabytes, or a few hundred
+            if sum(each.nbytes for each in known.values()) > 100e6:
                 known.clear()
             known[key] = compute(points, vertices, faces)
         return known[key].copy()
@@ -248,8 +248,8 @@ def _binding_of(bind: Any, inputs: Any, folder: Any, progress: Any) -> Any:
     return _bindings[key]
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _bound_once_in_memory() -> Iterator[None]:
+@pytest.fixture(scope="module", autouse=True)
+def bound_once_in_memory() -> Iterator[None]:
     """Bind equal meshes, regions and cages once, unless in a folder or with reports of progress."""
     from vtk_segdeform.deformer import problem
 
@@ -265,7 +265,7 @@ def _bound_once_in_memory() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def bound_once() -> Iterator[None]:
+def bound_once(bound_once_in_memory: None) -> Iterator[None]:
     """Bind equal inputs once, whatever the folder: for tests of poses, not of binding."""
     from vtk_segdeform.deformer import problem
 

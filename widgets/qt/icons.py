@@ -53,7 +53,7 @@ def icon(name: str, palette: Any) -> Any:
 
 @functools.lru_cache(maxsize=128)  # those of a toolbar take 40 ms, and some palettes 2 MB
 def _pictures(name: str, colour: str) -> list[Any]:
-    """Return the icon in one colour, for each pixel ratio: images, which outlive the application."""
+    """Return the icon in one colour for each pixel ratio, as images: they outlive Qt."""
     drawing, pictures = QtSvg.QSvgRenderer(_svg(name, colour).encode()), []
     for ratio in _RATIOS:
         size = round(SIZE * ratio)

@@ -28,7 +28,7 @@ from qtpy import QtGui
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session, models
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.editor import keys_of
 from vtk_segdeform.widgets.panel.panel import all_sections
