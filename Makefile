@@ -41,9 +41,7 @@ bench: $(VENV)/installed
 
 # On two cores three workers take a tenth less time than two: some tests wait for other processes.
 # Workers keep the tests of a file together, so that its fixtures are created once, and take over
-# tests of others when they have finished.  Without bytecode files, every worker and every child
-# process would compile all modules again.
-test test-lowest test-newest: export PYTHONDONTWRITEBYTECODE :=
+# tests of others when they have finished.
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n 3 --dist worksteal
 

@@ -21,6 +21,10 @@ os.environ.setdefault("LP_NUM_THREADS", "0")  # additional rendering threads of 
 os.environ["PYVISTA_OFF_SCREEN"] = "true"
 os.environ["SEGDEFORM_CACHE"] = "0"  # no files in the user's folders
 os.environ.setdefault("SEGDEFORM_THREADS", "1")
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # Without bytecode files, every worker and every child process would compile all modules again.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
 if sys.platform == "linux" and not os.environ.get("DISPLAY"):
     # Without a display VTK warns once per window that it cannot connect to X; EGL needs none.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
@@ -34,6 +38,7 @@ _WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
 _WORKERS = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
 _PROGRAMS = {"app", "qt", "web"}
 _parts: dict[bytes, Any] = {}  # of coarse surfaces
+_bindings: dict[Any, Any] = {}  # by the digests of their inputs, and the sizes in force
 
 
 class _Backwards(pytest.Dir):
@@ -131,6 +136,36 @@ def fitted_once() -> Iterator[Any]:
         yield fitting
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _coordinates_once() -> Iterator[None]:
+    """Compute equal mean value coordinates of bindings once, unless with reports of progress."""
+    from vtk_segdeform import sizes
+    from vtk_segdeform.energy import interior
+    from vtk_segdeform.kernels import dispatch
+    from vtk_segdeform.subspace import subspace
+
+    compute = subspace.mean_value_coordinates
+    known: dict[Any, np.ndarray] = {}
+
+    def coordinates(points: Any, vertices: Any, faces: Any, *, progress: Any = None) -> Any:
+        if progress is not None or len(points) * len(vertices) > 250_000:
+            return compute(points, vertices, faces, progress=progress)
+        inputs = hashlib.blake2b()
+        for array in (points, vertices, faces):
+            inputs.update(np.ascontiguousarray(array))
+        key = inputs.digest(), len(points), sizes.COMPILED, dispatch._kernels
+        if key not in known:
+            if sum(each.nbytes for each in known.values()) > 100e6:
+                known.clear()
+            known[key] = compute(points, vertices, faces)
+        return known[key].copy()
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (subspace, interior):
+            patch.setattr(module, "mean_value_coordinates", coordinates)
+        yield
+
+
 @pytest.fixture(scope="module", autouse=True)
 def segmented_once() -> Iterator[None]:
     """Find the parts of equal coarse surfaces once per process, unless with reports of progress."""
@@ -202,19 +237,42 @@ def either(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
         monkeypatch.setattr(dispatch, "_kernels", lambda: None)
 
 
-@pytest.fixture(scope="module")
-def bound_once() -> Iterator[None]:
-    """Bind equal meshes, regions and cages once: for tests of poses, not of binding."""
+def _binding_of(bind: Any, inputs: Any, folder: Any, progress: Any) -> Any:
+    from vtk_segdeform import sizes
+
+    key = inputs.digest(), *(size for size in vars(sizes).values() if isinstance(size, int | float))
+    if key not in _bindings:
+        if len(_bindings) > 100:
+            _bindings.clear()
+        _bindings[key] = bind(inputs, folder, progress)
+    return _bindings[key]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bound_once_in_memory() -> Iterator[None]:
+    """Bind equal meshes, regions and cages once, unless in a folder or with reports of progress."""
     from vtk_segdeform.deformer import problem
 
-    known: dict[str, Any] = {}
     bind = problem.cached_binding
 
     def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
-        key = inputs.digest()
-        if key not in known:
-            known[key] = bind(inputs, folder, progress)
-        return known[key]
+        known = folder is None and progress is None
+        return _binding_of(bind, inputs, None, None) if known else bind(inputs, folder, progress)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(problem, "cached_binding", bound)
+        yield
+
+
+@pytest.fixture(scope="module")
+def bound_once(bound_once_in_memory: None) -> Iterator[None]:
+    """Bind equal inputs once, whatever the folder: for tests of poses, not of binding."""
+    from vtk_segdeform.deformer import problem
+
+    bind = problem.cached_binding
+
+    def bound(inputs: Any, folder: Any, progress: Any = None) -> Any:
+        return _binding_of(bind, inputs, folder, progress)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(problem, "cached_binding", bound)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import runpy
 import sys
 
@@ -181,6 +182,23 @@ def test_cages_are_written_as_one_coloured_surface_of_closed_cages(bar_file, tmp
     assert written.n_points == 60
     assert convert.from_polydata(written).components.max() == 1
     assert len(np.unique(written.point_data["RGB"], axis=0)) == 2
+
+
+def test_without_a_display_egl_draws_unless_another_window_is_chosen(monkeypatch):
+    name, asked = "VTK_DEFAULT_OPENGL_WINDOW", []
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.setitem(main.__globals__, "find_library", lambda _: asked.append(1) or "libEGL.so")
+    for display, chosen, expected in (
+        ("", "", "vtkEGLRenderWindow"), ("", "vtkOSOpenGLRenderWindow", "vtkOSOpenGLRenderWindow"),
+        (":0", "", None),
+    ):  # fmt: skip
+        monkeypatch.setenv("DISPLAY", display)
+        monkeypatch.setenv(name, chosen)
+        if not chosen:
+            monkeypatch.delenv(name)
+        assert main(["check", "missing.ply"]) == 1
+        assert os.environ.get(name) == expected
+    assert asked == [1]  # it starts a process
 
 
 def test_the_demo_leaves_meshes_whose_volume_is_the_same(tmp_path, capsys):

@@ -29,7 +29,6 @@ from vtk_segdeform.errors import SegDeformError
 from vtk_segdeform.session.session import Session
 from vtk_segdeform.session.state import Locality, Pose, State
 
-pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 SECONDS = 30.0  # limit for one call
 GIGABYTES = 4  # in addition to the memory in use
 SETTERS = {"DeformEditor.path"}  # of paths

@@ -14,7 +14,6 @@ from vtk_segdeform import models
 from vtk_segdeform.errors import MissingDependencyError
 from vtk_segdeform.pictures.canvas import require_offscreen
 
-pytestmark = pytest.mark.usefixtures("bound_once_in_memory")
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 RIGHT = {
     "an_arm_in_a_sleeve": lambda names: (

@@ -163,8 +163,11 @@ class _Warnings(logging.Handler):
 
 def _render_without_display() -> None:
     """Select EGL where there is no X server; VTK would otherwise warn at every picture."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY") and find_library("EGL"):
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    if sys.platform != "linux" or os.environ.get("DISPLAY"):
+        return
+    name = "VTK_DEFAULT_OPENGL_WINDOW"
+    if name not in os.environ and find_library("EGL"):  # which starts a process
+        os.environ[name] = "vtkEGLRenderWindow"
 
 
 def _printable(line: str) -> str:

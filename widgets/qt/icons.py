@@ -5,6 +5,7 @@ Each icon contains pictures for several pixel ratios, in the colours of the pale
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 from qtpy import QtCore, QtGui, QtSvg
@@ -45,16 +46,25 @@ def icon(name: str, palette: Any) -> Any:
         (groups.Disabled, roles.ButtonText, modes.Disabled, states.Off),
         (groups.Disabled, roles.ButtonText, modes.Disabled, states.On),
     ):
-        drawing = QtSvg.QSvgRenderer(_svg(name, palette.color(group, role).name()).encode())
-        for ratio in _RATIOS:
-            picture = QtGui.QPixmap(round(SIZE * ratio), round(SIZE * ratio))
-            picture.setDevicePixelRatio(ratio)
-            picture.fill(QtCore.Qt.GlobalColor.transparent)
-            painter = QtGui.QPainter(picture)
-            drawing.render(painter, QtCore.QRectF(0.0, 0.0, SIZE, SIZE))
-            painter.end()
-            made.addPixmap(picture, mode, state)
+        for picture in _pictures(name, palette.color(group, role).name()):
+            made.addPixmap(QtGui.QPixmap.fromImage(picture), mode, state)
     return made
+
+
+@functools.lru_cache(maxsize=128)  # those of a toolbar take 40 ms, and some palettes 2 MB
+def _pictures(name: str, colour: str) -> list[Any]:
+    """Return the icon in one colour for each pixel ratio, as images: they outlive Qt."""
+    drawing, pictures = QtSvg.QSvgRenderer(_svg(name, colour).encode()), []
+    for ratio in _RATIOS:
+        size = round(SIZE * ratio)
+        picture = QtGui.QImage(size, size, QtGui.QImage.Format.Format_ARGB32_Premultiplied)
+        picture.setDevicePixelRatio(ratio)
+        picture.fill(QtCore.Qt.GlobalColor.transparent)
+        painter = QtGui.QPainter(picture)
+        drawing.render(painter, QtCore.QRectF(0.0, 0.0, SIZE, SIZE))
+        painter.end()
+        pictures.append(picture)
+    return pictures
 
 
 def _svg(name: str, colour: str) -> str:

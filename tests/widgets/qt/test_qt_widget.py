@@ -28,7 +28,7 @@ from qtpy import QtGui
 import pyvistaqt  # isort: skip
 from vtk_segdeform import Session, models
 from vtk_segdeform.errors import SegDeformError
-from vtk_segdeform.session.store import load_session, save_session
+from vtk_segdeform.session.store import load_session
 from vtk_segdeform.widgets import Mode, Paint, Tool
 from vtk_segdeform.widgets.editor import keys_of
 from vtk_segdeform.widgets.panel.panel import all_sections
@@ -605,19 +605,6 @@ def test_a_session_is_saved_and_opened_again(seen, tmp_path, monkeypatch):
     seen.session.handles.remove("handle 1")
     seen.mode(Mode.HANDLES)
     assert len(seen.session.fixed) == int(rows(seen.panel.controls["handles.list"])[0][1]) > 0
-
-
-def test_poses_of_another_session_are_copied_from_the_panel(seen, tmp_path, monkeypatch):
-    other = Session(seen.session.mesh, state=seen.session.state)
-    other.saved_poses.save("wave")
-    save_session(tmp_path / "other.segdeform", other)
-    answer(monkeypatch, tmp_path / "other.segdeform")
-    seen.mode(Mode.DEFORM)
-    seen.settle()
-    seen.click(seen.panel.controls["poses.copy"])
-    seen.settle()
-    assert list(seen.session.saved_poses) == ["wave"]
-    assert "Copied 1 pose" in seen.panel.status.words.text()
 
 
 def test_unsaved_changes_are_discarded_only_if_confirmed(seen, tmp_path, monkeypatch):
