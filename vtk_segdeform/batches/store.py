@@ -27,6 +27,7 @@ from ..errors import ArgumentError
 from ..files import replacing
 from ..importing import imported
 from ..mesh import Mesh
+from .remote import RemoteFolder, is_url
 from .tasks import FAILED, SET_ASIDE, TOO_LONG, Row, deformer_of, rigid_deformer_of, unpacked
 
 NAME = "poses.segposes"
@@ -49,8 +50,8 @@ class PoseStore(Described):
 
     Parameters
     ----------
-    path : path
-        The output folder of `batch`, or the file in it.
+    path : path or URL
+        The output folder of `batch`, or the file in it.  That of a URL is copied to this machine.
 
     Raises
     ------
@@ -59,13 +60,19 @@ class PoseStore(Described):
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        place = as_path(path)
+        self._copy = RemoteFolder(path, NAME) if isinstance(path, str) and is_url(path) else None
+        place = as_path(path) if self._copy is None else self._copy.path
         self.path = place / NAME if os.path.isdir(place) else place
         if not os.path.isfile(self.path):
-            raise ArgumentError(f"path must have poses of a batch; there is no file {self.path}")
+            where = self.path if self._copy is None else path
+            raise ArgumentError(f"path must have poses of a batch; there is no file {where}")
         with self._open() as database:
             count = database.execute("SELECT count(*) FROM plan").fetchone()[0]
         self._count = int(count)
+
+    def keep(self, copy: RemoteFolder) -> None:
+        """Keep the folder of this machine that the poses are in for as long as this object."""
+        self._copy = copy
 
     def __len__(self) -> int:
         return self._count
@@ -223,6 +230,16 @@ class Writer:
         """Forget the numbers of an earlier, longer plan, and leave a single file."""
         self._execute("DELETE FROM plan WHERE number >= ?", [count])
         self._execute("PRAGMA journal_mode=DELETE")
+
+    def copy(self, path: Path) -> None:
+        """Write what is there now to another file."""
+        with faults_named(path):
+            path.unlink(missing_ok=True)
+            other = sqlite3.connect(path)
+            try:
+                self._database.backup(other)
+            finally:
+                other.close()
 
     def close(self) -> None:
         """Close the file."""
