@@ -68,6 +68,9 @@ class RemoteFolder:
                 if system.exists(path):
                     system.get_file(path, str(self.path / name))
 
+    def __fspath__(self) -> str:
+        return str(self.path)
+
     def send(self, name: str, file: Path | None = None) -> None:
         """Copy a *file*, by default that of this name in this folder, to the URL as *name*."""
         with _named(self.url):

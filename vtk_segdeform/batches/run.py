@@ -151,11 +151,10 @@ def batch(
         store.close()
         if remote is not None:
             remote.send(NAME)
-    result = PoseStore(folder)
+    result = PoseStore(folder if remote is None else remote)
     table = result.write_table()
     if remote is not None:
         remote.send(table.name)
-        result.keep(remote)
     return result
 
 

@@ -60,19 +60,16 @@ class PoseStore(Described):
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self._copy = RemoteFolder(path, NAME) if isinstance(path, str) and is_url(path) else None
-        place = as_path(path) if self._copy is None else self._copy.path
+        # A copy is deleted with its last owner.
+        self._given = RemoteFolder(path, NAME) if isinstance(path, str) and is_url(path) else path
+        place = as_path(self._given)
         self.path = place / NAME if os.path.isdir(place) else place
         if not os.path.isfile(self.path):
-            where = self.path if self._copy is None else path
+            where = path if isinstance(self._given, RemoteFolder) else self.path
             raise ArgumentError(f"path must have poses of a batch; there is no file {where}")
         with self._open() as database:
             count = database.execute("SELECT count(*) FROM plan").fetchone()[0]
         self._count = int(count)
-
-    def keep(self, copy: RemoteFolder) -> None:
-        """Keep the folder of this machine that the poses are in for as long as this object."""
-        self._copy = copy
 
     def __len__(self) -> int:
         return self._count
