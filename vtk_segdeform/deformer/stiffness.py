@@ -95,7 +95,8 @@ class FactorSlopes:
         """Return the slopes at *stiffness* (n,)."""
         mates = np.arange(len(stiffness)) if mirror is None else mirror.mates
         values, other = np.maximum(stiffness, stiffness[mates]), stiffness[mates]
-        shares = 0.5 * (1.0 + (stiffness > other) - (stiffness < other))
+        more, less = stiffness > other, stiffness < other
+        shares = np.where(more, 1.0, np.where(less, 0.0, 0.5))
         is_soft = np.isfinite(values) & (values > 0.0)
         of_median, median = np.zeros(len(values)), _median_of(values[is_soft])
         if is_soft.any():
