@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -23,6 +24,25 @@ VALIDATE = """
 const read = require("fs").readFileSync;
 require("gltf-validator").validateBytes(new Uint8Array(read(process.argv[1])))
   .then((found) => console.log(JSON.stringify(found.issues)));
+"""
+
+# Prints the evaluated vertices, in glTF's axes, of the only mesh of a file at some seconds.
+BLENDER = """
+import json, os, sys
+import bpy
+bpy.ops.wm.read_factory_settings(use_empty=True)
+bpy.ops.import_scene.gltf(filepath=sys.argv[1])
+(shown,) = (each for each in bpy.data.objects if each.type == "MESH")
+scene, found = bpy.context.scene, []
+for seconds in map(float, sys.argv[2:]):
+    frame = seconds * scene.render.fps / scene.render.fps_base
+    scene.frame_set(int(frame), subframe=frame % 1.0)
+    graph = bpy.context.evaluated_depsgraph_get()
+    own = shown.evaluated_get(graph)
+    mesh, place = own.to_mesh(), own.matrix_world.copy()
+    found.append([[x, z, -y] for x, y, z in (place @ vertex.co for vertex in mesh.vertices)])
+print("found", json.dumps(found), flush=True)
+os._exit(0)  # bpy 4.2 crashes when Python ends
 """
 
 
@@ -177,3 +197,27 @@ def test_the_validator_of_khronos_finds_no_fault(tmp_path):
         issues = json.loads(done.stdout)
         assert not issues["numErrors"], issues
         assert not issues["numWarnings"], issues
+
+
+@pytest.mark.campaign
+def test_blender_shows_the_poses(tmp_path):
+    """In a Python with bpy, that of SEGDEFORM_BPY or this one; bpy is under the GPL."""
+    python = shutil.which(os.environ.get("SEGDEFORM_BPY", sys.executable))
+    probe = [python or "", "-c", "import bpy"]
+    if python is None or subprocess.run(probe, capture_output=True, check=False).returncode:
+        pytest.skip("needs bpy")
+    mesh, path = ellipsoid(), tmp_path / "turn.glb"
+    poses = [turned(mesh, angle) for angle in (15.0, 30.0, 45.0)]
+    sd.write_motion(path, mesh, poses, seconds=[1.0, 2.0, 3.0])
+    sd.write_motion(path.with_suffix(".gltf"), mesh, poses, seconds=[1.0, 2.0, 3.0])
+    moments = [0.0, 1.0, 1.5, 2.0, 3.0]
+    done = subprocess.run(
+        [python, "-c", BLENDER, str(path), *map(str, moments)],
+        capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    (line,) = (each for each in done.stdout.splitlines() if each.startswith("found"))
+    shown = json.loads(line.removeprefix("found"))
+    for seconds, vertices in zip(moments, shown, strict=True):
+        expected = blended(path.with_suffix(".gltf"), seconds)
+        assert_allclose(vertices, expected, atol=1e-5 * mesh.diagonal)
+    assert_allclose(shown[-1], poses[-1], atol=2e-3 * mesh.diagonal)

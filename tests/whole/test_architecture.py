@@ -63,6 +63,7 @@ GRANTED = {
     "landmarks.followers": {"pyvista"},
     "inside": {"pyvista"},
     "any_mesh": {"pyvista"},
+    "batches.remote": {"fsspec"},
     "batches.store": {"pyarrow"},
     "session.output": {"pyvista"},
     "session.session": {"pyvista"},

@@ -52,7 +52,7 @@ def imported() -> set[str]:
 
 def test_every_library_imported_is_declared(setup_cfg):
     declared = names_in(setup_cfg["options"]["install_requires"])
-    for extra in ("meshlab", "qt", "web", "jupyter", "bench", "dask"):
+    for extra in ("meshlab", "qt", "web", "jupyter", "bench", "dask", "remote"):
         declared |= names_in(setup_cfg["options.extras_require"][extra])
     used = imported()
     assert {"numba", "qtpy"} <= used  # the sources of all folders are read

@@ -2,6 +2,7 @@
 
 The files, in reading order:
 
+    remote         files elsewhere, by their URLs
     plan           meshes and poses, checked and resolved to vertices
     random_poses   `random_poses`: limbs bent at random
     tasks          what a worker computes: a block of poses of one mesh
@@ -11,8 +12,9 @@ The files, in reading order:
 
 from .plan import Plan
 from .random_poses import RandomPoses, random_poses
+from .remote import is_url
 from .run import batch
 from .store import PoseStore
 from .tasks import Row
 
-__all__ = ["Plan", "PoseStore", "RandomPoses", "Row", "batch", "random_poses"]
+__all__ = ["Plan", "PoseStore", "RandomPoses", "Row", "batch", "is_url", "random_poses"]

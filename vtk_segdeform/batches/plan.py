@@ -18,6 +18,7 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,6 +34,8 @@ from ..geometry import moved_handles
 from ..importing import imported
 from ..mesh import Mesh, Role, parse_selection
 from ..version import __version__
+from .remote import copied, is_url, read_json
+from .remote import found as found_at
 
 _SHAPE = {"volumes", "stiffness", "slides", "symmetry"}
 _KEYS = {
@@ -72,8 +75,10 @@ class Plan:
     @classmethod
     def of(cls, plan: Mapping[str, Any] | str | os.PathLike[str]) -> Plan:
         """Return the checked plan of a mapping or of a JSON file; see `batch`."""
-        folder = Path()
-        if not isinstance(plan, Mapping):
+        folder: Path | str = Path()
+        if is_url(plan):
+            folder, plan = str(plan).rpartition("/")[0], _checked(read_json(str(plan)), str(plan))
+        elif not isinstance(plan, Mapping):
             path = as_path(plan, "plan")
             folder, plan = path.parent, _read(path)
         known = {"meshes", "poses", "block", *Settings._fields} - {"goals"}
@@ -120,7 +125,8 @@ class Given:
         imported("vtk_segdeform.io")  # imports pyvista
         from ..io import surface_of
 
-        self._surface = surface_of(given)
+        with copied(given) if is_url(given) else nullcontext(given) as near:
+            self._surface = surface_of(near)
         self.mesh = self._surface.mesh
 
     def resolved(self, pose: Mapping[str, Any]) -> dict[str, Any]:
@@ -220,15 +226,27 @@ def _read(path: Path) -> Mapping[str, Any]:
         found = json.loads(read_regular(path))
     except ValueError as fault:  # no JSON, or no text
         raise ArgumentError(f"plan {path} is no JSON: {fault}") from None
+    return _checked(found, path)
+
+
+def _checked(found: Any, path: Path | str) -> Mapping[str, Any]:
     if not isinstance(found, dict):
         raise ArgumentError(f"plan {path} must have meshes and poses; got {shown(found)}")
     return found
 
 
-def _expanded(given: Any, folder: Path) -> list[Any]:
-    """Return the files that a path or a pattern names, sorted; anything else as it is."""
+def _expanded(given: Any, folder: Path | str) -> list[Any]:
+    """Return the files that a path, a URL or a pattern names, sorted; anything else as it is.
+
+    Names in a plan that is elsewhere are relative to its *folder*.
+    """
     if not isinstance(given, str | os.PathLike):
         return [given]
+    if is_url(given) or isinstance(folder, str):
+        url = str(given) if is_url(given) else f"{folder}/{os.fspath(given)}"
+        if urls := found_at(url):
+            return urls
+        raise ArgumentError(f"plan['meshes'] must name files; there is none called {url}")
     path = folder / as_path(given, "plan['meshes']")
     if path.exists():
         return [path]

@@ -36,7 +36,8 @@ from ..interpreter import spawning
 from ..kernels import n_threads, wait_until_compiled
 from ..progress import Progress, tell
 from .plan import Given, Plan, Settings, digest
-from .store import PoseStore, Writer
+from .remote import RemoteFolder, is_url
+from .store import NAME, PoseStore, Writer
 from .tasks import FAILED, SET_ASIDE, Row, begin, compute, compute_alone, packed, ready
 
 _MOST_TRIES, _MOST_WORKERS = 2, 100_000
@@ -76,8 +77,9 @@ def batch(
 
     Parameters
     ----------
-    plan : mapping, or path of a JSON file
-        ``meshes``: paths, patterns such as ``limbs/*.ply``, or whatever ``sd.deform`` takes.
+    plan : mapping, or path or URL of a JSON file
+        ``meshes``: paths, URLs, patterns of these such as ``limbs/*.ply``, or whatever
+        ``sd.deform`` takes.
         ``poses``: each a mapping of one of these kinds:
 
         - ``fixed``, and ``handles``, each with a selection under ``select`` and ``rotate``,
@@ -95,8 +97,9 @@ def batch(
         Of all poses: ``refine`` (False: cages are stored; True: finished vertices),
         ``avoid_contact`` (False), ``n_regions``, ``n_cage_vertices`` (automatic); ``block``, poses
         of a task (10); ``seconds``, for a pose (120), and ``memory``, for a process, in GB (4).
-    output : path
-        A folder, which is created, for ``poses.segposes`` and a table.
+    output : path or URL
+        A folder, which is created, for ``poses.segposes`` and a table.  That of a URL is written in
+        a temporary folder, copied every minute and at the end, and continued from there.
     executor : concurrent.futures.Executor, optional
         Runs the tasks; by default processes of this machine, of one thread each.
     n_workers : int, optional
@@ -118,12 +121,14 @@ def batch(
     ArgumentError, ConstraintError
         If the *plan* is invalid, or another batch writes to *output*.
     MissingDependencyError
-        If no processes can be started.
+        If no processes can be started, or a URL is given without fsspec, or without the library
+        that it needs.
     Cancelled
         If *progress* raised it, or the *executor* has ended.
     """
     found = Plan.of(plan)
-    folder = as_path(output, "output")
+    remote = RemoteFolder(output, NAME) if isinstance(output, str) and is_url(output) else None
+    folder = as_path(output, "output") if remote is None else remote.path
     if executor is not None:
         require(executor, Executor, "executor")
     if n_workers is not None and not is_whole(n_workers, 1, _MOST_WORKERS):
@@ -136,7 +141,7 @@ def batch(
     except OSError as fault:
         raise ArgumentError(f"output {folder} cannot be written: {fault.strerror}") from None
     try:
-        run = _Run(found, store, as_flag(retry, "retry"), progress)
+        run = _Run(found, store, as_flag(retry, "retry"), progress, remote)
         if executor is None:
             _run_here(run, count, found.settings)
         elif not run.on(lambda *task: executor.submit(compute, *task), _AHEAD * count):
@@ -144,8 +149,12 @@ def batch(
         store.end(len(found.meshes) * len(found.poses))
     finally:
         store.close()
-    result = PoseStore(folder)
-    result.write_table()
+        if remote is not None:
+            remote.send(NAME)
+    result = PoseStore(folder if remote is None else remote)
+    table = result.write_table()
+    if remote is not None:
+        remote.send(table.name)
     return result
 
 
@@ -176,7 +185,15 @@ def _run_here(run: _Run, count: int, settings: Settings) -> None:
 class _Run:
     """The tasks of one call of `batch`: waiting and under way; and how many poses are done."""
 
-    def __init__(self, plan: Plan, store: Writer, retry: bool, progress: Progress | None) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        store: Writer,
+        retry: bool,
+        progress: Progress | None,
+        remote: RemoteFolder | None,
+    ) -> None:
+        self._remote = remote
         self._plan, self._store, self._retry, self._progress = plan, store, retry, progress
         self._total = len(plan.meshes) * len(plan.poses)
         self._done = self._computed = self._missing = 0
@@ -267,6 +284,8 @@ class _Run:
         self._missing += sum(not row.data for row in rows.values())
 
     def _report(self) -> None:
+        if self._remote is not None:
+            self._remote.checkpoint(NAME, self._store.copy)
         left, text = self._total - self._done, f"{self._done:,} of {self._total:,} poses"
         if self._missing:
             text += f", {self._missing:,} failed"

@@ -27,6 +27,7 @@ from ..errors import ArgumentError
 from ..files import replacing
 from ..importing import imported
 from ..mesh import Mesh
+from .remote import RemoteFolder, is_url
 from .tasks import FAILED, SET_ASIDE, TOO_LONG, Row, deformer_of, rigid_deformer_of, unpacked
 
 NAME = "poses.segposes"
@@ -49,8 +50,8 @@ class PoseStore(Described):
 
     Parameters
     ----------
-    path : path
-        The output folder of `batch`, or the file in it.
+    path : path or URL
+        The output folder of `batch`, or the file in it.  That of a URL is copied to this machine.
 
     Raises
     ------
@@ -59,10 +60,13 @@ class PoseStore(Described):
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        place = as_path(path)
+        # A copy is deleted with its last owner.
+        self._given = RemoteFolder(path, NAME) if isinstance(path, str) and is_url(path) else path
+        place = as_path(self._given)
         self.path = place / NAME if os.path.isdir(place) else place
         if not os.path.isfile(self.path):
-            raise ArgumentError(f"path must have poses of a batch; there is no file {self.path}")
+            where = path if isinstance(self._given, RemoteFolder) else self.path
+            raise ArgumentError(f"path must have poses of a batch; there is no file {where}")
         with self._open() as database:
             count = database.execute("SELECT count(*) FROM plan").fetchone()[0]
         self._count = int(count)
@@ -223,6 +227,16 @@ class Writer:
         """Forget the numbers of an earlier, longer plan, and leave a single file."""
         self._execute("DELETE FROM plan WHERE number >= ?", [count])
         self._execute("PRAGMA journal_mode=DELETE")
+
+    def copy(self, path: Path) -> None:
+        """Write what is there now to another file."""
+        with faults_named(path):
+            path.unlink(missing_ok=True)
+            other = sqlite3.connect(path)
+            try:
+                self._database.backup(other)
+            finally:
+                other.close()
 
     def close(self) -> None:
         """Close the file."""

@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 
 from .. import io
-from ..batches import PoseStore
+from ..batches import PoseStore, is_url
 from ..batches import batch as computed
 from ..errors import MissingDependencyError
 from ..progress import Progress
@@ -36,7 +36,7 @@ def batch(options: Namespace, say: Say, progress: Progress) -> bool:
     if draws := [count for count in table["draws"] if count is not None]:
         share = 1.0 - len(draws) / sum(draws)
         say(f"refused         {share:.0%} of {sum(draws):,} drawn random poses")
-    say(f"written         {store.path}")
+    say(f"written         {options.output if is_url(options.output) else store.path}")
     return not lost
 
 

@@ -346,7 +346,10 @@ def _parser() -> argparse.ArgumentParser:
     _batch(add_command("batch", "compute many poses of many meshes"))
 
     sub = add_command("pose", "write one pose of a batch as a mesh")
-    _input_output(sub, "the mesh in this pose", required=True)
+    text = "output folder of batch, or its URL"
+    sub.add_argument("input", metavar="POSES", help=text)
+    text = "the mesh in this pose"
+    sub.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=text)
     text = "number of the pose, from 0, as in the table"
     sub.add_argument("number", type=_count, metavar="NUMBER", help=text)
 
@@ -356,8 +359,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def _batch(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("plan", type=Path, metavar="PLAN", help="JSON file with meshes and poses")
-    add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="output folder")
+    add("plan", metavar="PLAN", help="JSON file, or its URL, with meshes and poses")
+    add("-o", "--output", required=True, metavar="FOLDER", help="output folder, or its URL")
     text = "number of processes, or of the cluster's threads (default: all)"
     add("--workers", type=_count, default=None, metavar="N", help=text)
     text = "address of the scheduler of a Dask cluster, such as tcp://10.0.0.1:8786"

@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -22,10 +22,13 @@ from .. import sizes
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage
 from ..energy import (
+    Contraction,
     Energy,
     Interior,
+    InteriorSamples,
     grown_gradients,
     interior_weights,
+    sampled_operators,
     shape_energy,
     with_cage_stiffness,
     with_interior,
@@ -74,6 +77,11 @@ class BindingInputs:
     stretch: float
     n_clusters: int
     stiffness: Stiffness | None = None
+
+    @property
+    def factors(self) -> FloatArray | None:
+        """(n,): factors of the terms of each vertex, if they are not all 1."""
+        return None if self.stiffness is None else self.stiffness.factors
 
     @property
     def parts(self) -> IntArray:
@@ -173,6 +181,16 @@ class Binding:
         gradients = grown_gradients(self.energy, self.interior, p)
         return replace(self, energy=with_interior(energy, gradients, self.interior))
 
+    def by_factors(self, inputs: BindingInputs, contraction: Contraction) -> FloatArray:
+        """Return the gradient (n,) of *contraction* by the factors of *inputs*, at rest."""
+        rest, factors, subspace = inputs.rest, inputs.factors, self.energy.subspace
+        sampled = sampled_operators(rest, subspace, inputs.clusters, factors)
+        gradients = partial(_gradients, inputs, subspace, self.rigid)
+        n, inside = rest.n_vertices, _inside(inputs)
+        return contraction.of_surface(sampled, inputs.stretch, n) + contraction.of_interior(
+            inside, self.interior, gradients, stiffness=factors, n=n
+        )
+
 
 def _rigid_parts(inputs: BindingInputs, cages: Subspace) -> AffineParts | None:
     """Return the parts of *inputs* that are to be rigid; their collars are as wide as the cages.
@@ -215,8 +233,7 @@ def _surface_energy(
     progress: Progress | None = None,
 ) -> Energy:
     """Return the energy of the surface that keeps *shape*, with cages *p* (m, 3), and of these."""
-    stiff, clusters = inputs.stiffness, inputs.clusters
-    factors = None if stiff is None else stiff.factors
+    clusters, factors = inputs.clusters, inputs.factors
     energy = shape_energy(
         shape, subspace, inputs.stretch, clusters, stiffness=factors, progress=progress
     )
@@ -234,14 +251,24 @@ def _interior(
     inputs: BindingInputs, energy: Energy, rigid: AffineParts | None
 ) -> tuple[FloatArray, FloatArray]:
     """Return the gradients (k, 3, m) at points inside the bodies, and the volumes (k,) there."""
-    mesh, regions = inputs.rest, inputs.regions
+    interior = _inside(inputs).means(inputs.factors)
+    return _gradients(inputs, energy.subspace, rigid, interior), interior.volumes
+
+
+def _inside(inputs: BindingInputs) -> InteriorSamples:
+    regions = inputs.regions
+    return InteriorSamples.of(inputs.rest, regions.weights, lids_of(regions.mesh).encloses)
+
+
+def _gradients(
+    inputs: BindingInputs, subspace: Subspace, rigid: AffineParts | None, interior: Interior
+) -> FloatArray:
+    """Return the gradients (k, 3, m) of the map of the cages at the points of *interior*."""
     ends = np.cumsum([cage.n_vertices for cage in inputs.cages])[:-1]
     p = np.split(inputs.rest_cages, ends)
     cages = [Cage(x, cage.faces) for x, cage in zip(p, inputs.cages, strict=True)]
-    factors = None if inputs.stiffness is None else inputs.stiffness.factors
-    interior = Interior.of(mesh, regions.weights, lids_of(regions.mesh).encloses, factors)
-    gradients = interior.gradients(cages, energy.subspace)
-    if rigid is not None:
-        shares = blend_at(mesh.vertices, rigid.shares, interior.points)
-        gradients = rigid.blended_gradients(gradients, shares)
-    return gradients, interior.volumes
+    gradients = interior.gradients(cages, subspace)
+    if rigid is None:
+        return gradients
+    shares = blend_at(inputs.rest.vertices, rigid.shares, interior.points)
+    return rigid.blended_gradients(gradients, shares)

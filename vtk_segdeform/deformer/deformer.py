@@ -46,7 +46,6 @@ from ..checks import (
     as_path,
     as_text,
     require,
-    require_sequence,
     shown,
 )
 from ..errors import ArgumentError, ConstraintError
@@ -668,15 +667,16 @@ class Deformer:
         cotangent: ArrayLike,
         *,
         volumes: Sequence[str] = (),
-        stiffness: Sequence[ArrayLike] = (),
+        stiffness: bool = False,
     ) -> Gradient:
         """Return the gradient of a function of the vertices of *solution*; see `jvp`.
 
-        *cotangent* (n, 3) is its gradient by the vertices.  Returned are that by the targets, those
-        by the goals of *volumes* with these names, and those along k changes of the *stiffness*,
-        (n,) each, such as that of a region each.  Each change takes as long as the energy does.
+        *cotangent* (n, 3) is its gradient by the vertices.  Returned are that by the targets, that
+        by the goals of *volumes* with these names, and, with *stiffness*, that by the stiffness of
+        every vertex, (n,): 0 where the vertex is rigid, or a hundred times as stiff as the median
+        or more, or less than a hundredth.  There is none by the stiffness while volumes are set.
         """
-        require_sequence(stiffness, "stiffness")
+        require(stiffness, bool, "stiffness")
         return self._linearised(solution).gradient(
             as_points(cotangent, "cotangent", self.mesh.n_vertices),
             volumes=volumes,

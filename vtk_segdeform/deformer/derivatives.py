@@ -8,7 +8,8 @@ The cages p of a solve are a minimum (`solver.stationary`), and the mesh is x = 
 
 Each is differentiated as it is computed, the third up to the last scaling (below 3e-5).  Targets
 enter F linearly.  A volume, or the stiffness, changes the shape to keep, or the energy: the
-derivatives of F at the pose, which needs no further solve, are central differences.
+derivatives of F at the pose along it, which need no further solve, are central differences.  The
+gradient by the stiffness of every vertex is computed in reverse, `energy.by_stiffness`.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import FloatArray, is_number, plain
 from ..checks import all_of, shown
+from ..energy import Contraction, turning
 from ..errors import ArgumentError
 from ..solver import (
     CentroidConstraint,
@@ -41,7 +43,7 @@ from ..solver import (
 from .constraints import Constraints, HoldOptions
 from .enclosed_volume import EnclosedVolume
 from .path import Path
-from .stiffness import Stiffness
+from .stiffness import FactorSlopes, Stiffness
 from .volume_goals import VolumeGoal
 
 _STEP = 1e-5  # of a parameter, relative: differences of F, which is smooth, are exact to 1e-9
@@ -55,7 +57,7 @@ class Gradient(NamedTuple):
     volumes: Mapping[str, float]
     """By the goals of volumes that were asked for."""
     stiffness: FloatArray = np.empty(0)
-    """(k,), along the changes of the stiffness that were asked for."""
+    """(n,), by the stiffness of every vertex, if it was asked for."""
 
 
 class _Change(NamedTuple):
@@ -124,7 +126,7 @@ class Linearised:
         cotangent: FloatArray,
         *,
         volumes: Sequence[str],
-        stiffness: Sequence[ArrayLike],
+        stiffness: bool,
         now: FloatArray | None,
     ) -> Gradient:
         """Return `Deformer.vjp` for *cotangent* (n, 3); *now* (n,) is the present stiffness."""
@@ -141,13 +143,50 @@ class Linearised:
         for name in all_of(volumes, str, "volumes"):
             unit, at = self._with_volume(name)
             along[name] = slope(at) / unit
-        stiffer = [slope(self._with_stiffness(each, now)) for each in stiffness]
+        stiffer = self._by_stiffness(v, c, now) if stiffness else np.empty(0)
         constraints, positions = self.path.constraints, self.path.solver.positions
         by_places = positions.weights[:, None] * (positions.rows @ v)
         found = constraints.places_of_targets.T @ by_places / constraints.problem.frame.size
         if constraints.mirror is not None:
             found = constraints.mirror.adjoint(constraints.handle, constraints.mates, found)
-        return Gradient(np.asarray(found), along, np.array(stiffer, dtype=np.float64))
+        return Gradient(np.asarray(found), along, stiffer)
+
+    def _by_stiffness(self, v: FloatArray, c: FloatArray, now: FloatArray | None) -> FloatArray:
+        """Return the gradient (n,) by the stiffness *now*, with the loads *v* of F and *c* of q."""
+        constraints, p = self.path.constraints, self.path.end
+        problem = constraints.problem
+        self._refuse_local()
+        if constraints.rest_cages is not problem.rest_cages:
+            raise ArgumentError(
+                "there is no gradient by the stiffness while volumes are set, as the shape to keep "
+                "grows with them; use jvp for the derivative along a change of the stiffness"
+            )
+        ahead, beside = p, v
+        slope = half_gradient(self.path.solver, p, constraints.places(self.path.targets))
+        total = float(np.vdot(v, slope))
+        if self._is_moved:  # q contains H^-1 of rows, and dH^-1 = -H^-1 dH H^-1
+            moved = np.einsum("k,kma->ma", self._steps, self._directions)
+            ahead, total = np.hstack([p, moved]), total + float(np.vdot(c, moved))
+            beside = np.hstack([v, *self.path.solver.directions([c])])
+        held = np.concatenate([constraints.handle, constraints.fixed])
+        squares = np.zeros(len(p))
+        if len(held) and problem.regions.components.shape[1] > 1:
+            rows, weights, region = problem.loose_samples(held)
+            away = np.hstack([p - constraints.rest_cages, ahead[:, 3:]])
+            each = weights * np.einsum("ka,ka->k", rows @ away, rows @ beside)
+            for r, own in enumerate(problem.subspace.columns):
+                trace = np.trace(problem.energy.quadratic[own, own])
+                squares[own] = each[region == r].sum() / trace
+        rotations, twists = turning(problem.energy, p, v)
+        contraction = Contraction(ahead, beside, squares, rotations, twists, total)
+        found = -problem.binding.by_factors(problem.inputs, contraction)
+        return self._factor_slopes(now).adjoint(found)
+
+    def _factor_slopes(self, now: FloatArray | None) -> FactorSlopes:
+        """Return how the factors of the energy change with the stiffness, which is *now* (n,)."""
+        n = self.path.constraints.problem.mesh.n_vertices
+        now = np.ones(n) if now is None else np.asarray(now, dtype=np.float64)
+        return FactorSlopes.of(now, self.options.mirror)
 
     @property
     def _volumes(self) -> Volumes:
@@ -262,17 +301,21 @@ class Linearised:
         given = plain(change, "stiffness")
         if given.shape != (n,) or given.dtype.kind not in "fiu" or not np.isfinite(given).all():
             raise ArgumentError(f"stiffness must be {n} finite numbers; got {shown(change)}")
-        if self._is_local:
-            raise ArgumentError("the stiffness of a local deformer has no derivatives")
-        now = np.ones(n) if now is None else now
+        self._refuse_local()
+        begin = problem.inputs.stiffness or Stiffness(np.ones(n), ())
+        slope = self._factor_slopes(now).along(np.asarray(given, dtype=np.float64))
 
         def at(step: float) -> Constraints:
-            values = now + step * given
-            stiffness = Stiffness.of(problem.mesh, values, self.options.mirror)
+            stiffness = replace(begin, factors=begin.factors + step * slope)
             other = self.enclosed.problem.stiffened(stiffness)
             return self._held(EnclosedVolume.under(other, self.options.lids), self.options)
 
         return at
+
+    def _refuse_local(self) -> None:
+        """Raise an ArgumentError if the deformer is local."""
+        if self._is_local:
+            raise ArgumentError("the stiffness of a local deformer has no derivatives")
 
     @property
     def _is_local(self) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import FloatArray, IntArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..cages import Cage
 from ..energy import Energy
 from ..finish import CellEnergy
@@ -223,24 +223,39 @@ class Problem(Frozen):
         regions with; their anchors are so weak, compared with the energy of the least region that
         they are in, that they only prevent drifting.
         """
-        component, energy = self.mesh.components, self.energy
-        inside, led = self.regions.components, self.kept_gaps(ids)
+        energy, inside, led = self.energy, self.regions.components, self.kept_gaps(ids)
         if not len(ids) or inside.shape[1] == 1:
             return led
-        samples, (of_component, of_region) = self.samples, self.linked_parts
-        has_ids = np.zeros(len(of_component), dtype=bool)
-        has_ids[component[ids]] = True
-        stays = ~np.isin(of_region, of_component[has_ids])
+        of_component, of_region = self.linked_parts
+        stays = ~np.isin(of_region, of_component[self._has(ids)])
         own = [len(cage.vertices) for cage in self.cages]
         quadratic = np.diag(np.where(np.repeat(stays, own), energy.scale, 0.0))
-        traces = np.add.reduceat(np.diag(energy.quadratic), np.cumsum([0, *own[:-1]]))
-        least = np.where(inside, traces[:, None], np.inf).min(axis=0)
-        of_sample = np.empty(len(samples.points), dtype=np.int64)
-        of_sample[samples.cells] = component
-        loose = ~has_ids[of_sample]
-        weight = _LOOSE * (least / np.bincount(of_sample, minlength=len(least)))[of_sample[loose]]
-        rows = samples.rows[loose]
+        rows, weight, _ = self.loose_samples(ids)
         return np.asarray(led + quadratic + (rows.T * weight) @ rows)
+
+    def loose_samples(self, ids: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the rows of W~ (k, m) of samples of components without any vertices *ids*.
+
+        And the weights (k,) of their anchors, in proportion to the trace of the energy of a region,
+        and this region (k,).
+        """
+        samples, inside = self.samples, self.regions.components
+        own = [len(cage.vertices) for cage in self.cages]
+        traces = np.add.reduceat(np.diag(self.energy.quadratic), np.cumsum([0, *own[:-1]]))
+        each = np.where(inside, traces[:, None], np.inf)
+        of_sample = np.empty(len(samples.points), dtype=np.int64)
+        of_sample[samples.cells] = self.mesh.components
+        share = each.min(axis=0) / np.bincount(of_sample, minlength=inside.shape[1])
+        loose = ~self._has(ids)[of_sample]
+        own_component = of_sample[loose]
+        region = each.argmin(axis=0)[own_component]
+        return samples.rows[loose], _LOOSE * share[own_component], region
+
+    def _has(self, ids: IntArray) -> BoolArray:
+        """Return whether each component (c,) has any of the vertices *ids*."""
+        found = np.zeros(self.regions.components.shape[1], dtype=bool)
+        found[self.mesh.components[ids]] = True
+        return found
 
     @cached_property
     def cell_energy(self) -> CellEnergy:

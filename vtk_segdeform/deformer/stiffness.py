@@ -68,12 +68,64 @@ class Stiffness:
             values = np.maximum(values, values[mirror.mates])
         is_rigid = np.isinf(values)
         rigid = np.flatnonzero(is_rigid)
-        soft = values[~is_rigid & (values > 0.0)]
-        usual = np.median(soft) if len(soft) else 1.0
+        usual = _median_of(values[~is_rigid & (values > 0.0)])
         values = np.clip(np.where(is_rigid, usual, values) / usual, _LEAST, _MOST)
         if not len(rigid) and (values == values[0]).all():
             return None
         return cls(values, tuple(rigid[own] for own in connected_sets(mesh, rigid)))
+
+
+@dataclass(frozen=True, eq=False)
+class FactorSlopes:
+    """How the factors of `Stiffness` change with the stiffness, to first order.
+
+    Limited and rigid factors stay.  Where the stiffness is not smooth, the slope is a mean: both
+    vertices of a pair, of a mirror, that are equally stiff count half, and vertices with the
+    median count alike.
+    """
+
+    soft: FloatArray  # (n,): the stiffness over its median, or 0 where the factor stays
+    median: float
+    of_median: FloatArray  # (n,), sum 1: how the median changes with the soft vertices
+    shares: FloatArray  # (n,): of the vertex itself; the rest is of its mate
+    mates: IntArray  # (n,)
+
+    @classmethod
+    def of(cls, stiffness: FloatArray, mirror: Mirror | None) -> FactorSlopes:
+        """Return the slopes at *stiffness* (n,)."""
+        mates = np.arange(len(stiffness)) if mirror is None else mirror.mates
+        values, other = np.maximum(stiffness, stiffness[mates]), stiffness[mates]
+        more, less = stiffness > other, stiffness < other
+        shares = np.where(more, 1.0, np.where(less, 0.0, 0.5))
+        is_soft = np.isfinite(values) & (values > 0.0)
+        of_median, median = np.zeros(len(values)), _median_of(values[is_soft])
+        if is_soft.any():
+            middle = np.quantile(values[is_soft], 0.5, method="inverted_cdf")
+            for value in (middle, 2.0 * median - middle):
+                nearest = np.abs(np.where(is_soft, values, np.inf) - value)
+                ties = nearest == nearest.min()
+                of_median += 0.5 * ties / np.count_nonzero(ties)
+        soft = np.asarray(np.where(is_soft, values, 0.0) / median, dtype=np.float64)
+        soft[(soft <= _LEAST) | (soft >= _MOST)] = 0.0
+        return cls(soft, median, of_median, shares, mates)
+
+    def along(self, change: FloatArray) -> FloatArray:
+        """Return the change (n,) of the factors with a *change* (n,) of the stiffness."""
+        own = self.shares * change + (1.0 - self.shares) * change[self.mates]
+        return (np.where(self.soft > 0.0, own, 0.0) - self.soft * (self.of_median @ own)) / (
+            self.median
+        )
+
+    def adjoint(self, gradient: FloatArray) -> FloatArray:
+        """Return the gradient (n,) by the stiffness for a *gradient* (n,) by the factors."""
+        own = np.where(self.soft > 0.0, gradient, 0.0)
+        own = (own - self.of_median * (self.soft @ gradient)) / self.median
+        others = np.bincount(self.mates, (1.0 - self.shares) * own, len(own))
+        return np.asarray(self.shares * own + others)
+
+
+def _median_of(soft: FloatArray) -> float:
+    return float(np.median(soft)) if len(soft) else 1.0
 
 
 def rigid_places(

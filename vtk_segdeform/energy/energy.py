@@ -43,6 +43,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -55,7 +56,7 @@ from ..mesh import Mesh
 from ..progress import Progress, tell
 from ..subspace import Subspace
 from .cubature import Sample
-from .operators import reduced_operators, surface_operators
+from .operators import SurfaceOperators, reduced_operators, surface_operators
 
 _CAGE_STIFFNESS = 3e-4  # e by traces, as a share of the shape energy: the distortion rises by 1 %
 
@@ -135,6 +136,32 @@ def _blocks_by_cage(k: FloatArray, cages: Sequence[slice]) -> Subspace:
     return Subspace(len(k), tuple(rows), tuple(blocks))
 
 
+class SampledOperators(NamedTuple):
+    """The operators of a mesh, or of a sample of its vertices, k in all."""
+
+    operators: SurfaceOperators
+    surface: IntrinsicTriangulation
+    rows: Subspace  # W~, (k, m)
+    clusters: IntArray  # (k,)
+    sample: Sample | None
+
+
+def sampled_operators(
+    mesh: Mesh, subspace: Subspace, clusters: IntArray, stiffness: FloatArray | None
+) -> SampledOperators:
+    """Return the operators of `shape_energy`."""
+    inner = inner_vertices(mesh)
+    if not (sample := Sample.of(mesh, clusters)):
+        surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
+        operators = surface_operators(surface, clusters, stiffness, inner=inner)
+        return SampledOperators(operators, surface, subspace, clusters, None)
+    ids, own, factors = sample.ids, clusters[sample.ids], sample.weights
+    if stiffness is not None:
+        factors = stiffness[ids] * factors
+    operators = surface_operators(sample.surface, own, factors, inner=inner[ids])
+    return SampledOperators(operators, sample.surface, sample.rows(subspace), own, sample)
+
+
 def shape_energy(
     mesh: Mesh,
     subspace: Subspace,
@@ -164,18 +191,9 @@ def shape_energy(
     if not is_number(stretch, 0.0):
         raise ArgumentError(f"stretch must be a number, 0 or more; got {stretch!r}")
     tell(progress, 0.0, "sampling vertices")
-    rows, own, weights, inner = subspace, clusters, None, inner_vertices(mesh)
-    if not (sample := Sample.of(mesh, clusters)):
-        surface = IntrinsicTriangulation.of(mesh.vertices, mesh.faces)
-    else:
-        surface, weights = sample.surface, sample.weights
-        rows, own, inner = sample.rows(subspace), clusters[sample.ids], inner[sample.ids]
-    factors = weights
-    if stiffness is not None:
-        factors = stiffness if sample is None else stiffness[sample.ids] * sample.weights
-    shape = surface_operators(surface, own, factors, inner=inner)
+    shape, surface, rows, own, sample = sampled_operators(mesh, subspace, clusters, stiffness)
     tell(progress, 0.5, "computing the energy")
-    areas = shape.areas if weights is None else weights * shape.areas
+    areas = shape.areas if sample is None else sample.weights * shape.areas
     bending, stretching, mass = reduced_operators(
         rows,
         shape.laplacian,

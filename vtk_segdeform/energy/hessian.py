@@ -159,6 +159,22 @@ def rotation_term(energy: Energy, p: FloatArray) -> FloatArray:
     return total.T
 
 
+def turning(energy: Energy, p: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return R and N (G, 3, 3) at *p*: sum_g tr(R_g K_g v) changes by sum_g tr(N_g dS_g).
+
+    *v* (m, 3) is a motion of the cages, and S are the covariances; v remains.
+    """
+    covariances, moved = energy.covariances(p), energy.covariances(v)
+    rotations = closest_rotations(covariances)
+    stretched = rotations @ covariances
+    symmetric = 0.5 * (stretched + np.swapaxes(stretched, 1, 2))
+    root = _roots(np.trace(symmetric, axis1=1, axis2=2)[:, None, None] * np.eye(3) - symmetric)
+    epsilon = _EPSILON.reshape(3, 3, 3)  # eps_kic as (k, c, i)
+    torque = np.einsum("kji,gij->gk", epsilon, rotations @ moved)
+    turned = np.einsum("gak,gab,gb->gk", root, root, torque)
+    return rotations, np.einsum("kji,gk,gic->gjc", epsilon, turned, rotations)
+
+
 def _twists(covariances: FloatArray) -> FloatArray:
     """Return (G, 9, 3), which takes K_g to M^-1/2 T^T, for each axis of rotation and of dp."""
     rotations = closest_rotations(covariances)

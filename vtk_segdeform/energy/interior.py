@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import sizes
-from ..arrays import BoolArray, FloatArray
+from ..arrays import BoolArray, FloatArray, IntArray
 from ..cages import Cage, mean_value_coordinates
 from ..geometry import cluster_positions, decimated, inner_balls
 from ..mesh import Mesh
@@ -34,6 +34,64 @@ from .energy import Energy
 
 _TRACE_SHARE = 0.3  # of the trace of the energy; with 0.1, the twist of a bar jumps
 _PATCHES = 200  # with 100, the twist of a bar jumps
+
+
+@dataclass(frozen=True, eq=False)
+class InteriorSamples:
+    """Points inside the bodies of a mesh, one below each of k vertices, in q patches."""
+
+    vertices: IntArray  # (k,)
+    points: FloatArray  # (k, 3)
+    radii: FloatArray  # (k,), of their balls
+    volumes: FloatArray  # (k,), around them
+    weights: FloatArray  # (r, k): the blend weights
+    patches: IntArray  # (k,)
+
+    @classmethod
+    def of(cls, mesh: Mesh, weights: FloatArray, encloses: BoolArray) -> InteriorSamples:
+        """Return points in those components of *mesh* that are bodies.
+
+        Parameters
+        ----------
+        mesh : Mesh
+            n vertices, c components.
+        weights : (r, n) float
+            Blend weights of the regions.
+        encloses : (c,) bool
+            Whether each component is a body.
+        """
+        component, kept = mesh.components, np.arange(mesh.n_vertices)
+        if mesh.n_vertices > sizes.DECIMATED:
+            mesh, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
+            component = component[kept]
+        x, area = mesh.vertices, mesh.vertex_areas
+        inward, _, diameters = inner_balls(x, mesh.faces)
+        radius = 0.5 * diameters
+        own = encloses[component] & (area * radius > 0.0)
+        own &= diameters < mesh.diagonal  # otherwise nothing is opposite
+        x, radius, area, component = x[own], radius[own], area[own], component[own]
+        patch = component
+        if len(x):
+            patch = cluster_positions(x, _PATCHES)
+            patch = np.unique([patch, component], axis=1, return_inverse=True)[1].ravel()
+        points = x + 0.75 * radius[:, None] * inward[own]
+        return cls(kept[own], points, radius, area * radius, weights[:, kept[own]], patch)
+
+    def means(self, stiffness: FloatArray | None = None) -> Interior:
+        """Return the mean of each patch; *stiffness* (n,) are factors of the volumes, or 1."""
+        volume, patch = self.volumes, self.patches
+        if stiffness is not None:
+            volume = volume * stiffness[self.vertices]
+        if not len(volume):
+            return Interior(self.points, self.radii, volume, self.weights)
+        total = np.asarray(np.bincount(patch, volume), dtype=np.float64)
+
+        def mean(values: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(patch, volume * values) / total)
+
+        middle = np.stack([mean(axis) for axis in self.points.T], axis=1)
+        blend = np.stack([mean(each) for each in self.weights])
+        return Interior(middle, mean(self.radii), total, blend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,45 +111,8 @@ class Interior:
         encloses: BoolArray,
         stiffness: FloatArray | None = None,
     ) -> Interior:
-        """Return points in those components of *mesh* that are bodies.
-
-        Parameters
-        ----------
-        mesh : Mesh
-            n vertices, c components.
-        weights : (r, n) float
-            Blend weights of the regions.
-        encloses : (c,) bool
-            Whether each component is a body.
-        stiffness : (n,) float, optional
-            Factors of the volumes; by default 1.
-        """
-        component = mesh.components
-        if mesh.n_vertices > sizes.DECIMATED:
-            mesh, kept, _ = decimated(mesh, sizes.DECIMATED_POINTS)
-            component, weights = component[kept], weights[:, kept]
-            stiffness = None if stiffness is None else stiffness[kept]
-        x, area = mesh.vertices, mesh.vertex_areas
-        inward, _, diameters = inner_balls(x, mesh.faces)
-        radius = 0.5 * diameters
-        own = encloses[component] & (area * radius > 0.0)
-        own &= diameters < mesh.diagonal  # otherwise nothing is opposite
-        x, radius, area, component = x[own], radius[own], area[own], component[own]
-        points, volume = x + 0.75 * radius[:, None] * inward[own], area * radius
-        if stiffness is not None:
-            volume = volume * stiffness[own]
-        if not len(x):
-            return cls(points, radius, volume, weights[:, own])
-        patch = cluster_positions(x, _PATCHES)
-        patch = np.unique([patch, component], axis=1, return_inverse=True)[1].ravel()
-        total = np.asarray(np.bincount(patch, volume), dtype=np.float64)
-
-        def mean(values: FloatArray) -> FloatArray:
-            return np.asarray(np.bincount(patch, volume * values) / total)
-
-        middle = np.stack([mean(axis) for axis in points.T], axis=1)
-        blend = np.stack([mean(each) for each in weights[:, own]])
-        return cls(middle, mean(radius), total, blend)
+        """Return the means of `InteriorSamples` over their patches."""
+        return InteriorSamples.of(mesh, weights, encloses).means(stiffness)
 
     def gradients(self, cages: Sequence[Cage], subspace: Subspace) -> FloatArray:
         """Return the gradients (k, 3, m) of the map of *cages* at the points, in W~'s columns."""

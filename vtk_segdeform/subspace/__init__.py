@@ -13,7 +13,7 @@ from .affine_parts import AffineParts
 from .gpu import GPUError, GPUSurface, gpu_arrays
 from .interpolated import InterpolatedBlock
 from .passengers import Passengers, bind_passengers, blend_at
-from .subspace import NUMBERS_PER_FACE, Subspace, cage_subspace
+from .subspace import NUMBERS_PER_FACE, Subspace, cage_subspace, row_pieces
 
 __all__ = [
     "NUMBERS_PER_FACE",
@@ -27,4 +27,5 @@ __all__ = [
     "blend_at",
     "cage_subspace",
     "gpu_arrays",
+    "row_pieces",
 ]
