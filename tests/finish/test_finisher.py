@@ -379,6 +379,10 @@ def test_a_pose_with_its_held_vertices_at_other_places_is_on_the_volume():
     places = mesh.vertices[held] + np.where(mesh.vertices[held, :1] > 0.0, 0.4, 0.0) * [1, 0, 0]
     x = SAUSAGE.finisher()._at_places(mesh.vertices, places)
     assert_array_equal(x[held], places)
+    offset, free = np.zeros(mesh.n_vertices), np.ones(mesh.n_vertices, dtype=bool)
+    offset[held], free[held] = places[:, 0] - mesh.vertices[held, 0], False
+    beside = free & (mesh.adjacency @ offset > 0.0)
+    assert (x - mesh.vertices)[beside, 0].min() > 0.05  # they were moved along
     assert abs(exact_volume_change(mesh.vertices, x, mesh.faces)) < 1e-13
 
 

@@ -139,6 +139,17 @@ def test_two_triangles_cross_in_a_segment_of_known_length_and_slope():
     assert contour(apart, faces, pairs)[0] == 0.0
 
 
+def test_two_triangles_with_a_common_corner_cross_from_there_on():
+    points = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [2, 1, 1], [1, 2, -1.0]])
+    faces, pairs = np.array([[0, 1, 2], [0, 3, 4]]), np.array([[0, 1]])
+    length, slope = contour(points, faces, pairs)
+    assert length == pytest.approx(1.5 * np.sqrt(2.0))
+    assert contour(points, faces, pairs[:, ::-1])[0] == pytest.approx(length)
+    for way in np.eye(points.size).reshape(-1, *points.shape):
+        ends = (contour(points + step * way, faces, pairs)[0] for step in (1e-6, -1e-6))
+        assert np.subtract(*ends) / 2e-6 == pytest.approx(np.vdot(slope, way), abs=1e-6)
+
+
 def test_the_gradient_is_bounded_where_an_edge_is_almost_in_the_plane():
     points = np.array(
         [[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, 1e-6], [2, 1, -1e-6], [1.5, 2, 1e-6]]
