@@ -30,9 +30,9 @@ What is added to the iteration of the paper (`deformer.as_printed`):
    and rotations follow one step behind: where much turns, hundreds of steps are needed, and a small
    step does not mean that the minimum is near.  With the derivatives of the rotations and of the
    volumes in H, h is Newton's step, about as long as the remaining distance.  But to compute this H
-   takes as long as several steps, the more, the more cage vertices there are.  So it is computed
-   where the first call begins, if that takes no longer than all its steps; and again if steps at
-   the present rate would not converge in that time, and if no share of a step lowers the objective.
+   takes as long as some 5 steps.  So it is computed where the first call begins; and again if steps
+   at the present rate would not converge in that time, and if no share of a step lowers the
+   objective.
    An H of the same call serves 5 steps at least, which fill the window of Anderson acceleration.
    If it is not convex, it contains a share of the rotations' derivatives only, and h is shorter.
    If it is almost singular, so that no share of h lowers the objective, the paper's H takes its
@@ -81,7 +81,7 @@ from .volumes import Volumes, violations
 
 _DAMPING = 1e-9  # of the mean diagonal of H
 _MOST_RAISES = 4  # of the damping, to ten times as much each
-_PER_STEP = 30  # cage vertices: for each so many, computing H takes as long as another step
+_COST = 5  # of computing H, in steps
 _SETTLED = 2  # steps with one H after which their rate is known, Anderson acceleration included
 _WINDOW = 5  # steps that Anderson acceleration remembers, those of earlier calls included
 _MOST_TRIES = 30  # of weights of steadying anchors, each twice the one before
@@ -142,12 +142,10 @@ class _State:
     """The running state of an iteration, from which a later call continues."""
 
     factor: Factor  # of H; at first the paper's
-    cost: float  # of computing H, in steps
     age: int = 1  # of the factor, in steps
     has_begun: bool = False  # whether H has been computed
     is_new: bool = False  # whether the factor was computed in this call
     length: float = math.inf  # of the last step in this call
-    left: int = 0  # steps, in this call
     tolerance: float = 0.0  # of this call
     has_terms: bool = False  # whether the factor is with those terms that were active
     acceleration: Anderson = field(default_factory=lambda: Anderson(_WINDOW))
@@ -155,21 +153,21 @@ class _State:
 
     def begin(self, p: FloatArray, targets: FloatArray, options: SolverOptions) -> None:
         """Begin a call, which continues the last steps if it begins where they ended."""
-        self.tolerance, self.left, self.is_new = options.tolerance, options.max_steps, False
+        self.tolerance, self.is_new = options.tolerance, False
         if self.end is None or self.end[0] is not p or not np.array_equal(targets, self.end[1]):
             self.acceleration.pause()
             self.length = math.inf
 
     def is_slow(self, step: Step) -> bool:
         """Tell whether *step* and the next ones would not converge while a new H is computed."""
-        if not self.has_begun and self.cost <= self.left:
+        if not self.has_begun:
             return step.length > self.tolerance
         rate, least = min(step.length / self.length, 1.0), _WINDOW if self.is_new else _SETTLED
-        return self.age >= least and step.length * rate**self.cost > self.tolerance
+        return self.age >= least and step.length * rate**_COST > self.tolerance
 
     def took(self, step: Step) -> None:
         """Count a step."""
-        self.age, self.left, self.length = self.age + 1, self.left - 1, step.length
+        self.age, self.length = self.age + 1, step.length
 
     def copy(self) -> _State:
         """Return a state from which another solver continues."""
@@ -212,8 +210,7 @@ class GaussNewton:
             raise CageError(
                 "the cages have almost no influence on the mesh; refit them closer to the surface"
             )
-        self._factor = factor
-        self._state = self._unbegun()
+        self._factor, self._state = factor, _State(factor)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "_term"}
@@ -227,11 +224,8 @@ class GaussNewton:
     def fresh(self) -> GaussNewton:
         """Return a solver of the same problem that has not begun."""
         other = copy.copy(self)
-        other._state, other._last, other._way = self._unbegun(), None, Way()
+        other._state, other._last, other._way = _State(self._factor), None, Way()
         return other
-
-    def _unbegun(self) -> _State:
-        return _State(self._factor, len(self._hessian) / _PER_STEP)
 
     def preserve(self, volumes: Volumes) -> None:
         """Preserve other *volumes* from now on."""
