@@ -390,3 +390,21 @@ def test_a_pull_reaches_its_target_while_volumes_change(goals):
     assert solution.handle_error < 1e-4
     assert solution.volume_error < EXACT
     assert solution.status is Status.CONVERGED
+
+
+def test_a_part_that_grows_leaves_the_rest_in_its_place_and_with_its_volume():
+    scene = hollow()
+    outer = scene.mesh.components == 0
+    half = outer & (scene.mesh.vertices[:, 0] > 0.3)
+    free = sd.Deformer(scene.mesh, scene.regions, scene.cages, parts={"tip": half})
+    far = scene.mesh.vertices[:, 0] < -0.3
+    moved, size = {}, scene.mesh.diagonal
+    for kept in ({}, {"whole": "keep"}):
+        solution = free.hold(volumes={"tip": "+20%", **kept}).solve(np.empty((0, 3)))
+        assert solution.volume_error < EXACT
+        moved[len(kept)] = np.linalg.norm(solution.vertices - scene.mesh.vertices, axis=1)
+        before, after = (free.volumes(x) for x in (None, solution.vertices))
+        gain = 0.0 if kept else 0.2 * before["tip"]
+        assert_allclose(after["whole"], before["whole"] + gain, rtol=EXACT)
+    assert moved[0][far].max() < 1e-3 * size < 1e-2 * size < moved[0][half].max()
+    assert moved[1][far].max() > 5e-3 * size
