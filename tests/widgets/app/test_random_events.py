@@ -107,6 +107,9 @@ class Anywhere:
         panel = self.window.editor_widget.panel
         found = [w for kind in kinds for w in panel.findChildren(kind)]
         found = [w for w in found if w.isVisible() and w.isEnabled()]
+        if not found:  # in a narrow window it is closed at first
+            self.window.editor_widget.panel_button.click()
+            return
         control = self.pick(found)
         if isinstance(control, QtWidgets.QAbstractSpinBox):
             QtTest.QTest.keyClicks(control.lineEdit(), str(self.rng.integers(0, 30)))
