@@ -157,8 +157,9 @@ def test_random_events_in_the_window_leave_no_memory_and_every_state_returns(
     raised = []
     monkeypatch.setattr(sys, "excepthook", lambda *error: raised.append(error[1]))
     # Files are for other tests; a dialog of the system would wait for its user.
-    for name in ("getOpenFileName", "getSaveFileName"):
-        monkeypatch.setattr(QtWidgets.QFileDialog, name, lambda *_, **__: ("", ""))
+    for name in ("getOpenFileName", "getOpenFileNames", "getSaveFileName"):
+        none = [] if name.endswith("s") else ""
+        monkeypatch.setattr(QtWidgets.QFileDialog, name, lambda *_, none=none, **__: (none, ""))
     application()
     mesh, state = small()
     save_session(tmp_path / "arm.segdeform", Session(mesh, state=state))
