@@ -337,4 +337,5 @@ class SurfaceSamples:
 
 def _graded(away: FloatArray) -> FloatArray:
     """Return the weights of points that are *away* (s,) in reaches."""
-    return np.asarray(np.minimum((np.clip(away, 1.0, 1e2) ** 2 - 1.0) ** 2, _LARGEST))
+    nearer = np.clip(away, 1.0, 1e2)
+    return np.asarray(np.minimum((nearer**2 - 1.0) ** 2, _LARGEST))
