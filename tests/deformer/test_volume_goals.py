@@ -13,6 +13,7 @@ from organs import under_a_lid
 from solids import icosphere, rotation
 
 import vtk_segdeform as sd
+from vtk_segdeform import sizes
 from vtk_segdeform.deformer.volume_goals import VolumeGoal, checked_goals
 from vtk_segdeform.errors import ConstraintError
 from vtk_segdeform.solver import GaussNewton, Status
@@ -390,3 +391,45 @@ def test_a_pull_reaches_its_target_while_volumes_change(goals):
     assert solution.handle_error < 1e-4
     assert solution.volume_error < EXACT
     assert solution.status is Status.CONVERGED
+
+
+def test_a_part_that_grows_leaves_the_rest_in_its_place_and_with_its_volume():
+    scene = hollow()
+    outer = scene.mesh.components == 0
+    half = outer & (scene.mesh.vertices[:, 0] > 0.3)
+    free = sd.Deformer(scene.mesh, scene.regions, scene.cages, parts={"tip": half})
+    far = scene.mesh.vertices[:, 0] < -0.3
+    moved, size = {}, scene.mesh.diagonal
+    for kept in ({}, {"whole": "keep"}):
+        solution = free.hold(volumes={"tip": "+20%", **kept}).solve(np.empty((0, 3)))
+        assert solution.volume_error < EXACT
+        moved[len(kept)] = np.linalg.norm(solution.vertices - scene.mesh.vertices, axis=1)
+        before, after = (free.volumes(x) for x in (None, solution.vertices))
+        gain = 0.0 if kept else 0.2 * before["tip"]
+        assert_allclose(after["whole"], before["whole"] + gain, rtol=EXACT)
+    assert moved[0][far].max() < 1e-3 * size < 1e-2 * size < moved[0][half].max()
+    assert moved[1][far].max() > 5e-3 * size
+
+
+def test_only_the_body_of_a_part_gains_what_the_part_does():
+    mesh = three().mesh
+    tip = (mesh.vertices[:, 0] > 3.6) & (mesh.components == mesh.components.max())
+    deformer = sd.Deformer(mesh, three().regions, three().cages, parts={"tip": tip})
+    solution = deformer.hold(volumes={"tip": "+20%"}).solve(np.empty((0, 3)))
+    before, after = (deformer.volumes(x) for x in (None, solution.vertices))
+    gains = {name: after[name] - before[name] for name in ("tip", "body 0", "body 1", "body 2")}
+    far = int(np.argmax([abs(gains[f"body {k}"]) for k in range(3)]))
+    assert_allclose([gains.pop(f"body {far}"), gains.pop("tip")], 0.2 * before["tip"], rtol=1e-9)
+    assert_allclose(list(gains.values()), 0.0, atol=EXACT)
+
+
+def test_a_grown_shape_has_the_exact_volumes_also_if_steps_preserve_coarse_ones(monkeypatch):
+    monkeypatch.setattr(sizes, "COARSE_VOLUME", 200)
+    monkeypatch.setattr(sizes, "COARSE_VOLUME_POINTS", 100)
+    vertices, faces = icosphere(3)
+    mesh = sd.Mesh(vertices * [2.0, 1.0, 1.0], faces)
+    regions, part = sd.segment(mesh, 1), {"tip": mesh.vertices[:, 0] > 0.3}
+    free = sd.Deformer(mesh, regions, sd.fit_cages(mesh, regions, 60), parts=part)
+    constraints = free.hold(volumes={"tip": "+20%"})._constraints
+    x = constraints.problem.map(constraints.rest_cages)
+    assert np.abs(constraints.preserved.constraints.relative(x)).max() < 1e-5

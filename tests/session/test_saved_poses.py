@@ -90,6 +90,22 @@ def test_a_blend_is_solved_with_exact_volume_and_ends_in_the_poses(posed):
     assert_array_equal(session.vertices, poses["turned"])
 
 
+def test_what_two_poses_of_pulled_points_have_alike_stays_between_them():
+    session, left, right = SCENE.caged(), int(X[:, 0].argmin()), int(X[:, 0].argmax())
+    for name, tip, up in (("first", left, 0.5), ("second", right, 1.0)):
+        session.pull(tip, X[tip] + [0.0, 0.0, up])
+        session.commit("pull")
+        session.saved_poses.save(name)
+    after, far = session.vertices, X[:, 0] < -1.0
+    for share in (0.3, 0.7):
+        session.saved_poses.blend("first", "second", share)
+        assert abs(session.volume_change) < 1e-12
+        assert np.abs(session.vertices - after)[far].max() < 3e-3 * SCENE.mesh.diagonal
+        assert_allclose(session.vertices[right, 2] - X[right, 2], share, atol=1e-2)
+        session.refine()
+        assert np.abs(session.vertices - after)[far].max() < 3e-3 * SCENE.mesh.diagonal
+
+
 def test_they_are_in_files_which_without_them_are_as_before(posed, tmp_path):
     session, poses = posed
     path = tmp_path / "s.segdeform"

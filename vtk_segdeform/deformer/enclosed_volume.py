@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -54,6 +54,8 @@ class Preserved(NamedTuple):
     """With the shape that has these volumes; see `growth`."""
     rest_cages: FloatArray
     """(m, 3): its cages."""
+    part: BoolArray | None
+    """The vertices around volumes that are set, a mask (n,), if the surface beyond them stays."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,9 +117,10 @@ class EnclosedVolume:
             rest = problem.rest_pose.vertices
             scaled = ScaledSurface.of(problem.subspace, rest, preserved, body)
         cages = problem.rest_cages
-        if goals and (grown := grown_cages(problem, volumes)) is not cages:
+        exact, part = Together(preserved), self._changed(goals, parts)
+        if goals and (grown := grown_cages(problem, volumes, exact, part)) is not cages:
             problem, cages = problem.grown(grown), grown
-        found = Preserved(Together(preserved), volumes, scaled, problem, cages)
+        found = Preserved(exact, volumes, scaled, problem, cages, part)
         for old in [old for old in self._known if goals and old[1]]:
             del self._known[old]  # one set of goals is enough
         self._known[key] = found
@@ -147,6 +150,8 @@ class EnclosedVolume:
         ]
         if not wanted and not kept:
             return ()
+        gaining = [each for each in wanted if self._part(each.name, parts) is not None]
+        kept = _with_gains(kept, [each for each in gaining if not each.bound])
         return consistent(wanted, kept, self.problem.rest_pose.vertices)
 
     def _mirrored(
@@ -157,11 +162,8 @@ class EnclosedVolume:
     ) -> tuple[Mapping[str, VolumeGoal | None], Mapping[str, BoolArray]]:
         """Return *goals* and *parts*, and those of mirror images that overlap the parts little."""
         goals, parts = dict(goals), dict(parts)
-        labels = self.problem.regions.labels
         for name, goal in list(goals.items()):
-            kind, number = _split(name)
-            mask = parts.get(name, labels == number if kind == "region" else None)
-            if mask is None:
+            if (mask := self._part(name, parts)) is None:
                 continue
             image = np.zeros_like(mask)
             image[mirror.mates[mask]] = True
@@ -169,6 +171,30 @@ class EnclosedVolume:
                 parts[f"{name}, mirrored"] = image
                 goals[f"{name}, mirrored"] = goal
         return goals, parts
+
+    def _part(self, name: str, parts: Mapping[str, BoolArray]) -> BoolArray | None:
+        """Return the vertices of the part or region called *name*, a mask (n,)."""
+        kind, number = _split(name)
+        labels = self.problem.regions.labels
+        return parts.get(name, labels == number if kind == "region" else None)
+
+    def _changed(
+        self, goals: Mapping[str, VolumeGoal | None], parts: Mapping[str, BoolArray]
+    ) -> BoolArray | None:
+        """Return the vertices of the *parts* and regions whose volumes *goals* set, a mask (n,).
+
+        None if there are none, or if bounds or other goals determine the volume of the rest.
+        """
+        found = np.zeros(self.problem.mesh.n_vertices, dtype=bool)
+        for name, goal in goals.items():
+            if goal is None:
+                continue
+            part = self._part(name, parts)
+            if part is None or goal.bound:
+                return None
+            if goal.share != 1.0:
+                found |= part
+        return found if found.any() else None
 
     def named(self, name: str, parts: Mapping[str, BoolArray] = _NO_PARTS) -> VolumeConstraint:
         """Return the volume called *name* at rest; see `volume_names`.
@@ -303,6 +329,24 @@ def changing_components(
             each = np.arange(len(bodies.of_component)) if kind == "component" else bodies.cavities
             found.append(each if number is None else each[number : number + 1])
     return np.unique(np.concatenate(found))
+
+
+def _with_gains(
+    kept: tuple[VolumeConstraint, ...], parts: Sequence[VolumeConstraint]
+) -> tuple[VolumeConstraint, ...]:
+    """Return the volumes *kept*, larger by what *parts* gain that are in them: the rest is kept."""
+    if not kept:
+        return kept
+    gains = np.zeros(len(kept))
+    keys = [_keys_of(each.faces) for each in kept]
+    for part in parts:
+        own = _keys_of(part.faces)
+        inside = [np.isin(own, key).mean() > 0.5 for key in keys]
+        gains[inside] += part.target - part.target / part.share
+    return tuple(
+        replace(each, target=each.target + gain, share=1.0 + gain / each.target) if gain else each
+        for each, gain in zip(kept, gains.tolist(), strict=True)
+    )
 
 
 def _keys_of(faces: IntArray) -> NDArray[np.uint64]:

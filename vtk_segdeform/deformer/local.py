@@ -13,11 +13,11 @@ from ..energy import Energy, with_rotating_rows
 from ..mesh import SurfacePoint
 from ..solver import Anchors, GaussNewton
 from .constraints import Constraints, PulledPoints
+from .growth import kept_around
 from .limbs import with_hinge
-from .locality import Ring
+from .locality import ANCHOR_WEIGHT, Ring
 from .path import Path
 
-_ANCHOR_WEIGHT = 90.0  # kappa of `locality`, times the scale of the shape energy
 _SPIKE, _FAR_PULL = 0.15, 0.3  # edges: higher spikes are resisted, of a pull by 0.3 diagonals
 _FIRM = 0.02  # least curvature at the press of a pull under a load, times the scale of the energy
 _HELD = 1.0  # the same of a surface that only volumes move; less than 0.2 lets it turn over
@@ -58,8 +58,10 @@ def near_point(
         for far in (reach, reach and max(reach, 2 * spread))
     )
     ids = np.concatenate([constraints.handle, constraints.fixed])
-    quadratic = _ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
+    quadratic = ANCHOR_WEIGHT * energy.scale * samples.quadratic(*near)
     quadratic += problem.anchors_of_loose_parts(ids)
+    if not reach and constraints.preserved.part is not None:
+        quadratic += kept_around(problem, constraints.preserved.part)
     anchors = Anchors(quadratic, p, np.zeros_like(p))
     handles = _points_of_handles(constraints, points)
     own_rows = np.array([problem.row_of(each.point) for each in handles])
@@ -122,7 +124,7 @@ def _with_rings(constraints: Constraints, own_rows: FloatArray, solver: GaussNew
     problem, energy = constraints.problem, solver.energy
     held = np.concatenate([constraints.fixed, constraints.handle])
     far = _FAR_PULL * problem.mesh.diagonal / problem.frame.size
-    most = _ANCHOR_WEIGHT * energy.scale
+    most = ANCHOR_WEIGHT * energy.scale
     for point, row in zip(constraints.pulled.points, own_rows, strict=True):
         ring = Ring.around(problem.mesh, problem.rest.vertices, point)
         if ring is None or np.isin(ring.vertices, held[held != point.vertex]).any():

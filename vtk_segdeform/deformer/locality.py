@@ -64,6 +64,9 @@ from ..mesh import Mesh, SurfacePoint
 from ..solver import CoarseVolume, ContactSurface
 from .limbs import Levels, Limb
 
+ANCHOR_WEIGHT = 90.0
+"""kappa, times the scale of the shape energy."""
+
 _LARGEST = 1e4  # (d^2 - 1)^2, reached at ten times the reach; also the weight of other bodies
 _FADES = 0.25  # of the length of a limb, beyond its joint
 _FEWEST = 4  # points of a ring, its own included
@@ -286,14 +289,12 @@ class SurfaceSamples:
         if np.isinf(reach):
             return np.zeros(len(self.points))
         if depth:
-            limbs = [self.within(each, depth) for each in points]
-            beyond = self._beyond(np.any(limbs, axis=0)) / max(reach, _SHORTEST)
-            away = 1.0 + np.maximum(beyond - _FADES, 0.0)
+            limbs = np.any([self.within(each, depth) for each in points], axis=0)
+            away = self._beyond(limbs) / max(reach, _SHORTEST) + 1.0 - _FADES
         else:
             away = np.min([self.distances(each) for each in points], axis=0)
             away /= max(reach, _SHORTEST)
-        nearer = np.clip(away, 1.0, 1e2)
-        weights = np.minimum((nearer**2 - 1.0) ** 2, _LARGEST)
+        weights = _graded(away)
         far = np.flatnonzero((away > 1.0) & np.isfinite(away))
         if len(far):
             _, part = csgraph.connected_components(self._joined[far][:, far], directed=False)
@@ -305,10 +306,21 @@ class SurfaceSamples:
         self, points: Sequence[SurfacePoint], reach: float, follows: float, depth: float = 0.0
     ) -> FloatArray:
         """Return sum_s w_s W~_s^T W~_s, (m, m), for kappa = 1; see `weights`."""
-        weights = self.areas * self.weights(points, reach, follows, depth)
+        return self._sum_over(self.weights(points, reach, follows, depth))
+
+    def quadratic_around(self, vertices: BoolArray, reach: float) -> FloatArray:
+        """Return the same for a part of the surface with some *vertices*, a mask (n,).
+
+        The *reach* ends at its border.
+        """
+        inside = np.zeros(len(self.points), dtype=bool)
+        inside[self.cells[vertices]] = True
+        return self._sum_over(_graded(1.0 + self._beyond(inside) / max(reach, _SHORTEST)))
+
+    def _sum_over(self, weights: FloatArray) -> FloatArray:
         kept = weights > 0.0
         rows = self.rows[kept]
-        return np.asarray((rows.T * weights[kept]) @ rows)
+        return np.asarray((rows.T * (self.areas * weights)[kept]) @ rows)
 
     def smooth_at_vertices(self, values: FloatArray) -> FloatArray:
         """Return *values* (s,) of the samples at all vertices, without steps between cells."""
@@ -321,3 +333,9 @@ class SurfaceSamples:
         for _ in range(math.ceil(_SMOOTHING * math.sqrt(len(at_vertices) / len(values)))):
             at_vertices = (at_vertices + near @ at_vertices) / count
         return at_vertices
+
+
+def _graded(away: FloatArray) -> FloatArray:
+    """Return the weights of points that are *away* (s,) in reaches."""
+    nearer = np.clip(away, 1.0, 1e2)
+    return np.asarray(np.minimum((nearer**2 - 1.0) ** 2, _LARGEST))

@@ -80,7 +80,8 @@ class Path:
         path.active = tuple(k for k, each in enumerate(preserved) if not each.bound)
         if not is_rest or constraints.has_goals:
             path.is_on_volumes = not (preserved.missed(path._problem.map(p)) > _MISSED).any()
-        if len(path.active) < len(preserved) or not path.is_on_volumes:
+        is_ready = path.is_on_volumes and not constraints.has_goals
+        if len(path.active) < len(preserved) or not is_ready:
             path._continue_from(p)
         return path
 

@@ -6,6 +6,9 @@ of now: with the same cages the mesh is where it was to the bit, with others as 
     blend of two poses at a share t:  handle targets  c_t + R_t ((1 - t) a + t R_1^T b),
     where a, b are the targets relative to their centres, c_t moves from one centre to the other,
     and R_t turns from 1 to the rotation R_1 that takes a closest to b.  The mesh is solved for.
+
+If only pulled points move, they are pulled there one after the other from the nearer of the two
+poses, each with the surface around it: what is alike in both poses stays.
 """
 
 from __future__ import annotations
@@ -20,9 +23,11 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import FloatArray, IntArray, frozen, is_number
 from ..checks import shown
+from ..deformer import checked_radius
 from ..errors import ArgumentError, ConstraintError
 from ..geometry import rigid_fit
-from ..mesh import Mesh
+from ..mesh import Mesh, SurfacePoint
+from ..solver import Solution
 from . import pulls, solving
 from .handles import targets_of
 from .naming import fault_of
@@ -225,6 +230,17 @@ class SavedPoses(Mapping[str, State]):
         start = history.state if is_going_on else ends[round(share)]
         a, b = (targets_of(self._poses.mesh, end) for end in ends)
         targets = {name: between(a[name], b[name], share) for name in a}
+        far = {name: float(np.abs(b[name] - a[name]).max()) for name in a}
+        moving = sorted((name for name in a if far[name] > 0.0), key=lambda name: far[name])
+        if moving and set(moving) <= set(start.pulls):
+            state = ends[round(share)]
+            for name in moving:  # the farthest last: the finish has room around it
+                most = max_steps if name == moving[-1] else None
+                state, solution = self._pulled(state, name, targets[name], most)
+            assert state.pose is not None
+            self._poses.keep_solution(state.pose, solution)
+            history.move(state)
+            return
         if any(end.fixed_at is not None for end in ends):
             at_rest = self._poses.mesh.vertices[start.fixed]
             c, d = (at_rest if end.fixed_at is None else end.fixed_at for end in ends)
@@ -232,6 +248,19 @@ class SavedPoses(Mapping[str, State]):
         pose, solution = solving.solve(self._poses, start, targets, max_steps, live=True)
         self._poses.keep_solution(pose, solution)
         history.move(replace(start, pose=pose, locality=None))
+
+    def _pulled(
+        self, state: State, name: str, places: FloatArray, max_steps: int | None
+    ) -> tuple[State, Solution]:
+        """Return *state* with the pulled point *name* at its *places* (k, 3), and the solution."""
+        poses, mesh = self._poses, self._poses.mesh
+        point = SurfacePoint.at_vertex(pulls.middle_vertex(mesh, state.handles[name]))
+        grip = pulls.Grip(point, checked_radius(mesh, None), None, None, 0.0, turns=False)
+        here = pulls.grasp(poses.bind(state), state, poses.vertices(state), grip).state
+        assert here.pose is not None
+        targets = {**here.pose.targets, name: places}
+        pose, solution = solving.solve(poses, here, targets, max_steps, live=True)
+        return replace(here, pose=pose), solution
 
     def _require(self, name: str) -> None:
         if not isinstance(name, str) or name not in self:

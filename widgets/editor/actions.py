@@ -470,20 +470,23 @@ def growing(part: str | None) -> Action:
     def grow(controller: Controller) -> None:
         name, session = _checked_part(controller, part), controller.session
         goal = round(100.0 * session.volume(name)[1]) + _GROWTH
-        then = partial(_change_of_rest, session, name)
+        then = partial(_change_beyond, session, name)
         setting_volume(name, f"{goal:+}%", then=then)(controller)
 
     return grow
 
 
-def _change_of_rest(session: Session, name: str) -> str | None:
-    """Return how the rest of the mesh pays for a part with more volume, and how to avoid that."""
+def _change_beyond(session: Session, name: str) -> str | None:
+    """Return how the whole, or else the rest of it, has changed with the volume of a part."""
     (whole, change), (own, own_change) = session.volume("whole"), session.volume(name)
+    if abs(change) > _NOTICED:
+        keep = "To keep its volume: Volumes, Whole, goal Kept"
+        return f"The whole has changed by {signed(100.0 * change, 0)} %. {keep}"
     rest = (whole - own) / (whole / (1.0 + change) - own / (1.0 + own_change)) - 1.0
-    if abs(change) > _NOTICED or abs(rest) < _NOTICED:
-        return None
-    free = "To let the whole grow: Volumes, Whole, goal Free"
-    return f"The rest has changed by {signed(100.0 * rest, 0)} %: the whole is kept. {free}"
+    if abs(rest) > _NOTICED:
+        keep = "To keep that instead: Volumes, Whole, goal As by default"
+        return f"The rest has changed by {signed(100.0 * rest, 0)} %: the whole is kept. {keep}"
+    return None
 
 
 def setting_volume(

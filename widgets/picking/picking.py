@@ -75,9 +75,23 @@ class Picker:
         met = met if ids is None else ids[met]
         return [self._hit(place, int(face)) for place, face in zip(places, met, strict=True)]
 
-    def hit(self, pointer: Pointer) -> Hit | None:
-        """Return the visible point of the surface at *pointer*, or None beside the mesh."""
-        return next(iter(self.hits(pointer)), None)
+    def hit(self, pointer: Pointer, *, beside: float = 0.0) -> Hit | None:
+        """Return the visible point of the surface at *pointer*, or None beside the mesh.
+
+        Or the vertex at the silhouette that is nearest to it, if it is *beside* the mesh by at most
+        so many pixels.
+        """
+        found = next(iter(self.hits(pointer)), None)
+        if found is not None or not beside:
+            return found
+        display, faces, ids = self.display_points(), self._faces, self._surface.shown_faces
+        away = np.hypot(*(display[:, :2] - pointer.position).T)[faces]
+        away[np.isnan(away)] = np.inf  # behind the camera
+        face, corner = divmod(int(away.argmin()), 3)
+        if not away[face, corner] <= beside:
+            return None
+        point = self._surface.points[faces[face, corner]]
+        return self._hit(point, face if ids is None else int(ids[face]))
 
     def sees(self, point: FloatArray, *, within: float) -> bool:
         """Return whether the surface does not hide *point* (3,); see `is_seen`."""

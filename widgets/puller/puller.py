@@ -47,6 +47,7 @@ _RADIUS = 0.15  # the initial radius, in diagonals of the mesh
 _SMALLEST_RADIUS, _LARGEST_RADIUS = 0.005, 1.0  # in diagonals
 _GROWTH = 1.1  # factor for one click of the wheel or one key press
 _CLICK_TOLERANCE = 3.0  # pixels; a press that moves less does not pull
+_BESIDE = 4.0  # pixels beside the surface at which a press still grabs its edge
 _RING_THICKNESS = 0.8  # of the ring of a brush
 _TOO_COARSE = "No vertex near this point. Enlarge the radius, or subdivide the mesh"
 _FIXED = "This point is fixed. Grab another one, or erase fixed vertices in mode 3"
@@ -173,7 +174,7 @@ class Puller(Widget):
         Return which one it is, or why there is none.
         """
         pointer = self.view.pointer(Phase.HOVER)
-        point = self._point_at(self._markers.at(pointer), self._picker.hit(pointer))
+        point = self._point_at(self._markers.at(pointer), self._hit(pointer))
         if point is None:
             return "Point at the surface to choose a limb"
         limbs = self.session.deformer.limbs(point) if self.session.is_bound else ()
@@ -256,9 +257,12 @@ class Puller(Widget):
         inside = self.view.contains(pointer)
         marker = self._markers.at(pointer) if inside else None
         self._markers.highlight(marker)
-        hit = self._picker.hit(pointer) if inside and marker is None else None
+        hit = self._hit(pointer) if inside and marker is None else None
         self._draw_ring(hit)
         self._tint.follow(self._point_at(marker, hit))
+
+    def _hit(self, pointer: Pointer) -> Hit | None:
+        return self._picker.hit(pointer, beside=_BESIDE)
 
     def _point_at(self, marker: str | None, hit: Hit | None) -> SurfacePoint | None:
         if marker is not None:
@@ -276,7 +280,7 @@ class Puller(Widget):
         """Pull the marker or the surface under the pointer; beside it, pass on the press."""
         self.remark = ""
         marker = self._markers.at(press)
-        hit = self._picker.hit(press) if marker is None else None
+        hit = self._hit(press) if marker is None else None
         if self.waiting.has_pull and (marker is not None or hit is not None):
             return self._refuse(_NOT_YET)
         point = self._point_at(marker, hit)
@@ -297,7 +301,7 @@ class Puller(Widget):
         """
         if self.is_grabbing:
             return True  # camera and radius stay the same during a pull
-        if not pointer.shift or self._picker.hit(pointer) is None:
+        if not pointer.shift or self._hit(pointer) is None:
             return False
         if pointer.control:
             self.says(self.change_limb(clicks))

@@ -116,6 +116,22 @@ def test_the_point_under_the_pointer_is_pulled_also_between_vertices(bench):
     assert "subdivide the mesh" in bench.puller.remark
 
 
+def test_a_press_just_beside_the_surface_grabs_its_edge(bench):
+    session, hand = bench.session, bench.hand
+    edge = int(session.vertices[:, 0].argmax())
+    seen = np.array(hand.at(session.vertices[edge]))
+    for aside, is_grabbed in ((7.0, False), (3.0, True)):
+        assert (
+            bench.puller._hit(Pointer(Phase.HOVER, *seen + [aside, 0.0])) is not None
+        ) is is_grabbed
+    hand.press(np.round(seen + [3.0, 0.0]))
+    hand.move(np.round(seen + [3.0, 30.0]))
+    hand.release()
+    assert session.handles["pull 1"].tolist() == [edge]
+    moved = hand.at(bench.target) - seen
+    assert np.abs(moved - [0.0, 30.0]).max() < 0.5  # without a jump to the pointer
+
+
 def test_shift_click_pins_and_unpins_and_markers_are_grabbed(bench):
     session, hand = bench.session, bench.hand
     place, _ = bench.on(0.5)
