@@ -20,8 +20,7 @@ from typing import Any
 from ..errors import ArgumentError, MissingDependencyError
 from ..importing import imported
 
-_PERIOD = 60.0  # seconds between copies, and ten times what a copy took
-_TIMES = 10.0
+_PERIOD, _TIMES = 60.0, 10.0  # seconds, and times what a copy takes, between copies at least
 
 
 def is_url(path: object) -> bool:
