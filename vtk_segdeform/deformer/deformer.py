@@ -127,7 +127,8 @@ class Deformer:
     volumes : mapping of str to str or float, optional
         Goals by the names of volumes, as ``{"cavity": "-40%", "whole": "keep", "body 1": 2.5}``;
         see `volume_goals` and `volume_names`.  They take precedence over what is preserved by
-        default.
+        default.  A body gains or loses what its parts and regions are set to, unless "whole"
+        is kept; bounds, such as "at least 5", let the rest of it make room.
     parts : mapping of str to (k,) int or (n,) bool, optional
         Vertices by the names of parts of the surface, whose volumes are those under a lid over
         their borders; for *volumes*.
