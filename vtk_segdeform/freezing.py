@@ -1,4 +1,4 @@
-"""Immutable objects: copies, pickles and read-only arrays.
+"""Immutable objects: copies, pickles, read-only arrays, and results kept by frozen inputs.
 
 Only the fields of such objects are copied and pickled; cached values are computed again on demand.
 Matrices are stored without their zeros.
@@ -6,7 +6,7 @@ Matrices are stored without their zeros.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -99,3 +99,70 @@ def _read_only(value: Any) -> Any:
 def _plain(value: Any) -> Any:
     """Return *value* as it is pickled: read-only mappings cannot be."""
     return dict(value) if isinstance(value, Mapping) else without_zeros(value)
+
+
+class Memo:
+    """The last few results of expensive functions, by kind and inputs.
+
+    Inputs are frozen: an array is identified by itself, everything else by its value.
+
+    Examples
+    --------
+    >>> memo = Memo()
+    >>> memo.get("sum", (1, 2), lambda: 1 + 2), memo.find("sum", (1, 2)), memo.find("sum", (3, 4))
+    (3, 3, None)
+    """
+
+    def __init__(self) -> None:
+        self._results: dict[str, tuple[tuple[tuple[Any, ...], Any], ...]] = {}
+
+    def copy(self) -> Memo:
+        """Return another one with the same results."""
+        other = Memo()
+        other._results = dict(self._results)
+        return other
+
+    def find(self, kind: str, inputs: tuple[Any, ...]) -> Any:
+        """Return the result of *inputs*; None if it is not known."""
+        known = self._results.get(kind, ())
+        for each in known:
+            if same_inputs(each[0], inputs):
+                if each is not known[0]:
+                    self._results[kind] = (each, *(other for other in known if other is not each))
+                return each[1]
+        return None
+
+    def get(self, kind: str, inputs: tuple[Any, ...], make: Callable[[], _T], most: int = 1) -> _T:
+        """Return the result of *inputs*, by *make* if it is not known; keep *most* of its kind."""
+        found: _T | None = self.find(kind, inputs)
+        if found is None:
+            found = make()
+            self._results[kind] = ((inputs, found), *self._results.get(kind, ()))[:most]
+        return found
+
+    def keep(self, kind: str, inputs: tuple[Any, ...], result: _T, most: int = 1) -> _T:
+        """Keep *result* as that of *inputs*, and return it."""
+        others = [each for each in self._results.get(kind, ()) if not same_inputs(each[0], inputs)]
+        self._results[kind] = ((inputs, result), *others)[:most]
+        return result
+
+    def drop(self, kind: str) -> None:
+        """Forget all results of a kind."""
+        self._results.pop(kind, None)
+
+
+def same_inputs(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
+    """Return whether *a* and *b* are the same inputs."""
+    if len(a) != len(b):
+        return False
+    for x, y in zip(a, b, strict=True):
+        if x is y:
+            continue
+        if isinstance(x, np.ndarray) or isinstance(y, np.ndarray):
+            return False
+        if isinstance(x, tuple) and isinstance(y, tuple):
+            if not same_inputs(x, y):
+                return False
+        elif x != y:
+            return False
+    return True

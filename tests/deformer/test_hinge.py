@@ -40,7 +40,7 @@ def club() -> Session:
 def another(session: Session) -> Session:
     """Return a session in the same state, with the same bound cages."""
     other = Session(session.mesh, state=session.state)
-    other.poses.adopt(session.state, club().deformer)
+    other.poses.bindings.adopt(session.state, club().deformer)
     return other
 
 

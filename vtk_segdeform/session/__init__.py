@@ -10,7 +10,7 @@ The files, in reading order:
     pulls          pulls and pins
     painting       painting, merging and splitting regions
     poses          surfaces and deformers of states, cached
-    memo           the cache
+    bindings       their deformers, bound to cages
     solving        the next pose of a state
     preparing      regions, cages and binding in advance
     separating     components that follow others, and those with regions of their own
@@ -29,6 +29,7 @@ The files, in reading order:
     archive        the file format
 """
 
+from ..freezing import same_inputs
 from ..mesh import SurfacePoint
 from . import finishing, preparing, pulls, separating, solving
 from .carried import SessionCarried
@@ -71,6 +72,7 @@ __all__ = [
     "pulls",
     "region_name",
     "require_handle",
+    "same_inputs",
     "save_session",
     "saved_view",
     "separating",

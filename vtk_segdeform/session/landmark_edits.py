@@ -253,10 +253,10 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
             raise ConstraintError(
                 f"a fit needs {LEAST_PAIRS} landmarks with targets or more; there are {len(rows)}"
             )
-        if not poses.is_bound(state):
+        if not poses.bindings.is_bound(state):
             ready = preparing.preparation(poses, state, part(progress, 0.0, _PREPARED))
             state = preparing.prepared(ready, state)
-            poses.adopt(State(ready.regions, ready.cages, options=state.options), ready.deformer)
+            preparing.adopt(poses, state.options, ready)
         fit = fit_landmarks(
             poses.mesh,
             own.source[rows],
@@ -305,7 +305,7 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
 
 def _in_fit(poses: Poses, state: State, x: FloatArray) -> State:
     """Return *state* in the pose with the vertices *x* (n, 3), whose volume is its goal."""
-    deformer, options = poses.bind(state), state.options
+    deformer, options = poses.bindings.bind(state), state.options
     p = solving.carried(poses, state, x)
     for vertices in p:
         frozen(vertices)

@@ -50,7 +50,7 @@ def copied_pose(poses: Poses, state: State, rest: FloatArray, posed: FloatArray)
 
 
 def _cages_like(poses: Poses, state: State, x: FloatArray, y: FloatArray) -> Cages:
-    mesh, deformer = poses.mesh, poses.bind(state)
+    mesh, deformer = poses.mesh, poses.bindings.bind(state)
     A, _ = rigid_fit(x, mesh.vertices)
     x, y = x @ A.T, y @ A.T
     edges = mesh.edges[:: 1 + len(mesh.edges) // _EDGES]

@@ -24,19 +24,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import sizes
 from ..arrays import FloatArray, as_points, frozen
 from ..deformer import Deformer, Mirror
-from ..errors import CageError
-from ..files import cache_folder
+from ..freezing import Memo
 from ..geometry import Lids, lids_of
 from ..mesh import Mesh
 from ..progress import Progress, part, tell
 from ..solver import Solution, VolumeConstraint, total_volume
 from ..subspace import blend_at
 from . import pulls
+from .bindings import Bindings
 from .handles import stacked
-from .memo import Memo
 from .state import Cages, Pose, State
 
 _KEPT = 3  # bound deformers, rotations and surfaces of the last poses
@@ -105,55 +103,14 @@ class Poses:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
+        self.bindings = Bindings(mesh)
         self.memo = Memo()
 
     # Deformers.
 
-    def is_bound(self, state: State) -> bool:
-        """Return whether the cages of *state* are bound, so that `bind` returns at once."""
-        return self.memo.find("bound", _binding(state)) is not None
-
-    def bind(self, state: State, progress: Progress | None = None) -> Deformer:
-        """Return a deformer for the cages of *state* without constraints; bind it if necessary.
-
-        Raises
-        ------
-        CageError
-            If there are no cages, or they do not fit.
-        """
-
-        def bound() -> Deformer:
-            if state.regions is None or not state.cages:
-                raise CageError("there are no cages to deform with; fit or set cages first")
-            return Deformer(
-                self.mesh,
-                state.regions,
-                state.cages,
-                stretch=state.options.stretch,
-                rotation_groups=state.options.rotation_groups,
-                cache=cache_folder() if self.mesh.n_vertices >= sizes.CACHED_BINDING else None,
-                progress=progress,
-            )
-
-        found = self.memo.get("bound", _binding(state), bound, _KEPT)
-        symmetry, stiffness, parts = state.options.symmetry, state.stiffness, state.parts
-        if symmetry is None and stiffness is None and not parts:
-            return found
-
-        def made() -> Deformer:
-            is_same = symmetry is None and not parts
-            other = found if is_same else found.hold(symmetry=symmetry, parts=dict(parts))
-            return other if stiffness is None else other.stiffened(stiffness)
-
-        return self.memo.get("made", (found, symmetry, stiffness, parts), made)
-
-    def adopt(self, state: State, deformer: Deformer) -> None:
-        """Use *deformer*, bound elsewhere, for the regions, cages and options of *state*."""
-        self.memo.keep("bound", _binding(state), deformer, _KEPT)
-
     def prepare(self, state: State, progress: Progress | None = None) -> None:
         """Bind, and constrain the fixed vertices and handles of *state* if there are any."""
-        self.bind(state, part(progress, 0.0, 0.95))
+        self.bindings.bind(state, part(progress, 0.0, 0.95))
         if len(state.fixed) or state.handles:
             self.constrained(state)
         tell(progress, 1.0, "ready")
@@ -166,12 +123,12 @@ class Poses:
             places = self.fixed_places(state) - shift[state.fixed]
             key = places.tobytes()  # as it is a new array each time
         held = tuple(state.handles.values())
-        inputs = self.bind(state), state.fixed, key, held, *_volumes(state).values()
+        inputs = self.bindings.bind(state), state.fixed, key, held, *_volumes(state).values()
         return self.memo.get("held", inputs, partial(self.held, state, places))
 
     def held(self, state: State, fixed_at: FloatArray | None) -> Deformer:
         """Return a deformer with the constraints of *state*, its fixed vertices at *fixed_at*."""
-        return self.bind(state).hold(
+        return self.bindings.bind(state).hold(
             fixed=state.fixed, handle=state.handle, fixed_at=fixed_at, **_volumes(state)
         )
 
@@ -254,7 +211,7 @@ class Poses:
             return self.mesh.vertices
         if pose.finished is not None:
             return pose.finished.vertices
-        if not self.is_bound(state):
+        if not self.bindings.is_bound(state):
             return None
         inputs = state.regions, state.cages, pose.cage_vertices
         known: FloatArray | None = self.memo.find("surface", inputs)
@@ -272,12 +229,12 @@ class Poses:
         """Return a deformer with the W~ of *cages*: those of the pose keep that of their solve."""
         pose = state.pose
         if pose is None or cages is not pose.cage_vertices or pose.on(state.stiffness) is pose:
-            return self.bind(state)
-        return self.bind(replace(state, stiffness=pose.stiffness))
+            return self.bindings.bind(state)
+        return self.bindings.bind(replace(state, stiffness=pose.stiffness))
 
     def rotations(self, state: State, cages: Cages) -> FloatArray:
         """Return `Deformer.rotations`, (n, 3, 3) float."""
-        rotations = partial(self.bind(state).rotations, cages)
+        rotations = partial(self.bindings.bind(state).rotations, cages)
         return self.memo.get("rotations", (state.regions, cages), rotations, _KEPT)
 
     def shift(self, state: State) -> FloatArray | None:
@@ -345,12 +302,6 @@ class Poses:
             return lids, total_volume(self.mesh, lids)
 
         return self.memo.get("enclosed", (wanted,), enclosed, most=3)  # None, True, False
-
-
-def _binding(state: State) -> tuple[Any, ...]:
-    """Return the inputs of a bound deformer."""
-    options = state.options
-    return state.regions, state.cages, options.stretch, options.rotation_groups
 
 
 def _volumes(state: State) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from ..errors import RegionError
 from ..mesh import Mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
+from .bindings import Stiffened
 from .poses import Poses
 from .state import Options, State
 
@@ -28,7 +29,9 @@ class Preparation(NamedTuple):
     regions: Regions
     cages: tuple[Cage, ...]
     deformer: Deformer
-    """Bound to them."""
+    """Bound to them, with the same stiffness all over."""
+    stiffened: Stiffened | None = None
+    """The same with the stiffness of the session, if it has one."""
 
 
 def preparation(poses: Poses, state: State, progress: Progress | None = None) -> Preparation:
@@ -39,10 +42,10 @@ def preparation(poses: Poses, state: State, progress: Progress | None = None) ->
         regions = segment(mesh, None, progress=first, **following(mesh, state))
     state = replace(state, regions=regions)
     cages = state.cages or fitted(mesh, state, part(progress, _SEGMENTED, _FITTED))
-    state = State(regions, cages, options=state.options)
-    deformer = Poses(mesh).bind(state, part(progress, _FITTED, 1.0))
+    own, state = poses.bindings.snapshot(), replace(state, cages=cages)
+    own.bind(state, part(progress, _FITTED, 1.0))
     _ = mesh.adjacency, poses.lids(state)  # the first frame needs them
-    return Preparation(regions, cages, deformer)
+    return Preparation(regions, cages, own.bound(state), own.stiffened(state))
 
 
 def following(mesh: Mesh, state: State) -> dict[str, Any]:
@@ -58,9 +61,15 @@ def held_firmly(state: State) -> IntArray:
     return np.concatenate([state.fixed, *own])
 
 
+def adopt(poses: Poses, options: Options, preparation: Preparation) -> None:
+    """Let *poses* use what is bound in a *preparation* that was made with *options*."""
+    regions, cages, deformer, stiffened = preparation
+    poses.bindings.adopt(State(regions, cages, options=options), deformer, stiffened)
+
+
 def fits(mesh: Mesh, state: State, preparation: Preparation) -> bool:
     """Return whether *state* has no other regions and cages than *preparation*."""
-    regions, cages, deformer = preparation
+    regions, cages, deformer, _ = preparation
     has_others = state.regions not in (None, regions) or state.cages not in ((), cages)
     return deformer.mesh is mesh and not has_others
 

@@ -192,9 +192,9 @@ class SavedPoses(Mapping[str, State]):
         if pose.finished is not None:
             return np.asarray(pose.finished.vertices[vertices])
         state = self._history.state
-        if not (has_cages(state, saved) and self._poses.is_bound(state)):
+        if not (has_cages(state, saved) and self._poses.bindings.is_bound(state)):
             return None
-        rows = self._poses.bind(state).subspace.at(vertices)
+        rows = self._poses.bindings.bind(state).subspace.at(vertices)
         return np.asarray(rows @ np.concatenate(pose.cage_vertices))
 
     def blend(
@@ -256,7 +256,7 @@ class SavedPoses(Mapping[str, State]):
         poses, mesh = self._poses, self._poses.mesh
         point = SurfacePoint.at_vertex(pulls.middle_vertex(mesh, state.handles[name]))
         grip = pulls.Grip(point, checked_radius(mesh, None), None, None, 0.0, turns=False)
-        here = pulls.grasp(poses.bind(state), state, poses.vertices(state), grip).state
+        here = pulls.grasp(poses.bindings.bind(state), state, poses.vertices(state), grip).state
         assert here.pose is not None
         targets = {**here.pose.targets, name: places}
         pose, solution = solving.solve(poses, here, targets, max_steps, live=True)

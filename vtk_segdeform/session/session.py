@@ -58,7 +58,7 @@ from ..importing import imported
 from ..mesh import Mesh, SurfacePoint, require_mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
-from ..solver import Solution, Status
+from ..solver import Bodies, Solution, Status
 from . import finishing, handles, naming, output, painting, preparing, pulls, separating, solving
 from .carried import SessionCarried
 from .finishing import FinishedPose
@@ -307,7 +307,7 @@ class Session(Described):
     @property
     def is_bound(self) -> bool:
         """Whether the cages are bound, so that the first move of a drag need not wait."""
-        return self.poses.is_bound(self.state)
+        return self.poses.bindings.is_bound(self.state)
 
     @property
     def what_next(self) -> str:
@@ -409,7 +409,7 @@ class Session(Described):
 
         Its `subspace` is W~ of the mesh.  The session solves with copies, so use it to read only.
         """
-        return self.poses.bind(self.state)
+        return self.poses.bindings.bind(self.state)
 
     def preparation(self, progress: Progress | None = None) -> Preparation:
         """Return the regions and cages that the session lacks, bound, without changing it.
@@ -426,8 +426,7 @@ class Session(Described):
         require(preparation, Preparation, "preparation")
         if not preparing.fits(self.mesh, self.state, preparation):
             return False
-        regions, cages, deformer = preparation
-        self.poses.adopt(State(regions, cages, options=self.options), deformer)
+        preparing.adopt(self.poses, self.options, preparation)
         self.history.amend(partial(preparing.prepared, preparation))
         return True
 
@@ -573,7 +572,8 @@ class Session(Described):
         grasp = before
         if grasp is None or (turns and not grasp.grip.turns):
             grip = pulls.Grip(point, radius, locality, limb, hinge, turns)
-            grasp = pulls.grasp(self.poses.bind(start), start, self.poses.vertices(start), grip)
+            bound = self.poses.bindings.bind(start)
+            grasp = pulls.grasp(bound, start, self.poses.vertices(start), grip)
             if before is not None:  # the handle becomes a patch, of the shape that it has now
                 grasp = pulls.as_it_is(grasp, self.turned(), self.vertices)
         targets = grasp.targets(motion)
@@ -664,13 +664,25 @@ class Session(Described):
         grip = _Placed(pose, tuple(places))
         self.history.move(replace(self.state, pose=pose), name, grip=grip)
 
+    @property
+    def volume_names(self) -> tuple[str, ...]:
+        """The names of `volumes`; none before the cages are bound."""
+        enclosing = self.poses.bindings.enclosing_now(self.state)
+        return () if enclosing is None else enclosing.volume_names
+
+    @property
+    def bodies(self) -> Bodies | None:
+        """The bodies of the mesh; None before the cages are bound."""
+        enclosing = self.poses.bindings.enclosing_now(self.state)
+        return None if enclosing is None else enclosing.bodies
+
     def volumes(self) -> dict[str, float]:
         """Return all volumes of the pose by name, in the mesh's unit cubed; see `Deformer`."""
-        return self.deformer.volumes(self.vertices)
+        return self.poses.bindings.enclosing(self.state).volumes(self.vertices)
 
     def volume(self, name: str) -> tuple[float, float]:
         """Return one of `volumes`, and (V - V0) / V0."""
-        return self.deformer.volume(name, self.vertices)
+        return self.poses.bindings.enclosing(self.state).volume(name, self.vertices)
 
     def set_part(self, name: str, vertices: ArrayLike | None) -> None:
         """Let the part *vertices* of the surface have a volume called *name*, under a lid.
@@ -690,11 +702,11 @@ class Session(Described):
             after = replace(after, options=replace(self.options, volumes=goals))
             self.history.step(f"remove the volume of {name}", after)
             return
-        if name in self.poses.bind(after).volume_names:
+        if name in self.poses.bindings.bind(after).volume_names:
             raise ConstraintError(f"there is a volume {name!r} already; choose another name")
         after = replace(after, parts=(*others, *owned_parts(self.mesh, ((name, vertices),))))
         try:
-            self.poses.bind(after).volume(name)
+            self.poses.bindings.bind(after).volume(name)
         except ConstraintError as fault:
             raise ConstraintError(f"vertices: {fault}") from None
         self.history.step(f"add the volume of {name}", after)

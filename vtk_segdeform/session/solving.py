@@ -159,7 +159,7 @@ def _with_rest_volume(poses: Poses, state: State, cage_vertices: Cages) -> Cages
     pairs = zip(cage_vertices, state.cages, strict=True)
     outward = np.concatenate([volume_gradient(p, cage.faces) for p, cage in pairs])
     outward /= max(np.abs(outward).max(), np.finfo(float).tiny)
-    deformer = poses.bind(state)
+    deformer = poses.bindings.bind(state)
     path = np.hstack([deformer.surface(cage_vertices), deformer.subspace.map(outward)])
     p = np.concatenate(cage_vertices) + volume.exact_step(path) * outward
     require_near(poses.mesh, p, "cage vertices that preserve the volume")
@@ -173,7 +173,7 @@ def carried(poses: Poses, state: State, x: FloatArray, progress: Progress | None
     most, and among cages as near to the mesh as `require_near` asks for.  It binds *state*, and may
     run in another thread, as `Poses.bind`.
     """
-    deformer, mesh = poses.bind(state, progress), poses.mesh
+    deformer, mesh = poses.bindings.bind(state, progress), poses.mesh
     held = np.concatenate([state.fixed, state.handle])
     every = np.arange(mesh.n_vertices)
     some = [each[:: max(1, len(each) // 4000)] for each in (every, held)]

@@ -533,11 +533,11 @@ def _settle(controller: Controller) -> None:
 def _checked_part(controller: Controller, part: str | None) -> str:
     """Return *part* if it has a volume."""
     session = controller.session
-    if not session.is_bound:
+    if session.bodies is None:
         raise SessionError("The mesh is not ready yet. Wait until it is prepared")
     if part is None:
         raise ConstraintError("Point at a part of the surface, or select a handle")
-    if part not in session.deformer.volume_names:
+    if part not in session.volume_names:
         raise ConstraintError(
             f"{volume_label(session.state.region_names, part)} encloses no volume"
         )
@@ -675,10 +675,10 @@ def is_locked(session: Session, body: BoolArray) -> bool:
 
 def _body_under_pointer(controller: Controller, verb: str) -> tuple[BoolArray, str]:
     session = controller.session
-    if not session.is_bound:
+    bodies, components = session.bodies, session.mesh.components
+    if bodies is None:
         raise SessionError("The mesh is not ready yet. Wait until it is prepared")
     spot = controller.widgets.spot_at(controller.view.pointer(Phase.HOVER))
-    bodies, components = session.deformer.bodies, session.mesh.components
     number = -1 if spot is None else int(bodies.of_component[components[spot.vertex]])
     if number < 0:
         raise ConstraintError(f"Point at the body to {verb}")

@@ -456,7 +456,7 @@ class Controller:
         Another mode continues a preparation, but its result waits for mode PULL.
         """
         if self._is_on and not self.is_busy:
-            self._preparing.update(self.session, start=self._mode is Mode.PULL, again=again)
+            self._preparing.update(self.session, start=self._is_pulling, again=again)
             if self._mode is Mode.PULL and self._preparing.fraction is not None:
                 Draft.of(self.view).begin(if_slow=True)
 
@@ -464,7 +464,12 @@ class Controller:
         """Return whether the session may be prepared now: nothing is being pulled or painted."""
         session = self.session
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
-        return self._mode is Mode.PULL and not (self.is_busy or session.is_dragging or is_pulling)
+        return self._is_pulling and not (self.is_busy or session.is_dragging or is_pulling)
+
+    @property
+    def _is_pulling(self) -> bool:
+        """Whether the mode is PULL, or DEFORM with cages: other ones, if the stiffness changed."""
+        return self._mode is Mode.PULL or (self._mode is Mode.DEFORM and bool(self.session.cages))
 
     def is_free(self) -> bool:
         """Return whether nothing is being dragged, refined or computed."""

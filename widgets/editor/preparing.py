@@ -4,9 +4,9 @@
     another thread      ->  its result, from a snapshot of the session
     `Session.accept`    ->  here, once no gesture runs; no undo step
 
-A stage is cancelled if its inputs change: the mesh, the regions, the cages or the options of the
-binding.  A stage that failed, or that the user has cancelled, is not repeated for the same inputs
-unless requested.
+A stage is cancelled if its inputs change: the mesh, the regions, the cages, the stiffness or the
+options of the binding.  A stage that failed, or that the user has cancelled, is not repeated for
+the same inputs unless requested.
 
 A new mesh gets a `StandIn` first, which can be pulled long before the session is bound.
 """
@@ -21,7 +21,7 @@ from typing import Any
 from vtk_segdeform.errors import Cancelled, SegDeformError, SessionError
 from vtk_segdeform.kernels import load_for
 from vtk_segdeform.progress import Progress, part
-from vtk_segdeform.session import Preparation, Session, StandIn
+from vtk_segdeform.session import Preparation, Session, StandIn, same_inputs
 
 from .messages import error_text
 from .queue import Kind, Queue, Task
@@ -119,10 +119,11 @@ class Preparing:
         if again:
             self._declined = ()
         if self._queue.task(Kind.PREPARE) is not None:
-            if inputs == self._inputs:
+            if same_inputs(inputs, self._inputs):
                 return
             self.interrupt()
-        if start and inputs != self._declined and not session.is_bound:
+        is_declined = same_inputs(inputs, self._declined)
+        if start and not (is_declined or session.is_bound):
             self._inputs = inputs
             made = None if self.stand_in(session) is not None else self._stand_ins.append
             task = Task(
@@ -153,7 +154,7 @@ class Preparing:
 
     def _finish(self, session: Session, result: Preparation) -> None:
         self._stand_ins = []
-        if _key(session) == self._inputs:
+        if same_inputs(_key(session), self._inputs):
             self._accept(session, result)
         self._ended()
 
@@ -169,5 +170,7 @@ class Preparing:
 
 def _key(session: Session) -> tuple[Any, ...]:
     """Return the inputs of a preparation; two are equal exactly if its result is the same."""
-    regions, cages, options = session.regions, session.cages, session.options
-    return session.mesh, regions, cages, options.stretch, options.rotation_groups, options.offset
+    state, options = session.state, session.options
+    of_cages = state.regions, state.cages, options.offset
+    return (session.mesh, *of_cages, options.stretch, options.rotation_groups, options.symmetry,
+            state.stiffness)  # fmt: skip

@@ -16,7 +16,7 @@ def menu(editor: DeformEditor) -> tuple[Field | None, ...]:
     region, handle, is_posed = spot.region, spot.handle, session.state.pose is not None
     part = "" if region is None else f"region {region}"
     name = "this part" if region is None else session.painting.name(region)
-    has_volume = session.is_bound and part in session.deformer.volume_names
+    has_volume = part in session.volume_names
     is_rigid = region is not None and stiffness_of(session, [region]) == "inf"
     is_fixed = spot.vertex in session.fixed
     lock: tuple[Field, ...] = ()

@@ -38,8 +38,8 @@ _bodies: WeakKeyDictionary[Session, Bodies] = WeakKeyDictionary()
 def volumes_section(editor: DeformEditor) -> Section:
     """Return the volume that is chosen, with its goal, and the plane of symmetry."""
     session, controller = editor.session, editor.controller
-    is_ready = session.is_bound and session.has_volume
-    names = (*session.deformer.volume_names, *_OTHERS) if is_ready else ()
+    names = session.volume_names if session.has_volume else ()
+    names = (*names, *_OTHERS) if names else ()
     name = _chosen.get(controller, "whole")
     name = name if name in names else next(iter(names), "")
     volume, change = session.volume(name) if name else (0.0, 0.0)
@@ -130,8 +130,8 @@ def volumes_section(editor: DeformEditor) -> Section:
 def bodies_section(editor: DeformEditor) -> Section:
     """Return the largest bodies, if there are several, and what they follow."""
     session, name = editor.session, _chosen.get(editor.controller, "")
-    if session.is_bound:
-        _bodies[session] = session.deformer.bodies
+    if session.bodies is not None:
+        _bodies[session] = session.bodies
     bodies = _bodies.get(session)  # they are the same while other cages are being bound
     count, shown = 0, dict[str, int | None]()
     if bodies is not None:
@@ -218,7 +218,7 @@ def _row(editor: DeformEditor, name: str, component: int | None, *, is_chosen: b
     if component is not None:
         shown = only is None or bool(only[own].any())
         locked = actions.is_locked(session, own)
-    if session.is_bound:
+    if session.bodies is not None:
         share = editor.widgets.overlay.region_volumes.change(name)
         rest = float(bodies.volumes[int(name.rpartition(" ")[2])])
         volume, change = f"{rest * (1.0 + share):.4g}", in_tenths(share)

@@ -65,13 +65,13 @@ class RegionVolumes:
 
     def _part(self, name: str) -> _Own | None:
         kind, _, number = name.rpartition(" ")
-        owned, bodies = self._owned(), self._session.deformer.bodies
+        owned, bodies = self._owned(), self._session.bodies
         source = owned.get(int(number)) if kind == "region" else bodies
         if source is None:
             return None
         known = self._parts.get(name)
         if known is None or known[0] is not source:
-            whole = bodies.body(int(number)) if isinstance(source, Bodies) else source
+            whole = source.body(int(number)) if isinstance(source, Bodies) else source
             known = self._parts[name] = source, _Own.of(whole)
         return known[1]
 

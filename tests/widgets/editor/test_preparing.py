@@ -16,12 +16,14 @@ from numpy.testing import assert_array_equal
 from scenes import sausage
 
 from vtk_segdeform import Regions, Session, load_session, sizes
+from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.errors import CageError
 from vtk_segdeform.geometry import signed_volume
 from vtk_segdeform.io.convert import write_mesh
 from vtk_segdeform.session import Preparation, StandIn
 from vtk_segdeform.widgets import DeformEditor, Mode
 from vtk_segdeform.widgets.editor import actions, controller, queue, saving
+from vtk_segdeform.widgets.panel.volumes import volumes_section
 
 
 @pytest.fixture(scope="module")
@@ -472,3 +474,39 @@ def test_removing_the_editor_does_not_wait(bench):
     assert not bench.editor.is_preparing
     bench.hand.tick(3)
     assert bench.session.regions is None
+
+
+@pytest.mark.parametrize("mode", [Mode.PULL, Mode.DEFORM])
+def test_another_stiffness_is_bound_in_the_background_while_volumes_are_shown(mode, monkeypatch):
+    scene, threads, stiffened = sausage(is_coarse=True), [], Deformer.stiffened
+    session = scene.session("tip")
+    session.bind()
+
+    def noted(deformer, stiffness):
+        threads.append(threading.current_thread())
+        return stiffened(deformer, stiffness)
+
+    monkeypatch.setattr(Deformer, "stiffened", noted)
+    editor = DeformEditor(plain_view(), session)
+    draw_seldom(editor.view)
+    hand = Hand(editor.view)
+    editor.mode = mode
+    editor.On()
+    names = session.volume_names
+    session.set_stiffness(1.0 + 9.0 * (session.regions.labels == 1))
+    assert not session.is_bound
+    section = volumes_section(editor)
+    assert (session.volume_names, bool(names)) == (names, True)
+    assert next(f for f in section.fields if f.name == "volumes.name").enabled
+    end = time.monotonic() + 20.0
+    while not session.is_bound:
+        assert time.monotonic() < end, "waited in vain"
+        hand.tick()
+    session.drag({"tip": session.mesh.vertices[session.handles["tip"]] + [0.0, 0.0, 0.2]})
+    session.history.undo()
+    session.history.undo()
+    assert session.is_bound  # what was bound before is kept
+    assert threads
+    assert threading.main_thread() not in threads
+    assert hand.failures == []
+    editor.remove()
