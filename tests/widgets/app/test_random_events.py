@@ -31,6 +31,11 @@ KINDS = [0.15, 0.35, 0.15, 0.15, 0.05, 0.12, 0.018, 0.01, 0.002]
 HELD = Qt.NoModifier, Qt.NoModifier, Qt.NoModifier, Qt.ShiftModifier, Qt.ControlModifier
 
 
+@pytest.fixture(scope="module")
+def bound_once_in_memory() -> None:
+    """Keep no bindings for other tests: they are 100 MB after 20,000 events."""
+
+
 class Anywhere:
     """A hand that moves all over the window, and draws its actions at random.
 
