@@ -45,10 +45,14 @@ def held() -> Deformer:
     return SCENE.deformer().hold(handle=[HIGH])
 
 
-def chain(count: int = 12) -> SurfaceSamples:
-    """Return samples along a line, one apart, whose weights are the diagonal of `quadratic`."""
+def chain(count: int = 12, forks: dict[int, int] | None = None) -> SurfaceSamples:
+    """Return samples along a line, one apart, whose weights are the diagonal of `quadratic`.
+
+    With *forks*, some of them are joined to others than the ones before.
+    """
     i = np.arange(count - 1)
-    edges = sparse.coo_array((np.ones(count - 1), (i, i + 1)), (count, count)).tocsr()
+    before = np.array([(forks or {}).get(k + 1, k) for k in range(count - 1)])
+    edges = sparse.coo_array((np.ones(count - 1), (before, i + 1)), (count, count)).tocsr()
     points = np.stack([np.arange(count), *np.zeros((2, count))], axis=1)
     share = np.full(count, 1.0 / count)
     faces = np.empty((0, 3), dtype=np.int64)
@@ -490,6 +494,19 @@ def test_weights_grow_with_the_distance_to_the_largest_one():
         expected = np.minimum(np.maximum((away / reach) ** 2 - 1.0, 0.0) ** 2, 1e4)
         assert_allclose(weights, expected)
     assert samples.weights([SurfacePoint.at_vertex(0)], np.inf, 0.0).tolist() == [0.0] * 25
+
+
+def test_the_room_beyond_a_joint_is_a_fifth_as_long_up_other_limbs():
+    """Limbs 0 to 10 and 12 to 22 meet at 11, at the end of a longer one, 11 and 23 to 40."""
+    fork, tip = chain(41, forks={23: 11}), SurfacePoint.at_vertex(0)
+    weights = fork.weights([tip], 8.0, 0.0, 6.0)
+    beyond = np.arange(1.0, 7.0)  # 6 to 11
+    away = [np.zeros(6), beyond, 6.0 + 5.0 * np.arange(1.0, 12.0), 6.0 + np.arange(1.0, 19.0)]
+    expected = np.maximum((0.75 + np.concatenate(away) / 8.0) ** 2 - 1.0, 0.0) ** 2
+    assert_allclose(weights, expected)
+    both = fork.weights([tip, SurfacePoint.at_vertex(22)], 8.0, 0.0, 6.0)
+    assert_allclose(both[:12], expected[:12])
+    assert_allclose(both[12:23], expected[:11][::-1])
 
 
 def test_a_point_of_an_edge_is_as_far_as_its_nearer_corner():

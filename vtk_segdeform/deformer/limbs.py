@@ -117,6 +117,11 @@ class Levels:
             inner[x] = min(inner[last], f[x])
         return cls(f, np.array(inner), float(f[p]))
 
+    @property
+    def up(self) -> FloatArray:
+        """f - m, (s,): how far each point is up another limb than p."""
+        return self.f - self.inner
+
     def within(self, depth: float) -> BoolArray:
         """Return the points of the limb whose joint has this *depth*, (s,)."""
         return np.asarray(self.inner > self.start - depth)
