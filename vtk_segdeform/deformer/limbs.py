@@ -119,7 +119,7 @@ class Levels:
 
     @property
     def up(self) -> FloatArray:
-        """f - m, (s,): how far each point is up another limb than p."""
+        """How far each point is up another limb than p, (s,): f - m."""
         return self.f - self.inner
 
     def within(self, depth: float) -> BoolArray:

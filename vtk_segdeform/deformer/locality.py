@@ -14,7 +14,7 @@ The reach of a pull ends with the limb that is grabbed: a head is turned without
 All of the limb is free; see `limbs`.  Its extent L is the reach, and d is L + the distance from
 where it has faded, L / 4 beyond its joint: in this room it bends.  Without it, triangles were
 distorted by 15 to 25 % more on four bodies.  Up other limbs the room is a fifth as long: a finger
-that was bent by 50 degrees moved others by up to 0.25 % of the height of three hands, now by 0.03 %.
+bent by 50 degrees moved others by up to 0.25 % of the height of three hands, now by 0.03 %.
 
 What lies beyond the reach may fall into several parts: who grabs an elbow divides the hand from the
 body.  Parts that are small beside the largest one follow the grabbed point, too.
