@@ -51,11 +51,14 @@ class Contraction:
     def of_surface(self, sampled: SampledOperators, stretch: float, n: int) -> FloatArray:
         """Return the gradient (n,) of detail and stretch, with weight *stretch* of the latter."""
         operators, _, rows, own, sample = sampled
-        a, b = rows.map(self.ahead), rows.map(self.beside)
-        r, twists = self.rotations[own], self.twists[own]
-        bent = self._bent(sampled, a, b, r, twists)
-        flat = self._flat(sampled, a, b, r, twists)
-        weights = operators.weights
+        here = replace(
+            self,
+            ahead=rows.map(self.ahead),
+            beside=rows.map(self.beside),
+            rotations=self.rotations[own],
+            twists=self.twists[own],
+        )
+        bent, flat, weights = here._bent(sampled), here._flat(sampled), operators.weights
         trace = float(weights @ bent[:, 1])
         ratio = stretch * trace / float(weights @ flat[:, 1])
         found = _normalised(bent, weights) + ratio * _normalised(flat, weights)
@@ -64,17 +67,13 @@ class Contraction:
             return found
         return np.asarray(np.bincount(sample.ids, sample.weights * found, minlength=n))
 
-    def _bent(
-        self,
-        sampled: SampledOperators,
-        a: FloatArray,
-        b: FloatArray,
-        rotations: FloatArray,
-        twists: FloatArray,
-    ) -> FloatArray:
-        """Return the detail of each vertex in T and in the trace, (k, 2), for a factor of 1."""
+    def _bent(self, sampled: SampledOperators) -> FloatArray:
+        """Return the detail of each vertex in T and in the trace, (k, 2), for a factor of 1.
+
+        What T has of cages and clusters, self has of the vertices.
+        """
         operators, c = sampled.operators, sampled.operators.laplacian
-        a, b = c @ a, c @ b
+        a, b = c @ self.ahead, c @ self.beside
         squares = np.empty((len(a), 2))
         for piece in row_pieces(len(a), sampled.rows.n_columns):
             normals = sampled.rows.premultiplied(c[piece.start : piece.stop])
@@ -82,35 +81,29 @@ class Contraction:
         squares[:, 0] += np.einsum("na,na->n", a, b)
         squares *= (0.25 / operators.areas)[:, None]
         delta = operators.delta
-        squares[:, 0] -= 0.5 * np.einsum("na,nab,nb->n", b[:, :3], rotations, delta)
-        squares[:, 0] -= 0.5 * np.einsum("na,nab,nb->n", a[:, :3], twists, delta)
+        squares[:, 0] -= 0.5 * np.einsum("na,nab,nb->n", b[:, :3], self.rotations, delta)
+        squares[:, 0] -= 0.5 * np.einsum("na,nab,nb->n", a[:, :3], self.twists, delta)
         return np.asarray(squares * (operators.bends > 0.0)[:, None])
 
-    def _flat(
-        self,
-        sampled: SampledOperators,
-        a: FloatArray,
-        b: FloatArray,
-        rotations: FloatArray,
-        twists: FloatArray,
-    ) -> FloatArray:
+    def _flat(self, sampled: SampledOperators) -> FloatArray:
         """Return the stretch of each vertex likewise."""
         surface, rows = sampled.surface, sampled.rows
-        found = np.zeros((len(a), 2))
+        motions = surface.vertices, self.ahead, self.beside
+        found = np.zeros((len(surface.vertices), 2))
         for piece in row_pieces(len(surface.faces), 6 * rows.n_columns):
             faces, half = surface.faces[piece], 0.5 * surface.cotangents[piece]
             ends = faces[:, [1, 2, 0]], faces[:, [2, 0, 1]]
             at_corners = rows.at(faces.ravel()).reshape(len(faces), 3, -1)
             apart = (at_corners[:, [1, 2, 0]] - at_corners[:, [2, 0, 1]]) ** 2
             each = np.einsum("fe,fem->fm", half, apart) @ self._of_squares
-            x, a_apart, b_apart = (y[ends[0]] - y[ends[1]] for y in (surface.vertices, a, b))
-            each[:, 0] += np.einsum("fe,fea,fea->f", half, a_apart, b_apart)
+            x, a, b = (y[ends[0]] - y[ends[1]] for y in motions)
+            each[:, 0] += np.einsum("fe,fea,fea->f", half, a, b)
             of_corners = np.repeat(each[:, None], 3, axis=1)
-            for by, turned in ((b_apart, rotations), (a_apart, twists)):
+            for by, turned in ((b, self.rotations), (a, self.twists)):
                 stretched = np.einsum("fe,fea,feb->fab", half, by[..., :3], x)
                 of_corners[..., 0] -= np.einsum("fab,fcab->fc", stretched, turned[faces])
             for k in range(2):
-                found[:, k] += np.bincount(faces.ravel(), of_corners[..., k].ravel(), len(a))
+                found[:, k] += np.bincount(faces.ravel(), of_corners[..., k].ravel(), len(found))
         return found / 3.0
 
     def of_interior(
