@@ -54,8 +54,6 @@ class Spline:
     ----------
     bending : (k, k) float
         B: u^T B u is the bending energy of the spline with the values u (k,), up to a factor.
-    deviations : (k,) float
-        The standard deviation of the value at each centre given the others, up to a factor.
     """
 
     def __init__(self, centres: FloatArray, smoothing: FloatArray) -> None:
@@ -69,8 +67,6 @@ class Spline:
         matrix[np.arange(k), np.arange(k)] += smoothing
         self._inverse = linalg.pinvh(matrix, rtol=_RANK)[:, :k]
         self.bending = self._inverse[:k]
-        least = np.finfo(float).tiny
-        self.deviations = 1.0 / np.sqrt(np.maximum(np.diag(self._inverse), least))
 
     def _basis(self, points: FloatArray) -> FloatArray:
         x = (points - self._middle) / self._size
@@ -79,11 +75,12 @@ class Spline:
         return np.hstack([phi, np.ones((len(x), 1)), x])
 
     def at(self, points: FloatArray, values: FloatArray) -> FloatArray:
-        """Return s of the *values* (k, 3) of the centres at *points* (n, 3)."""
+        """Return s of the *values* (k, c) of the centres at *points* (n, 3), (n, c)."""
         factors = self._inverse @ values
         size = max(_PIECE // len(factors), 1)
         pieces = [points[i : i + size] for i in range(0, len(points), size)]
-        return np.concatenate([np.empty((0, 3)), *(self._basis(q) @ factors for q in pieces)])
+        none = np.empty((0, factors.shape[1]))
+        return np.concatenate([none, *(self._basis(q) @ factors for q in pieces)])
 
 
 def smoothing_of(centres: FloatArray, values: FloatArray, sigma: FloatArray) -> FloatArray:
@@ -117,7 +114,7 @@ class Compact:
     Parameters
     ----------
     centres : (k, 3) float
-    values : (k, 3) float
+    values : (k, c) float
     sigma : (k,) float
         Standard deviations of the values.
     """
