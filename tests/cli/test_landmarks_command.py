@@ -9,7 +9,8 @@ import pytest
 import pyvista as pv
 from numpy.testing import assert_allclose
 
-from vtk_segdeform import models
+from vtk_segdeform import landmarks, models
+from vtk_segdeform.cli import fitting
 from vtk_segdeform.cli.main import main
 from vtk_segdeform.io import read_mesh, read_points, write_mesh
 from vtk_segdeform.landmarks import Landmarks, read_landmarks, write_landmarks
@@ -65,6 +66,19 @@ def test_the_mesh_and_what_is_carried_grow_alike(words, tmp_path, capsys):
     assert [row["name"] for row in rows] == [f"L{k}" for k in range(1, 12)]
     assert max(float(row["residual"]) for row in rows) < 1e-9
     assert all(float(row["left out"]) < 1e-6 for row in rows)
+
+
+def test_contact_is_avoided_by_an_option(words, monkeypatch):
+    given = []
+
+    def fit_landmarks(*arguments, **options):
+        given.append(options["avoid_contact"])
+        return landmarks.fit_landmarks(*arguments, **options)
+
+    monkeypatch.setattr(fitting, "fit_landmarks", fit_landmarks)
+    assert main(words) == 0
+    assert main([*words, "--avoid-contact"]) == 0
+    assert given == [False, True]
 
 
 def test_landmarks_slide_along_a_surface_and_a_curve_by_their_names(words, tmp_path, capsys):

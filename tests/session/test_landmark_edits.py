@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from vtk_segdeform import load_session, save_session
 from vtk_segdeform.errors import Cancelled, ConstraintError, MeshError
 from vtk_segdeform.mesh import SurfacePoint
-from vtk_segdeform.session import Change, Session
+from vtk_segdeform.session import Change, Session, landmark_edits
 
 pytestmark = pytest.mark.usefixtures("bound_once")
 SCENE = sausage(is_coarse=True)
@@ -81,6 +81,22 @@ def test_a_fit_is_one_step_that_later_drags_continue_from():
     assert [session.undo() for _ in range(2)][-1] == "fit landmarks"
     assert_array_equal(session.vertices, X)
     assert not session.options.volumes
+
+
+@pytest.mark.parametrize("avoid", [False, True])
+def test_a_fit_avoids_contact_if_the_session_does(monkeypatch, avoid):
+    given = []
+
+    def fit(*arguments, **options):
+        given.append(options["avoid_contact"])
+        raise Cancelled
+
+    monkeypatch.setattr(landmark_edits, "fit_landmarks", fit)
+    session = with_targets()
+    session.change_options(avoid_contact=avoid)
+    with pytest.raises(Cancelled):
+        session.landmarks.fit()
+    assert given == [avoid]
 
 
 def test_a_session_without_cages_gets_them_by_the_fit_and_a_cancelled_one_changes_nothing():

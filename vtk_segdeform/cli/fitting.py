@@ -75,6 +75,7 @@ def landmarks(options: Namespace, say: Say, progress: Progress) -> bool:
             uncertainty=np.where(np.isnan(given), options.uncertainty, given),
             slides=[([pairs.names.index(name) for name in own], on) for own, on in sliding],
             volume=options.volume,
+            avoid_contact=options.avoid_contact,
             n_regions=options.regions,
             n_cage_vertices=options.cage_vertices,
             progress=progress,
@@ -146,7 +147,8 @@ def _report(fit: LandmarkFit, pairs: Pairs, say: Say) -> None:
         f"landmarks       {len(away)}, off by {_rms(away):.3g} root mean square, at most "
         f"{away[worst]:.3g}: {pairs.names[worst]}"
     )
-    text = "grown, not bent" if not fit.stiffness else f"bent, stiffness {fit.stiffness:g}"
+    bent = [f"{100.0 * part:.0f} % by stiffness {k:g}" for k, part in fit.shares.items() if k]
+    text = f"bent {', '.join(bent)}" if bent else "grown, not bent"
     one, other = _rms(fit.left_out), _rms(fit.left_out_spline)
     say(f"left out        off by {one:.3g} ({text}); by a thin-plate spline {other:.3g}")
     if crossings := len(fit.crossings()):

@@ -476,6 +476,8 @@ def _landmarks(parser: argparse.ArgumentParser) -> None:
     add("--slide", type=_slide, action="append", default=[], metavar="NAMES=FILE", help=text)
     text = "keep, a volume, or a change such as +5%% (default: free)"
     add("--volume", default="free", metavar="GOAL", help=text)
+    text = "separate parts that cross in the fit and do not at rest"
+    add("--avoid-contact", action="store_true", help=text)
     text = "move another surface, points, curves, a grid or landmarks along; may be repeated"
     add("--carry", type=_carried, action="append", default=[], metavar="IN=OUT", help=text)
     text = "write the error of every landmark"

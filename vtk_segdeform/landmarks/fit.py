@@ -30,6 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -37,12 +38,15 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray, as_numbers, as_points
+from ..checks import as_flag
 from ..deformer import Deformer, SpringBody, SpringPose, checked_goals, regions_and_cages
 from ..errors import ArgumentError, ConstraintError
+from ..finish import CellEnergy, Finisher
 from ..geometry import rigid_fit
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, part, tell
+from ..subspace import blend_at
 from .semilandmarks import checked_slides, slid
 from .spline import CENTRES, Compact, Spline, smoothing_of
 
@@ -53,7 +57,7 @@ LEAST_PAIRS = 3
 """Of a fit: fewer do not tell how a body is turned."""
 _GROUPS = 12  # of landmarks that are left out, at most
 _DRAWS = 1000  # of samples of the landmarks: shares are exact to 1.6 %
-_BOUND, _TESTED, _FITTED = 0.3, 0.75, 0.85  # of the progress
+_BOUND, _TESTED, _FITTED, _APART = 0.3, 0.75, 0.85, 0.9  # of the progress
 _Map: TypeAlias = Callable[[FloatArray | None], FloatArray]
 _WORDS = {0: "", 1: "at least ", -1: "at most "}
 
@@ -108,6 +112,7 @@ def fit_landmarks(
     uncertainty: ArrayLike = 0.0,
     slides: Sequence[tuple[ArrayLike, Mesh | ArrayLike]] = (),
     volume: str | float = "free",
+    avoid_contact: bool = False,
     n_regions: int | None = None,
     n_cage_vertices: int | None = None,
     progress: Progress | None = None,
@@ -131,6 +136,10 @@ def fit_landmarks(
     volume : str or float
         "free", "keep", or a goal such as "+5%" or a number, as of "whole" of `Deformer`; of an open
         surface that under lids.  The landmarks are then met as nearly as the cages can.
+    avoid_contact : bool
+        Separate parts and shells that cross in the fit and do not at rest, such as two organs, or a
+        sleeve and the arm in it.  Vertices next to landmarks stay; these take precedence.
+        `LandmarkFit.crossings` tells what still crosses.
     n_regions, n_cage_vertices : int, optional
         As of `deform`.
     progress : Progress, optional
@@ -173,6 +182,7 @@ def fit_landmarks(
     u = slid(a, u, tracks)
     _require_extent(a, u)
     goal = checked_goals({"whole": volume})["whole"]
+    avoid_contact = as_flag(avoid_contact, "avoid_contact")
     body = SpringBody(
         mesh,
         n_regions=n_regions,
@@ -184,9 +194,10 @@ def fit_landmarks(
     fitting = _Fitting(body, a, u, np.broadcast_to(sigma, len(a)))
     off = fitting.left_out(part(progress, _BOUND, _TESTED))
     how_often = _times_best(np.linalg.norm(off, axis=2))
-    shares = {k: share for k, share in zip((0.0, *STIFFNESS), how_often, strict=True) if share}
+    every = zip((0.0, *STIFFNESS), how_often.tolist(), strict=True)
+    shares = {stiffness: share for stiffness, share in every if share}
     tell(progress, _TESTED, "moving the body")
-    move = to = fitting.map_of(shares)
+    move = fitting.map_of(shares)
     x = move(None)
     frame = body.problem.frame
     alike = frame.about_origin(x / fitting.scale)  # of about the size at rest
@@ -195,25 +206,49 @@ def fit_landmarks(
             "the targets turn the body inside out, as a mirror image does: exchange left and right "
             "landmarks, or mirror the mesh first"
         )
+    maps, held = [move], np.unique(cKDTree(x).query(move(a))[1])
+    if avoid_contact:
+        tell(progress, _FITTED, "separating what crosses")
+        apart = _separated(body, fitting.scale, x, held)
+        blend = partial(blend_at, x, (apart - x).T)
+        maps.append(lambda points: points + blend(points).T)
+        x = apart
     if goal is not None:
-        tell(progress, _FITTED, "reaching the volume")
+        tell(progress, _APART, "reaching the volume")
         text = f"{_WORDS[goal.bound]}{goal.target(body.enclosed.target)!r}"
         grown = mesh.with_vertices(x)
-        held = np.unique(cKDTree(x).query(move(a))[1])
         parts = regions_and_cages(grown, n_regions, n_cage_vertices)
-        deformer = Deformer(grown, *parts, handle=held, volumes={"whole": text})
+        goals = {"whole": text}
+        deformer = Deformer(
+            grown, *parts, handle=held, volumes=goals, avoid_contact=avoid_contact
+        )  # fmt: skip
         x = np.array(deformer.solve(x[held]).vertices)
+        maps.append(deformer.carry)
 
-        def carried(points: FloatArray | None) -> FloatArray:
-            return deformer.carry(move(points))
+    def to(points: FloatArray) -> FloatArray:
+        for each in maps:
+            points = each(points)
+        return points
 
-        to = carried
     tell(progress, 1.0, "fitted")
     change = body.enclosed.relative(frame.about_origin(x))
     left_out, by_spline = np.linalg.norm([np.tensordot(how_often, off, 1), off[0]], axis=2)
     return LandmarkFit(
         x, u, u - to(a), left_out, by_spline, shares, change, _map=to, _mesh=mesh
     )  # fmt: skip
+
+
+def _separated(body: SpringBody, scale: float, x: FloatArray, held: IntArray) -> FloatArray:
+    """Return the fit *x* (n, 3), in *scale*, with those parts apart that cross only in it.
+
+    The vertices *held* stay; others are as rigid as possible near the fit.
+    """
+    problem = body.problem
+    mesh, stays = problem.mesh, np.isin(np.arange(len(x)), held)
+    energy = CellEnergy.of(mesh.with_vertices(x), len(x) / len(problem.rest_cages))
+    rest = mesh.with_vertices(scale * mesh.vertices)
+    finisher = Finisher(rest, energy, stays, [], problem.cage_weights, avoid_contact=True)
+    return finisher.run(x, x[stays]).vertices
 
 
 def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> FloatArray:

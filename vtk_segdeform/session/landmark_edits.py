@@ -219,6 +219,8 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
     def fit(self, *, volume: str | float = "free", progress: Progress | None = None) -> LandmarkFit:
         """Let the mesh grow and bend to where its landmarks are at their targets, in one undo step.
 
+        Contact is avoided if that is an option of the session.
+
         Parameters
         ----------
         volume : str or float
@@ -263,6 +265,7 @@ class SessionLandmarks(Mapping[str, tuple[FloatArray, FloatArray]]):
             own.target[rows],
             uncertainty=np.nan_to_num(own.uncertainty[rows]),
             volume=volume,
+            avoid_contact=state.options.avoid_contact,
             progress=part(progress, _PREPARED, _FITTED),
         )
         return FittedState(_in_fit(poses, state, frozen(fit.vertices.copy())), fit)
