@@ -8,7 +8,7 @@ towards its targets, and what they leave is mostly growth; see `landmarks`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,12 +16,13 @@ from scipy.spatial import cKDTree
 
 from ..arrays import FloatArray, IntArray
 from ..cages import Cage, fit_cages, require_cage_vertices, suggested_size
+from ..finish import CellEnergy, Finisher
 from ..kernels import one_blas_thread
 from ..mesh import Mesh
 from ..progress import Progress, part
 from ..regions import Regions, segment
 from ..solver import Anchors, GaussNewton, PositionTerm, SolverOptions, Volumes
-from ..subspace import Passengers
+from ..subspace import Passengers, blend_at
 from .enclosed_volume import EnclosedVolume
 from .problem import Problem
 
@@ -117,6 +118,24 @@ class SpringBody:
             solver = GaussNewton(problem.energy, term, Volumes(problem.subspace))
             p = solver.minimise(p, targets, _STEPS).p
             yield SpringPose(problem, p)
+
+    @one_blas_thread()
+    def separated(
+        self, x: FloatArray, held: IntArray, scale: float
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        """Return a pose *x* (n, 3) with those parts apart that cross only in it, and the map to it.
+
+        The vertices *held* stay; others are as rigid as possible near *x*, which is the body at
+        rest in another *scale*, grown and bent.
+        """
+        problem = self.problem
+        mesh, stays = problem.mesh, np.isin(np.arange(len(x)), held)
+        energy = CellEnergy.of(mesh.with_vertices(x), len(x) / len(problem.rest_cages))
+        rest = mesh.with_vertices(scale * mesh.vertices)
+        finisher = Finisher(rest, energy, stays, [], problem.cage_weights, avoid_contact=True)
+        apart = finisher.run(x, x[stays]).vertices
+        moves = (apart - x).T
+        return apart, lambda points: points + blend_at(x, moves, points).T
 
 
 def regions_and_cages(

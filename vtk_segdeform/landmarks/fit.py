@@ -30,7 +30,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -41,12 +40,10 @@ from ..arrays import FloatArray, IntArray, as_numbers, as_points
 from ..checks import as_flag
 from ..deformer import Deformer, SpringBody, SpringPose, checked_goals, regions_and_cages
 from ..errors import ArgumentError, ConstraintError
-from ..finish import CellEnergy, Finisher
 from ..geometry import rigid_fit
 from ..kernels import one_blas_thread
 from ..mesh import Mesh, new_crossings, require_mesh
 from ..progress import Progress, part, tell
-from ..subspace import blend_at
 from .semilandmarks import checked_slides, slid
 from .spline import CENTRES, Compact, Spline, smoothing_of
 
@@ -206,13 +203,12 @@ def fit_landmarks(
             "the targets turn the body inside out, as a mirror image does: exchange left and right "
             "landmarks, or mirror the mesh first"
         )
-    maps, held = [move], np.unique(cKDTree(x).query(move(a))[1])
+    maps: list[Callable[[FloatArray], FloatArray]] = [move]
+    held = np.unique(cKDTree(x).query(move(a))[1])
     if avoid_contact:
         tell(progress, _FITTED, "separating what crosses")
-        apart = _separated(body, fitting.scale, x, held)
-        blend = partial(blend_at, x, (apart - x).T)
-        maps.append(lambda points: points + blend(points).T)
-        x = apart
+        x, along = body.separated(x, held, fitting.scale)
+        maps.append(along)
     if goal is not None:
         tell(progress, _APART, "reaching the volume")
         text = f"{_WORDS[goal.bound]}{goal.target(body.enclosed.target)!r}"
@@ -236,19 +232,6 @@ def fit_landmarks(
     return LandmarkFit(
         x, u, u - to(a), left_out, by_spline, shares, change, _map=to, _mesh=mesh
     )  # fmt: skip
-
-
-def _separated(body: SpringBody, scale: float, x: FloatArray, held: IntArray) -> FloatArray:
-    """Return the fit *x* (n, 3), in *scale*, with those parts apart that cross only in it.
-
-    The vertices *held* stay; others are as rigid as possible near the fit.
-    """
-    problem = body.problem
-    mesh, stays = problem.mesh, np.isin(np.arange(len(x)), held)
-    energy = CellEnergy.of(mesh.with_vertices(x), len(x) / len(problem.rest_cages))
-    rest = mesh.with_vertices(scale * mesh.vertices)
-    finisher = Finisher(rest, energy, stays, [], problem.cage_weights, avoid_contact=True)
-    return finisher.run(x, x[stays]).vertices
 
 
 def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> FloatArray:
