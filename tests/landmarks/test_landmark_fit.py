@@ -194,7 +194,7 @@ def test_shares_are_how_often_samples_of_landmarks_are_predicted_best():
     assert len(fit.shares) > 1
     errors = np.array([[1.0, 1.0, 4.0], [2.0, 2.0, 1.8], [3.0, 3.0, 5.0]])
     untested = np.full((3, 1), np.nan)
-    often = fitting._times_best(np.hstack([errors, untested]))
+    often = fitting._shares_best(np.hstack([errors, untested]))
     # the square roots of the first are less unless the third landmark is drawn more than once
     assert_allclose(often, [20 / 27, 7 / 27, 0.0], atol=0.05)
 
@@ -203,7 +203,7 @@ def test_a_fit_is_the_mean_of_those_of_its_shares(monkeypatch):
     truth, ids = bent(120.0), SPREAD[:8]
 
     def by(*shares):
-        monkeypatch.setattr(fitting, "_times_best", lambda _: np.array(shares))
+        monkeypatch.setattr(fitting, "_shares_best", lambda _: np.array(shares))
         return fit_landmarks(BAR, X[ids], truth[ids], **OPTIONS)
 
     grown, soft = by(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), by(0.0, 1.0, 0.0, 0.0, 0.0, 0.0)

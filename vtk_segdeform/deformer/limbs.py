@@ -119,7 +119,7 @@ class Levels:
 
     @property
     def up(self) -> FloatArray:
-        """How far each point is up another limb than p, (s,): f - m."""
+        """How far up another limb than that of p each point is, (s,): f - m."""
         return self.f - self.inner
 
     def within(self, depth: float) -> BoolArray:

@@ -278,7 +278,7 @@ class SurfaceSamples:
     def _beyond_joint(self, levels: Sequence[Levels], depth: float) -> FloatArray:
         """Return the distance of each sample from the limbs whose joints have this *depth*, (s,).
 
-        The way up other limbs counts more.
+        The way up another limb counts five times.
         """
         inside = np.any([each.within(depth) for each in levels], axis=0)
         up = np.where(inside, 0.0, np.min([each.up for each in levels], axis=0))

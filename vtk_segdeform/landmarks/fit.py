@@ -12,11 +12,12 @@ Springs that are infinitely soft leave all of the motion to the spline, which is
 landmarks alone: a body that grows smoothly.  Stiff ones leave nothing: a body that keeps its
 lengths.  In between soft springs bend limbs, which costs little energy, and do not stretch them.
 How stiff they are is decided by cross-validation: landmarks are left out, group by group, and the
-best stiffness is that whose predictions of them are off by least.  Square roots of errors are
-added, so that a tip, which nothing can predict, does not decide.  A few landmarks tell this badly,
-so the best one is found for many samples of them, drawn with replacement (bagging), and the map is
-the mean of those of each stiffness, weighted by how often it was the best.  Where all agree, as on
-what grows, that is a single one; the others are off in different directions, and the mean by less.
+best stiffness is the one that predicts them with the smallest errors.  Square roots of errors are
+added, so that a tip, which nothing can predict, does not decide.  With few landmarks this is a
+matter of chance, so the best one is found for many samples of them, drawn with replacement
+(bagging), and the map is the mean of those of each stiffness, weighted by how often it was best.
+Where all samples agree, as on what grows, that is a single one.  Where they do not, each map is
+off in another direction, and their mean by less.
 
 Before, the body is brought to its targets by a similarity, whose scale is the median of that of
 the distances from landmarks to their nearest ones, which hardly change when a body bends.
@@ -79,8 +80,8 @@ class LandmarkFit:
     left_out_spline: FloatArray
     """(k,) float: the same of the thin-plate spline alone."""
     shares: Mapping[float, float]
-    """In how many samples of the landmarks each stiffness of springs predicts them best, of 1: its
-    share in the fit.  0: the spline alone, nothing is bent."""
+    """The share of samples of the landmarks that each stiffness of springs predicts best, which is
+    its share in the fit.  0: the spline alone, nothing is bent."""
     volume_change: float
     """(V - V0) / V0 of `vertices`, signed; 0 if nothing is enclosed."""
     _map: Callable[[FloatArray], FloatArray] = field(repr=False)
@@ -190,7 +191,7 @@ def fit_landmarks(
         raise ConstraintError("volume must be 'free': the mesh encloses none")
     fitting = _Fitting(body, a, u, np.broadcast_to(sigma, len(a)))
     off = fitting.left_out(part(progress, _BOUND, _TESTED))
-    how_often = _times_best(np.linalg.norm(off, axis=2))
+    how_often = _shares_best(np.linalg.norm(off, axis=2))
     every = zip((0.0, *STIFFNESS), how_often.tolist(), strict=True)
     shares = {stiffness: share for stiffness, share in every if share}
     tell(progress, _TESTED, "moving the body")
@@ -336,8 +337,8 @@ class _Fitting:
         return x, r, _turned(np.swapaxes(r, 1, 2), self._u - x)
 
 
-def _times_best(errors: FloatArray) -> FloatArray:
-    """Return in how many of samples of the landmarks each of r rows of *errors* is best, of 1.
+def _shares_best(errors: FloatArray) -> FloatArray:
+    """Return the share of samples of the landmarks in which each row of *errors* is best, (r,).
 
     *errors* (r, k) has NaN for landmarks that were not tested.
     """

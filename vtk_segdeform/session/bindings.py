@@ -17,10 +17,11 @@ from ..errors import CageError
 from ..files import cache_folder
 from ..freezing import Memo
 from ..mesh import Mesh
-from ..progress import Progress
+from ..progress import Progress, part, tell
 from .state import State
 
 _KEPT = 3  # deformers of each kind
+_BOUND = 0.7  # of the progress; the stiffness takes the rest
 
 
 class Stiffened(NamedTuple):
@@ -59,11 +60,14 @@ class Bindings:
         CageError
             If there are no cages, or they do not fit.
         """
-        found, stiffness = self.bound(state, progress), state.stiffness
+        stiffness = state.stiffness
         if stiffness is None:
-            return self._with_parts(self._mirrored(state), state)
+            self.bound(state, progress)
+            return self.enclosing(state)
+        found = self.bound(state, part(progress, 0.0, _BOUND))
 
         def stiffened() -> Deformer:
+            tell(progress, _BOUND, "binding the stiffness")
             return self._mirrored(state).stiffened(stiffness)
 
         inputs = _stiffening(found, state)

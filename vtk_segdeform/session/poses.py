@@ -37,7 +37,7 @@ from .bindings import Bindings
 from .handles import stacked
 from .state import Cages, Pose, State
 
-_KEPT = 3  # bound deformers, rotations and surfaces of the last poses
+_KEPT = 3  # rotations and surfaces of the last poses
 _MOST_CARRIED = 16  # files whose points stay bound
 # The options that are not those of `Deformer.hold`: of cages, regions and the binding.
 _NOT_HELD = {

@@ -451,12 +451,12 @@ class Controller:
             self.start("Computing local volume change", widgets.measure, lambda _: None)
 
     def _prepare_pulls(self, *, again: bool = False) -> None:
-        """Prepare the session for pulls in mode PULL; *again* even after an error or Escape.
+        """Prepare the session if the mode needs it; *again* even after an error or Escape.
 
-        Another mode continues a preparation, but its result waits for mode PULL.
+        Another mode continues a preparation, but its result waits for one that does.
         """
         if self._is_on and not self.is_busy:
-            self._preparing.update(self.session, start=self._is_pulling, again=again)
+            self._preparing.update(self.session, start=self._needs_binding, again=again)
             if self._mode is Mode.PULL and self._preparing.fraction is not None:
                 Draft.of(self.view).begin(if_slow=True)
 
@@ -464,11 +464,11 @@ class Controller:
         """Return whether the session may be prepared now: nothing is being pulled or painted."""
         session = self.session
         is_pulling = session.is_bound and any(w.is_grabbing for w in self.widgets.interactive)
-        return self._is_pulling and not (self.is_busy or session.is_dragging or is_pulling)
+        return self._needs_binding and not (self.is_busy or session.is_dragging or is_pulling)
 
     @property
-    def _is_pulling(self) -> bool:
-        """Whether the mode is PULL, or DEFORM with cages: other ones, if the stiffness changed."""
+    def _needs_binding(self) -> bool:
+        """Whether the mode is PULL, or DEFORM with cages, whose stiffness may have changed."""
         return self._mode is Mode.PULL or (self._mode is Mode.DEFORM and bool(self.session.cages))
 
     def is_free(self) -> bool:
