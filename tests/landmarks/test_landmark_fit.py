@@ -186,34 +186,11 @@ def test_two_bars_that_would_meet_between_their_landmarks_are_kept_apart(gap, bo
         assert fit.volume_change == pytest.approx(0.5, abs=1e-9)
 
 
-def test_shares_are_how_often_samples_of_landmarks_are_predicted_best():
-    truth, ids = bent(120.0), SPREAD[:12]
-    fit = fit_landmarks(BAR, X[ids], truth[ids], **OPTIONS)
-    assert sum(fit.shares.values()) == pytest.approx(1.0)
-    assert fit.shares[fit.stiffness] == max(fit.shares.values())
-    assert len(fit.shares) > 1
-    errors = np.array([[1.0, 1.0, 4.0], [2.0, 2.0, 1.8], [3.0, 3.0, 5.0]])
-    untested = np.full((3, 1), np.nan)
-    often = fitting._shares_best(np.hstack([errors, untested]))
-    # the square roots of the first are less unless the third landmark is drawn more than once
-    assert_allclose(often, [20 / 27, 7 / 27, 0.0], atol=0.05)
-
-
-def test_a_fit_is_the_mean_of_those_of_its_shares(monkeypatch):
-    truth, ids = bent(120.0), SPREAD[:8]
-
-    def by(*shares):
-        monkeypatch.setattr(fitting, "_shares_best", lambda _: np.array(shares))
-        return fit_landmarks(BAR, X[ids], truth[ids], **OPTIONS)
-
-    grown, soft = by(1.0, 0.0, 0.0, 0.0, 0.0, 0.0), by(0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
-    both = by(0.25, 0.75, 0.0, 0.0, 0.0, 0.0)
-    assert np.abs(grown.vertices - soft.vertices).max() > 0.01 * LENGTH
-    assert_allclose(both.vertices, 0.25 * grown.vertices + 0.75 * soft.vertices, atol=1e-9)
-    assert_allclose(grown.left_out, grown.left_out_spline, atol=1e-12)
-    assert (both.left_out <= 0.25 * grown.left_out + 0.75 * soft.left_out + 1e-9).all()
-    assert both.shares == {0.0: 0.25, 0.01: 0.75}
-    assert both.stiffness == 0.01
+def test_a_landmark_that_nothing_predicts_does_not_decide_on_the_stiffness(monkeypatch):
+    errors = np.full((1 + len(fitting.STIFFNESS), 9), 5.0)
+    errors[0], errors[0, 0], errors[1] = 1.0, 9.0, 1.6  # a larger sum, a smaller one of roots
+    monkeypatch.setattr(fitting._Fitting, "left_out", lambda *_: errors)
+    assert fit_landmarks(BAR, X[SPREAD[:9]], bent(60.0)[SPREAD[:9]], **OPTIONS).stiffness == 0.0
 
 
 def test_faults_are_told_before_anything_is_computed():

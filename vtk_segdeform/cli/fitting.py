@@ -147,8 +147,7 @@ def _report(fit: LandmarkFit, pairs: Pairs, say: Say) -> None:
         f"landmarks       {len(away)}, off by {_rms(away):.3g} root mean square, at most "
         f"{away[worst]:.3g}: {pairs.names[worst]}"
     )
-    bent = [f"{100.0 * part:.0f} % with stiffness {k:g}" for k, part in fit.shares.items() if k]
-    text = f"bent {', '.join(bent)}" if bent else "grown, not bent"
+    text = "grown, not bent" if not fit.stiffness else f"bent, stiffness {fit.stiffness:g}"
     one, other = _rms(fit.left_out), _rms(fit.left_out_spline)
     say(f"left out        off by {one:.3g} ({text}); by a thin-plate spline {other:.3g}")
     if crossings := len(fit.crossings()):

@@ -12,26 +12,17 @@ Springs that are infinitely soft leave all of the motion to the spline, which is
 landmarks alone: a body that grows smoothly.  Stiff ones leave nothing: a body that keeps its
 lengths.  In between soft springs bend limbs, which costs little energy, and do not stretch them.
 How stiff they are is decided by cross-validation: landmarks are left out, group by group, and the
-best stiffness is the one that predicts them with the smallest errors.  Square roots of errors are
-added, so that a tip, which nothing can predict, does not decide.  With few landmarks this is a
-matter of chance, so the best one is found for many samples of them, drawn with replacement
-(bagging), and the map is the mean of those of each stiffness, weighted by how often it was best.
-Where all samples agree, as on what grows, that is a single one.  Where they do not, each map is
-off in another direction, and their mean by less.
+stiffness is used that predicts them with the smallest errors.  Square roots of errors are added, so
+that a tip, which nothing can predict, does not decide.
 
 Before, the body is brought to its targets by a similarity, whose scale is the median of that of
 the distances from landmarks to their nearest ones, which hardly change when a body bends.
-
-Source
-------
-L. Breiman, "Bagging predictors", Machine Learning 24(2), 1996.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,9 +45,7 @@ moves, with the last they hold.  0, the spline alone, is compared as well."""
 LEAST_PAIRS = 3
 """Of a fit: fewer do not tell how a body is turned."""
 _GROUPS = 12  # of landmarks that are left out, at most
-_DRAWS = 1000  # of samples of the landmarks: shares are exact to 1.6 %
 _BOUND, _TESTED, _FITTED, _APART = 0.3, 0.75, 0.85, 0.9  # of the progress
-_Map: TypeAlias = Callable[[FloatArray | None], FloatArray]
 _WORDS = {0: "", 1: "at least ", -1: "at most "}
 
 
@@ -75,22 +64,16 @@ class LandmarkFit:
     """(k, 3) float: from where the landmarks are now to their targets."""
     left_out: FloatArray
     """(k,) float: the distance of each from its target when it is left out, with its group of at
-    most a twelfth of them, by the same shares.  Of more than 200 landmarks so many are tested,
+    most a twelfth of them, by the chosen stiffness.  Of more than 200 landmarks so many are tested,
     which are spread over the body; the others have NaN."""
     left_out_spline: FloatArray
     """(k,) float: the same of the thin-plate spline alone."""
-    shares: Mapping[float, float]
-    """The share of samples of the landmarks that each stiffness of springs predicts best, which is
-    its share in the fit.  0: the spline alone, nothing is bent."""
+    stiffness: float
+    """Of the springs that predict landmarks best; 0: the spline alone, nothing is bent."""
     volume_change: float
     """(V - V0) / V0 of `vertices`, signed; 0 if nothing is enclosed."""
     _map: Callable[[FloatArray], FloatArray] = field(repr=False)
     _mesh: Mesh = field(repr=False)
-
-    @property
-    def stiffness(self) -> float:
-        """The one with the largest share."""
-        return max(self.shares, key=self.shares.__getitem__)
 
     def moved(self, points: ArrayLike) -> FloatArray:
         """Return other points (q, 3), given at rest, moved along: near the body, or inside it."""
@@ -190,12 +173,11 @@ def fit_landmarks(
     if goal is not None and not body.enclosed.has_volume:
         raise ConstraintError("volume must be 'free': the mesh encloses none")
     fitting = _Fitting(body, a, u, np.broadcast_to(sigma, len(a)))
-    off = fitting.left_out(part(progress, _BOUND, _TESTED))
-    how_often = _shares_best(np.linalg.norm(off, axis=2))
-    every = zip((0.0, *STIFFNESS), how_often.tolist(), strict=True)
-    shares = {stiffness: share for stiffness, share in every if share}
+    errors = fitting.left_out(part(progress, _BOUND, _TESTED))
+    best = int(np.nansum(np.sqrt(errors), axis=1).argmin())
+    stiffness = (0.0, *STIFFNESS)[best]
     tell(progress, _TESTED, "moving the body")
-    move = fitting.map_of(shares)
+    move = fitting.map_of(stiffness)
     x = move(None)
     frame = body.problem.frame
     alike = frame.about_origin(x / fitting.scale)  # of about the size at rest
@@ -229,10 +211,8 @@ def fit_landmarks(
 
     tell(progress, 1.0, "fitted")
     change = body.enclosed.relative(frame.about_origin(x))
-    left_out, by_spline = np.linalg.norm([np.tensordot(how_often, off, 1), off[0]], axis=2)
-    return LandmarkFit(
-        x, u, u - to(a), left_out, by_spline, shares, change, _map=to, _mesh=mesh
-    )  # fmt: skip
+    tested = errors[best], errors[0]
+    return LandmarkFit(x, u, u - to(a), *tested, stiffness, change, _map=to, _mesh=mesh)
 
 
 def _targets(target: ArrayLike, count: int, slides: Sequence[IntArray]) -> FloatArray:
@@ -270,41 +250,38 @@ class _Fitting:
         smoothing = smoothing_of(a[few], u[few], sigma[few])
         self._spline = Spline(a[few], smoothing)
         self._splits = []
-        self._alone = np.full(a.shape, np.nan)
+        self._alone = np.full(len(a), np.nan)
         group = np.arange(len(few)) % _GROUPS
         for number in range(min(_GROUPS, len(few))):
             stays, left = group != number, few[group == number]
             kept, spline = few[stays], Spline(a[few[stays]], smoothing[stays])
             self._splits.append((kept, left, spline))
-            self._alone[left] = spline.at(a[left], u[kept]) - u[left]
+            self._alone[left] = np.linalg.norm(spline.at(a[left], u[kept]) - u[left], axis=1)
         self.scale = _scale_between(a[few], u[few])
         self._rotation, self._shift = rigid_fit(self.scale * a[few], u[few])
         self._u = (u - self._shift) @ self._rotation / self.scale
         self._sigma = sigma / self.scale
 
     def left_out(self, progress: Progress | None) -> FloatArray:
-        """Return how far each landmark is from its target if left out, (1 + stiffness, k, 3)."""
-        found = np.full((1 + len(STIFFNESS), *self._a.shape), np.nan)
+        """Return the distance of each landmark from its target if left out, (1 + stiffness, k)."""
+        found = np.full((1 + len(STIFFNESS), len(self._a)), np.nan)
         found[0] = self._alone
         for number, (kept, left, spline) in enumerate(self._splits):
             tell(progress, number / len(self._splits), "leaving out landmarks")
             for row, pose in zip(found[1:], self._poses(kept, STIFFNESS), strict=True):
                 x, r, back = self._left(pose)
-                off = x[left] + _turned(r[left], spline.at(self._a[left], back[kept]))
-                row[left] = self.scale * (off - self._u[left]) @ self._rotation.T
+                x = x[left] + _turned(r[left], spline.at(self._a[left], back[kept]))
+                row[left] = self.scale * np.linalg.norm(x - self._u[left], axis=1)
         return found
 
-    def map_of(self, shares: Mapping[float, float]) -> _Map:
-        """Return the map of points (q, 3), or of the vertices (n, 3) for None.
-
-        It is the mean of those of each stiffness with these *shares*.
-        """
-        a, few, rest = self._a, self._few, self._body.problem.mesh.vertices
-        upto = [k for k in STIFFNESS if k <= max(shares)]
-        every = dict(zip(upto, self._poses(few, upto), strict=True))
-        poses, weights = [every.get(k) for k in shares], list(shares.values())
-        back = np.hstack([self._u - a if p is None else self._left(p)[2] for p in poses])
-        compact = None
+    def map_of(self, stiffness: float) -> Callable[[FloatArray | None], FloatArray]:
+        """Return the map of points (q, 3), or of the vertices (n, 3) for None."""
+        a, few, pose, back = self._a, self._few, None, self._u - self._a
+        if stiffness:
+            upto = [k for k in STIFFNESS if k <= stiffness]
+            *_, pose = self._poses(few, upto)
+            *_, back = self._left(pose)
+        rest, compact = self._body.problem.mesh.vertices, None
         if len(few) < len(a):
             more = back - self._spline.at(a, back[few])
             more[few] = 0.0
@@ -315,14 +292,10 @@ class _Fitting:
             grown = self._spline.at(at, back[few])
             if compact is not None:
                 grown += compact.at(at)
-            on = self._body.attach(at) if every and points is not None else None
-            x = np.zeros_like(at)
-            for share, pose, s in zip(weights, poses, np.hsplit(grown, len(poses)), strict=True):
-                if pose is None:
-                    x += share * (at + s)
-                else:
-                    middle, r = pose.surface() if on is None else pose.at(on)
-                    x += share * (middle + _turned(r, s))
+            x = at + grown
+            if pose is not None:
+                x, r = pose.surface() if points is None else pose.at(self._body.attach(points))
+                x = x + _turned(r, grown)
             return np.asarray(self.scale * x @ self._rotation.T + self._shift)
 
         return move
@@ -335,18 +308,6 @@ class _Fitting:
         """Return where landmarks are, their rotations, and what is left to the targets, at rest."""
         x, r = pose.at(self._points)
         return x, r, _turned(np.swapaxes(r, 1, 2), self._u - x)
-
-
-def _shares_best(errors: FloatArray) -> FloatArray:
-    """Return the share of samples of the landmarks in which each row of *errors* is best, (r,).
-
-    *errors* (r, k) has NaN for landmarks that were not tested.
-    """
-    roots = np.sqrt(errors[:, ~np.isnan(errors[0])])
-    k = roots.shape[1]
-    drawn = np.random.default_rng(0).integers(k, size=(_DRAWS, k))
-    best = roots[:, drawn].sum(axis=2).argmin(axis=0)
-    return np.asarray(np.bincount(best, minlength=len(errors)) / _DRAWS)
 
 
 def _turned(rotations: FloatArray, vectors: FloatArray) -> FloatArray:

@@ -75,12 +75,11 @@ class Spline:
         return np.hstack([phi, np.ones((len(x), 1)), x])
 
     def at(self, points: FloatArray, values: FloatArray) -> FloatArray:
-        """Return s of the *values* (k, c) of the centres at *points* (n, 3), (n, c)."""
+        """Return s of the *values* (k, 3) of the centres at *points* (n, 3)."""
         factors = self._inverse @ values
         size = max(_PIECE // len(factors), 1)
         pieces = [points[i : i + size] for i in range(0, len(points), size)]
-        none = np.empty((0, factors.shape[1]))
-        return np.concatenate([none, *(self._basis(q) @ factors for q in pieces)])
+        return np.concatenate([np.empty((0, 3)), *(self._basis(q) @ factors for q in pieces)])
 
 
 def smoothing_of(centres: FloatArray, values: FloatArray, sigma: FloatArray) -> FloatArray:
@@ -114,7 +113,7 @@ class Compact:
     Parameters
     ----------
     centres : (k, 3) float
-    values : (k, c) float
+    values : (k, 3) float
     sigma : (k,) float
         Standard deviations of the values.
     """
