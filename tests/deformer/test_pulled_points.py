@@ -11,6 +11,7 @@ from vtk_segdeform.cages.cage import Cage
 from vtk_segdeform.deformer.deformer import Deformer
 from vtk_segdeform.deformer.pull import pull
 from vtk_segdeform.errors import ConstraintError
+from vtk_segdeform.geometry import rigid_fit
 from vtk_segdeform.mesh import Mesh, SurfacePoint, distance_to_surface
 from vtk_segdeform.regions.regions import Regions
 
@@ -53,6 +54,19 @@ def test_a_pulled_point_reaches_its_target_exactly(shares, refine, deformer):
     assert solution.handle_error == pytest.approx(off / MESH.diagonal, abs=1e-12)
     assert abs(solution.volume_change) < 1e-12
     assert np.linalg.norm(solution.vertices[point.vertex] - X[point.vertex] - shift) > 1e-4
+
+
+def test_a_pulled_point_of_a_rigid_part_takes_the_part_along(deformer):
+    point, shift = SurfacePoint.of(MESH.faces[40], (0.2, 0.5, 0.3)), np.array([0.2, -0.1, 0.3])
+    is_rigid = np.linalg.norm(X - point.at(X), axis=1) < 0.5
+    part = deformer.stiffened(np.where(is_rigid, np.inf, 1.0))
+    solution = pulled(part, point, shift, refine=True)
+    turn, moved = rigid_fit(X[is_rigid], solution.vertices[is_rigid])
+    assert_allclose(solution.vertices[is_rigid], X[is_rigid] @ turn.T + moved, atol=1e-9)
+    off = np.linalg.norm(point.at(solution.vertices) - point.at(X) - shift)
+    assert off < 1e-2 * MESH.diagonal
+    assert solution.handle_error == pytest.approx(off / MESH.diagonal, abs=1e-12)
+    assert abs(solution.volume_change) < 1e-12
 
 
 def test_a_pull_of_a_vertex_is_the_same_by_its_number_and_as_a_point(deformer):

@@ -187,11 +187,14 @@ def _is_near_pulled_points(constraints: Constraints) -> BoolArray:
 
 
 def _place_points(path: Path, places: FloatArray, stays: BoolArray) -> None:
-    """Move corners that stay at *places* (n, 3) so that pulled points are at their targets."""
+    """Move corners that stay at *places* (n, 3) so that pulled points are at their targets.
+
+    A point in a rigid part has no such corners, and goes with the part.
+    """
     pulled, frame = path.constraints.pulled, path.constraints.problem.frame
     goals = frame.outward(path.targets[pulled.targets] + pulled.levers)
     for point, goal in zip(pulled.points, frame.about_origin(goals), strict=True):
-        if not point.is_vertex:
-            corners, shares = np.array(point.corners), np.array(point.shares)
-            free = stays[corners]
+        corners, shares = np.array(point.corners), np.array(point.shares)
+        free = stays[corners]
+        if not point.is_vertex and free.any():
             places[corners[free]] += (goal - point.at(places)) / shares[free].sum()
